@@ -66,4 +66,4 @@ def _turns(harmonics: int) -> Complex:
     """complex[_INSTANTS, H]: the harmonics 1..H over one period, of size 1."""
     turns = np.exp(2j * np.pi * np.outer(np.arange(_INSTANTS) / _INSTANTS, np.arange(1, harmonics + 1)))
     turns.setflags(write=False)
-    return turns
+    return np.asarray(turns)

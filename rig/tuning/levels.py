@@ -50,7 +50,9 @@ def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float)
 
 PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
 SPAN = 30.0  # highest level over lowest, where noise allows
-LEAST_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; with less, the lowest points may be refused
+LEAST_SPAN = (
+    1.5  # highest level over lowest that rounding may reduce it to; with less, the lowest points may be refused
+)
 BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
 ALIEN = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
 NARROW = 10.0  # span below which rounding may add more, and the plan accepts more

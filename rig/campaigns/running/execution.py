@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,6 +14,7 @@ from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.skipped import what_was_skipped
 from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.vibrations import failed_point
@@ -70,7 +72,10 @@ class Journal(Protocol):
 
 
 class Execution:
-    """One part of a recording: runs the control loop, writes the journal and evaluates the points."""
+    """One part of a recording: runs the control loop, writes the journal and evaluates the points.
+
+    Rows of a record too long for memory wait for their evaluation in unnamed files in ``folder``.
+    """
 
     def __init__(
         self,
@@ -80,6 +85,7 @@ class Execution:
         journal: Journal,
         progress: Progress,
         before: MeasuredBefore | None = None,
+        folder: Path | None = None,
     ) -> None:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
@@ -102,7 +108,7 @@ class Execution:
         self.next_segment = 0
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
-        self.kept = RowBuffer(loop.tick.row_dtype)
+        self.kept = RowBuffer(loop.tick.row_dtype, folder)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
         self.evaluations = EvaluationThread()
         self.write_error: RecordingError | None = None
@@ -207,10 +213,10 @@ class Execution:
                     self.evaluations.known(failed_point(self.plan, target, entry, locked=self.locked))
                 elif kind in EVALUATED:
                     settling = outcomes[self.next_segment - 1].copy()
-                    rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
+                    record = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
                     steady = kind == SegmentKind.RECORD
                     faults = self._faults(self.next_segment, self.next_segment + 1, settled=steady)
-                    self.evaluations.ask(self._measured, first, rows, faults, steady, target, settling)
+                    self.evaluations.ask(self._measured, first, record, faults, steady, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
         while self.evaluations if self.loop.waits else self.evaluations.ready():
@@ -236,9 +242,7 @@ class Execution:
             first = self._point_begins(first - 1)
         return int(self.tick.outcomes["faults"][first:end].sum())
 
-    def _measured(
-        self, first: int, rows: np.ndarray, faults: int, steady: bool, target: Any, *told: Any
-    ) -> list[Point[Any]]:
+    def _measured(self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
         """Evaluate the points in rows that begin with sample ``first``.
 
         ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
