@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.signals.chunks import Line, Phase, Record, spans
-from identification.validation import finite_array
+from identification.validation import finite
 
 __all__ = ["Columns", "Stretch", "least_squares"]
 
@@ -47,11 +47,12 @@ class Columns:
         if self._single is not None:
             yield self._single
             return
+        if next(spans(self.count)) == (0, self.count):
+            self._single = self._read(0, self.count)
+            yield self._single
+            return
         for start, stop in spans(self.count):
-            chunk = self._read(start, stop)
-            if stop - start == self.count:
-                self._single = chunk
-            yield chunk
+            yield self._read(start, stop)
 
     def _read(self, start: int, stop: int) -> Stretch:
         theta = self._phase.read(start, stop)
@@ -63,7 +64,7 @@ class Columns:
         if lost.any():
             samples = np.where(lost, 0.0, samples)
         design[lost] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
-        return Stretch(theta, design, finite_array("samples", samples, np.float64, 2).T, lost)
+        return Stretch(theta, design, finite("samples", samples).T, lost)
 
     def _repeating(self, start: int, stop: int) -> Float:
         """float[stop - start, 2 H]: harmonics of a phase that advances uniformly."""

@@ -206,6 +206,7 @@ def _solved(chunks: Columns) -> tuple[Float, int]:
         normal = normal + chunk.design.T @ chunk.design
         right = right + chunk.design.T @ chunk.data
         lost += int(chunk.lost.sum())
+        del chunk  # before the next is read
     _refuse_lost(lost, chunks.count)
     return least_squares(np.asarray(normal), np.asarray(right)), chunks.count - lost
 
@@ -221,8 +222,8 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
     sums, known = np.zeros((batches, columns, solution.shape[1])), np.zeros(batches, int)
     borders: Float | None = None
     for chunk in chunks:
-        residual = chunk.data - chunk.design @ solution
-        squares += np.sum(residual**2, axis=0)
+        residual = chunk.design @ solution
+        np.subtract(chunk.data, residual, out=residual)
         if borders is None:
             borders = chunk.theta[0] + 2.0 * np.pi * np.round(np.linspace(0, periods, batches + 1))
         edges = np.searchsorted(chunk.theta, borders)
@@ -230,6 +231,8 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
             if stop > start:
                 sums[batch] += chunk.design[start:stop, :columns].T @ residual[start:stop]
                 known[batch] += int((~chunk.lost[start:stop]).sum())
+        squares += np.sum(np.multiply(residual, residual, out=residual), axis=0)
+        del chunk, residual  # before the next is read
     return squares, sums / np.maximum(known, 1)[:, None, None] if batches else None
 
 

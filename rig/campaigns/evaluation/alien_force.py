@@ -14,7 +14,7 @@ from rig.campaigns.evaluation.rows import Rows
 __all__ = ["FEWEST_PERIODS", "alien_force"]
 
 FEWEST_PERIODS = 14  # with fewer periods, lines between two harmonics cannot be separated from the harmonics
-LONGEST = 2**19  # samples whose spectrum is computed at once: with more, memory would grow with the record
+LONGEST = 2**18  # samples whose spectrum is computed at once: with more, memory would grow with the record
 MAIN_LOBE = 4.4  # half width of a line, in bins, with some room
 STANDS_OUT = 15.0  # times the noise: of a million bins of noise alone, one is that high
 WINDOW = (0.35875, -0.48829, 0.14128, -0.01168)  # Blackman-Harris: side lobes 92 dB down, below any converter's noise
