@@ -13,6 +13,9 @@ __all__ = ["Columns", "Stretch", "least_squares"]
 
 Float = NDArray[np.float64]
 
+_MOST_KEPT = 2**22
+"""Numbers that are kept in memory rather than computed again."""
+
 
 class Stretch(NamedTuple):
     """A stretch of the whole periods of a record; rows of zeros where samples were lost."""
@@ -30,7 +33,7 @@ class Stretch(NamedTuple):
 class Columns:
     """The first ``count`` samples of a record, whole periods, in chunks; as often as they are iterated over.
 
-    The ripple of the phase is removed and a drift is fitted if there are ``many`` periods. A single chunk is kept in memory.
+    The ripple of the phase is removed and a drift is fitted if there are ``many`` periods. Few chunks are kept in memory.
     """
 
     def __init__(self, record: Record, phase: Phase, count: int, harmonics: int, *, many: bool) -> None:
@@ -38,21 +41,23 @@ class Columns:
         self.count = count
         self._straight = Line(phase.first, phase.at(count - 1), count)
         self._position = Line(-0.5, 0.5, count)
-        self._single: Stretch | None = None
+        self._kept: list[Stretch] = []
         self._columns: tuple[int, int, Float] | None = None
         self._drifts = many
         self._swing = self._ripple() if many else None
 
     def __iter__(self) -> Iterator[Stretch]:
-        if self._single is not None:
-            yield self._single
+        if self._kept:
+            yield from self._kept
             return
-        if next(spans(self.count)) == (0, self.count):
-            self._single = self._read(0, self.count)
-            yield self._single
-            return
+        kept = []
         for start, stop in spans(self.count):
-            yield self._read(start, stop)
+            chunk = self._read(start, stop)
+            if self.count * (chunk.design.shape[1] + chunk.data.shape[1]) <= _MOST_KEPT:
+                kept.append(chunk)
+            yield chunk
+            del chunk  # before the next is read
+        self._kept = kept
 
     def _read(self, start: int, stop: int) -> Stretch:
         theta = self._phase.read(start, stop)

@@ -50,12 +50,16 @@ def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) 
         position = np.real(turns @ harmonics[row, 1:]) / step
         noise = max((residual_rms[row] / step) ** 2 - 1.0 / 12.0, 0.0)
         variance = np.zeros(orders.size)
+        first = np.exp(2j * np.pi * position)
+        turn = np.ones_like(first)
         for order in range(1, _ORDERS + 1):
             size = step / (np.pi * order) * np.exp(-2.0 * (np.pi * order) ** 2 * noise)
             if size < _NEGLIGIBLE * step:
                 break
-            spread = np.abs(np.fft.fft(np.exp(2j * np.pi * order * position)) / _INSTANTS) ** 2
-            variance += size**2 * 0.5 * (spread[orders] + spread[-orders])
+            turn = turn * first
+            spectrum = np.fft.fft(turn)
+            above, below = (np.abs(spectrum[side] / _INSTANTS) ** 2 for side in (orders, -orders))
+            variance += size**2 * 0.5 * (above + below)
         variance[0] *= 0.5
         out[row] = np.sqrt(variance)
     return out

@@ -183,8 +183,9 @@ class Execution:
         first = self.tick.sample - rows.size
         events: list[dict[str, Any]] = []
         for name, kind in (("lock", LockState), ("guard", GuardMode)):
-            values = np.concatenate([[self.last[name]], rows[name]])
-            for index in np.flatnonzero(np.diff(values.astype(int))):
+            values = np.ascontiguousarray(rows[name])
+            begins = [0] if int(values[0]) != self.last[name] else []
+            for index in (*begins, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()):
                 state = kind(int(rows[name][index])).name.lower()
                 self.locked = self.locked or state == "locked"
                 events.append({"sample": first + int(index), "what": name, "state": state})
