@@ -47,15 +47,20 @@ def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) 
     turns = _turns(orders.size - 1)
     for row in np.flatnonzero(resolution > 0.0):
         step = resolution[row]
-        position = np.real(turns @ harmonics[row, 1:]) / step
         noise = max((residual_rms[row] / step) ** 2 - 1.0 / 12.0, 0.0)
-        variance = np.zeros(orders.size)
-        first = np.exp(2j * np.pi * position)
-        turn = np.ones_like(first)
+        sizes: list[float] = []
         for order in range(1, _ORDERS + 1):
             size = step / (np.pi * order) * np.exp(-2.0 * (np.pi * order) ** 2 * noise)
             if size < _NEGLIGIBLE * step:
                 break
+            sizes.append(size)
+        if not sizes:
+            continue
+        position = np.real(turns @ harmonics[row, 1:]) / step
+        first = np.exp(2j * np.pi * position)
+        turn = np.ones_like(first)
+        variance = np.zeros(orders.size)
+        for size in sizes:
             turn = turn * first
             spectrum = np.fft.fft(turn)
             above, below = (np.abs(spectrum[side] / _INSTANTS) ** 2 for side in (orders, -orders))
