@@ -6,6 +6,7 @@ import numpy as np
 
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.figures.style import MAIN, SECOND, TRACE_BINS, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -41,13 +42,13 @@ def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None
     for part in recording.parts:
         if part.n_rows < width:
             continue
-        bins = part.n_rows // width
-        seconds = (start + width * (np.arange(bins) + 0.5)) / rate
+        stored = StoredSamples(part)
+        seconds = (start + stored.samples(width * (np.arange(part.n_rows // width) + 0.5))) / rate
         _band(frequency, seconds, _binned(part, "frequency_hz", width))
         level.plot(seconds, _binned(part, "command_v", width).mean, color=SECOND, lw=0.9)
         _band(error, seconds, _binned(part, "phase_error_rad", width), label="detector" if start == 0 else None)
         largest = max(largest, _usual_error_deg(part), _mark_points(error, part, start, rate))
-        start += part.n_rows
+        start += int(stored.samples(np.array([part.n_rows]))[0])
     frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
     frequency.yaxis.label.set_color(MAIN)
     level.set_ylabel("output amplitude, V", color=SECOND)
@@ -67,7 +68,8 @@ def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
     ]
     if not marks:
         return 0.0
-    seconds = [(start + middle) / rate for middle, _ in marks]
+    middles = StoredSamples(part).samples(np.array([middle for middle, _ in marks]))
+    seconds = (start + middles) / rate
     degrees = np.array([degrees for _, degrees in marks], float)
     axis.plot(seconds, degrees, "D", ms=4, color=SECOND, label="recorded fundamental" if start == 0 else None)
     return float(np.max(np.abs(degrees)))

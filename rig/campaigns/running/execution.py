@@ -109,7 +109,7 @@ class Execution:
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = RowBuffer(loop.tick.row_dtype, folder)
-        self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
+        self.stored = StoredRows(plan, loop.tick.arrays.segments, self._evaluated(), bench.sample_rate_hz)
         self.evaluations = EvaluationThread()
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
@@ -264,6 +264,13 @@ class Execution:
         while self.evaluations:
             for point in self._anyway(self.evaluations.take) or ():
                 self._anyway(self._report, point)
+
+    def _evaluated(self) -> np.ndarray:
+        """Return which segments belong to the rows with which a point is evaluated, bool[n]."""
+        segments = self.tick.arrays.segments
+        if self.in_one_go or self.plan.evaluates_approach:
+            return np.asarray(segments["point"] >= 0)
+        return np.isin(segments["kind"], list(EVALUATED))
 
     def _begin(self, segment: int) -> int:
         """Return the first sample of the rows with which a segment is evaluated."""
