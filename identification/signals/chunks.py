@@ -74,6 +74,8 @@ class Phase:
         if record.size < 2:
             raise IdentificationError(f"theta_rad: has {record.size} samples, needs one whole period")
         self._record = record
+        self._only: Float | None = None
+        """The phase of a record that is one chunk."""
         known = []
         last = 0.0
         for start, stop in spans(record.size):
@@ -87,6 +89,8 @@ class Phase:
                 raise IdentificationError(
                     f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time"
                 )
+            if stop - start == record.size:
+                self._only = theta
             known.append(theta[start - before])
             last = theta[-1]
         self._known = np.array(known)
@@ -94,6 +98,8 @@ class Phase:
 
     def read(self, start: int, stop: int) -> Float:
         """float[stop - start]: phase of a stretch that begins with a chunk."""
+        if self._only is not None:
+            return self._only[start:stop]
         theta = self._unwrapped(start, stop)
         theta += _whole_turns(self._known[start // CHUNK] - theta[0])
         return theta
