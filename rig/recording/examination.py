@@ -56,9 +56,10 @@ def objects_in(file: Any) -> Iterator[Any]:
     while waiting:
         group = waiting.pop()
         yield group
+        path = group.name.rstrip("/")
         for name in group:
-            where = f"{group.name.rstrip('/')}/{name}"
-            if type(group.get(name, getlink=True)) is not h5py.HardLink:
+            where = f"{path}/{name}"
+            if group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != h5py.h5l.TYPE_HARD:
                 raise RecordingError(f"{where} is a link to elsewhere; a file of its own is wanted, without soft links")
             item = group[name]
             address = h5py.h5o.get_info(item.id).addr
@@ -77,10 +78,11 @@ def objects_in(file: Any) -> Iterator[Any]:
 
 def check_attributes(item: Any) -> None:
     """Refuse an object with too many or too large attributes by `RecordingError`, before one of them is read."""
-    if len(item.attrs) > _MOST_ATTRIBUTES:
-        raise RecordingError(f"{item.name} has {len(item.attrs)} attributes; allowed are {_MOST_ATTRIBUTES}")
-    for name in item.attrs:
-        stored = item.attrs.get_id(name)
+    attributes = item.attrs
+    if len(attributes) > _MOST_ATTRIBUTES:
+        raise RecordingError(f"{item.name} has {len(attributes)} attributes; allowed are {_MOST_ATTRIBUTES}")
+    for name in attributes:
+        stored = attributes.get_id(name)
         if prod(stored.shape) * stored.dtype.itemsize > _LARGEST_ATTRIBUTE_BYTES:
             raise RecordingError(f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes")
 
