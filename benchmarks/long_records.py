@@ -1,7 +1,7 @@
 """How a long and wide record grows: ``python -m benchmarks.long_records [SECONDS] [CHANNELS]``; 3600 s of 32 by default.
 
 One level of the shipped magnet beam is recorded for so long, all channels of which beyond four are further accelerometers, and
-evaluated, stored, shown and drawn, each in a process of its own: seconds of wall and processor, largest memory, size of the file.
+evaluated, stored, shown and drawn, each in a process of its own: seconds of wall and processor, peak memory, size of the file.
 """
 
 import json

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.campaigns.evaluation.rows import LongRows, Rows, Spool
+from rig.errors import RecordingError
 
 __all__ = ["IN_MEMORY_BYTES", "RowBuffer"]
 
@@ -27,10 +28,14 @@ class RowBuffer:
         """Sample of the first row of the spool."""
 
     def add(self, first: int, rows: np.ndarray) -> None:
-        """Add a chunk that begins with sample ``first``.
+        """Add a chunk that begins with sample ``first``; raises `RecordingError` if it cannot be kept in files."""
+        try:
+            self._add(first, rows)
+        except OSError as error:
+            where = self._folder or "the folder for temporary files"
+            raise RecordingError(f"{where}: the rows of a long record cannot be kept ({error.strerror})") from error
 
-        Raises `OSError` if it belongs to a file and cannot be written.
-        """
+    def _add(self, first: int, rows: np.ndarray) -> None:
         if self._spool is not None:
             self._spool.add(rows)
             return

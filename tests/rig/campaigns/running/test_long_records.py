@@ -1,5 +1,7 @@
 """Records too long for memory wait in files, and their evaluation takes no more memory however long they are."""
 
+import errno
+import os
 import tracemalloc
 
 import numpy as np
@@ -14,6 +16,7 @@ from rig.campaigns.evaluation.vibrations import frequency_scatter, recorded_vibr
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.campaigns.running.row_buffer import RowBuffer
+from rig.errors import RecordingError
 from rig.tick.layout import recorded_row
 
 BENCH, PLAN = load_bench("magnet-beam"), load_plan("magnet-beam/backbone")
@@ -98,6 +101,16 @@ def test_rows_that_nobody_waits_for_leave_the_buffer(tmp_path):
         buffer.drop_before(first + 500)
     buffer.add(10_000, rows_of(10_000, 10_500))
     assert np.array_equal(buffer.take(10_000, 10_500), rows_of(10_000, 10_500))
+
+
+def test_a_full_disk_is_told_in_one_line_that_names_the_folder(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Spool, "add", full)
+    buffer = RowBuffer(ROW, tmp_path, in_memory_bytes=1000)
+    with pytest.raises(RecordingError, match=f"^{tmp_path}: the rows of a long record cannot be kept .No space left"):
+        buffer.add(0, rows_of(0, 1000))
 
 
 def test_whole_periods_angle_and_scatter_of_many_stretches_are_those_of_the_phase():
