@@ -85,6 +85,10 @@ class LongRows:
             raise IndexError(f"rows: every {step}th is not to be had")
         return LongRows(self._spool, self._first + start, self._first + max(start, stop))
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        """Return `whole`, where numpy joins rows."""
+        return self.whole() if dtype is None else self.whole().astype(dtype)
+
     def whole(self) -> np.ndarray:
         """Return all columns as one structured array."""
         out = np.empty(self.size, self._spool.dtype)

@@ -9,6 +9,7 @@ import rig
 from rig.campaigns.evaluation.recorded import point_rows
 from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.campaigns.plans import load_plan
+from rig.campaigns.running.row_buffer import RowBuffer
 from rig.measurements.experiments.build import rows_from_rest
 
 PLACE = ("first_sample", "end_sample")
@@ -38,7 +39,12 @@ def shortened(name):
 def both(request):
     plan = shortened(request.param)
     thin = plan.model_copy(update={"rows": "records", "telemetry_s": 0.05})
-    with rig.run(plan, seed=2) as full, rig.run(thin, seed=2) as records:
+    with (
+        pytest.MonkeyPatch.context() as patched
+    ):  # records that wait for their evaluation in files give the same points
+        patched.setitem(RowBuffer.__init__.__kwdefaults__, "in_memory_bytes", 20_000)
+        records = rig.run(thin, seed=2)
+    with rig.run(plan, seed=2) as full, records:
         yield full.recording, records.recording
 
 
