@@ -1,6 +1,7 @@
 """Filters and fractional delays of sensors and converters, as arrays for the kernels."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,12 @@ def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
     analogue filter at a frequency that differs by less than ``(pi corner / rate)^2 / 3``: 0.5 % if the rate is 25 times the
     corner.
     """
-    if corner_hz == 0.0:
-        return np.zeros((0, 5))
+    return np.zeros((0, 5)) if corner_hz == 0.0 else _butterworth(order, corner_hz, rate_hz).copy()
+
+
+@lru_cache(maxsize=64)
+def _butterworth(order: int, corner_hz: float, rate_hz: float) -> Matrix:
+    """Design a filter, once for all channels and rigs that have it."""
     from scipy.signal import butter  # half a second, which a rig without filters need not wait for
 
     sections: Matrix = butter(order, corner_hz, fs=rate_hz, output="sos")
