@@ -128,9 +128,9 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
         lock.gained = 1
         lock.far_periods = 0
         lock.astray_periods = 0
-    elif lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods:
-        lock.state = LOST
-    elif lock.gained == 1 and lock.astray_periods >= SWINGING * thresholds.lost_periods:
+        return
+    gone = lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods
+    if gone or (lock.gained == 1 and lock.astray_periods >= SWINGING * thresholds.lost_periods):
         lock.state = LOST
 
 

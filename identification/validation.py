@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from identification.errors import IdentificationError
 
-__all__ = ["finite_array", "one_specimen", "positive", "read_only"]
+__all__ = ["finite", "finite_array", "one_specimen", "positive", "read_only"]
 
 
 def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
@@ -25,6 +25,11 @@ def finite_array(name: str, values: ArrayLike, dtype: DTypeLike, ndim: int) -> N
         raise IdentificationError(f"{name}: not an array of numbers ({error})") from None
     if array.ndim != ndim:
         raise IdentificationError(f"{name}: has {array.ndim} dimensions (shape {array.shape}), needs {ndim}")
+    return finite(name, array)
+
+
+def finite(name: str, array: NDArray[Any]) -> NDArray[Any]:
+    """Return the array itself; raise `IdentificationError` unless all of it is finite."""
     if not np.all(np.isfinite(array)):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise IdentificationError(f"{name}: value at {list(index)} is {array[index]}, must be finite")

@@ -85,7 +85,8 @@ def nonlinear_mode(
         Relative standard error of the channels' sensitivities, and of their phase at the fundamental in degrees: one
         number for all, or by channel name. They are the same at all points.
     draws, seed
-        Number of draws and seed of the Monte Carlo error propagation; the same seed gives the same numbers.
+        Number of draws and seed of the Monte Carlo error propagation; the same seed gives the same numbers. With 0 draws no
+        errors are propagated: all standard errors and intervals are NaN.
 
     Returns
     -------

@@ -43,7 +43,7 @@ class ErrorModel:
     phase_skew_std_deg
         Standard error of each channel's phase at the fundamental: one number for all, or by channel name.
     draws, seed
-        Number of draws and seed of the Monte Carlo; the same seed gives the same numbers.
+        Number of draws and seed of the Monte Carlo; the same seed gives the same numbers. 0 draws: errors are not computed.
     """
 
     calibration_std: float | Mapping[str, float] = 0.0
@@ -52,8 +52,8 @@ class ErrorModel:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.draws < 100:
-            raise IdentificationError(f"draws: is {self.draws}, needs at least 100")
+        if self.draws != 0 and self.draws < 100:
+            raise IdentificationError(f"draws: is {self.draws}, needs at least 100, or 0 for no standard errors")
 
     def per_channel(self, name: str, backbone: Backbone) -> Float:
         """float[n_channels]: the field ``name`` of each channel; raises `IdentificationError` for unknown channels."""
@@ -79,8 +79,11 @@ def propagated(
 ) -> dict[str, Float]:
     """Return standard errors, their systematic and random parts, and intervals, by field name of `NonlinearMode`.
 
-    ``rows`` are the channels of ``states.deflection_m``; ``states.inverse`` is the pseudo-inverse of ``shapes``.
+    ``rows`` are the channels of ``states.deflection_m``; ``states.inverse`` is the pseudo-inverse of ``shapes``. Without draws
+    all of them are NaN.
     """
+    if model.draws == 0:
+        return _unknown(len(backbone.points))
     estimate = properties(states)
     rng = np.random.default_rng(model.seed)
     wrong = _systematic(states, backbone, rows, shapes, model, rng)
@@ -109,6 +112,17 @@ def propagated(
         "systematic_std": np.column_stack([_std(systematic[n]) for n in QUANTITIES]),
         "random_std": np.column_stack([np.where(known, _std(random[n]), np.nan) for n in QUANTITIES]),
         "interval_95": intervals,
+    }
+
+
+def _unknown(points: int) -> dict[str, Float]:
+    """Return what `propagated` returns, all of it unknown."""
+    size = len(QUANTITIES)
+    return {
+        **{STANDARD_ERRORS[name]: np.full(points, np.nan) for name in QUANTITIES},
+        "systematic_std": np.full((points, size), np.nan),
+        "random_std": np.full((points, size), np.nan),
+        "interval_95": np.full((points, size, 2), np.nan),
     }
 
 

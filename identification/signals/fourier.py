@@ -21,10 +21,12 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
+from identification.signals.chunks import ArrayRecord, Phase, Record
+from identification.signals.columns import Columns, least_squares
 from identification.signals.rounding import rounding_errors
 from identification.validation import finite_array, positive
 
-__all__ = ["batches_of", "periodic_vibration"]
+__all__ = ["batches_of", "periodic_vibration", "vibration_in"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -84,28 +86,49 @@ def periodic_vibration(
         If values are NaN or infinite, lengths differ, there is less than one period, the phase falls, there are too few
         samples per period for H, or more than 5 % of the samples are lost.
     """
-    theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
+    theta = finite_array("theta_rad", theta_rad, np.float64, 1)
     gone = _lost(lost, theta.size)
     values = np.where(gone, 0.0, samples) if gone.any() else samples
     data = finite_array("samples", values, np.float64, 2)
-    rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if data.shape != (len(channels), theta.size):
         raise IdentificationError(
             f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
         )
+    return vibration_in(
+        ArrayRecord(theta, data, gone),
+        channels,
+        sample_rate_hz=sample_rate_hz,
+        harmonics=harmonics,
+        resolution=resolution,
+        phase_lag_target_deg=phase_lag_target_deg,
+        settled=settled,
+    )
+
+
+def vibration_in(
+    record: Record,
+    channels: Sequence[Channel],
+    *,
+    sample_rate_hz: float,
+    harmonics: int = 7,
+    resolution: ArrayLike | None = None,
+    phase_lag_target_deg: float = 90.0,
+    settled: bool = True,
+) -> PeriodicVibration:
+    """Compute the periodic vibration in a record that is read in chunks; all else as in `periodic_vibration`.
+
+    The memory that this takes does not grow with the length of the record.
+    """
+    rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
-    frequency_hz, periods, count, warnings = _whole_periods(theta, rate_hz, harmonics)
-    theta, data, gone = _without_ripple(theta[:count], harmonics), data[:, :count], gone[:count]
-    design = _design(theta, harmonics)
-    design[gone] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
-    solution = _least_squares(design, data.T)
-    residual = data.T - design @ solution
-    coefficients, residual_rms = (
-        _coefficients(solution, harmonics),
-        np.sqrt(np.sum(residual**2, axis=0) / (~gone).sum()),
-    )
-    scatter = _standard_errors(theta, design[:, : 2 * harmonics + 1], residual, periods, gone)
+    phase = Phase(record)
+    frequency_hz, periods, count, warnings = _whole_periods(phase, record.size, rate_hz, harmonics)
+    chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
+    solution, kept = _solved(chunks)
+    squares, means = _residual(chunks, solution, periods)
+    coefficients, residual_rms = _coefficients(solution, harmonics), np.sqrt(squares / kept)
+    scatter = _standard_errors(squares, means, kept, periods, 2 * harmonics + 1)
     rounding = rounding_errors(coefficients, _steps(resolution, len(channels)), residual_rms)
     return PeriodicVibration(
         channels=tuple(channels),
@@ -128,11 +151,13 @@ def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
     gone = finite_array("lost", lost, np.bool_, 1)
     if gone.size != size:
         raise IdentificationError(f"lost: has {gone.size} values, needs {size}, one per sample")
-    if gone.sum() > _MOST_LOST * size:
-        raise IdentificationError(
-            f"samples: {gone.sum()} of {size} were lost, allowed is up to {100.0 * _MOST_LOST:g} %"
-        )
+    _refuse_lost(int(gone.sum()), size)
     return gone
+
+
+def _refuse_lost(lost: int, size: int) -> None:
+    if lost > _MOST_LOST * size:
+        raise IdentificationError(f"samples: {lost} of {size} were lost, allowed is up to {100.0 * _MOST_LOST:g} %")
 
 
 def _steps(resolution: ArrayLike | None, channels: int) -> Float:
@@ -147,17 +172,12 @@ def _steps(resolution: ArrayLike | None, channels: int) -> Float:
     return steps
 
 
-def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float, int, int, tuple[str, ...]]:
+def _whole_periods(phase: Phase, size: int, rate_hz: float, harmonics: int) -> tuple[float, int, int, tuple[str, ...]]:
     """Return mean frequency, number of whole periods, number of samples in them, and warnings."""
-    if theta.size < 2:
-        raise IdentificationError(f"theta_rad: has {theta.size} samples, needs one whole period")
-    if np.any(np.diff(theta) <= 0.0):
-        where = int(np.argmax(np.diff(theta) <= 0.0))
-        raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
-    step = (theta[-1] - theta[0]) / (theta.size - 1)
+    step = (phase.last - phase.first) / (size - 1)
     # The last sample covers one sampling interval. A period is seldom a whole number of samples, and a recorder may end up to
     # one sample early. Least squares tolerates this; otherwise a whole period would be lost.
-    covered = theta.size * step / (2.0 * np.pi)
+    covered = size * step / (2.0 * np.pi)
     periods = int(covered + step / (2.0 * np.pi) + 1e-6)
     if periods < 1:
         raise IdentificationError(f"theta_rad: covers {covered:.3f} periods, needs at least one whole period")
@@ -166,10 +186,10 @@ def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float,
         raise IdentificationError(
             f"harmonics: {harmonics} need more than {needed} samples per period, the record has {2 * np.pi / step:.2f}"
         )
-    count = int(np.searchsorted(theta - theta[0], 2.0 * np.pi * periods - 0.5 * step))
+    count = phase.samples_below(2.0 * np.pi * periods - 0.5 * step)
     warnings = []
-    if theta.size - count > _SAMPLES_TO_SPARE:
-        warnings.append(f"{theta.size - count} samples beyond {periods} whole periods are left out")
+    if size - count > _SAMPLES_TO_SPARE:
+        warnings.append(f"{size - count} samples beyond {periods} whole periods are left out")
     if periods < _MIN_BATCHES:
         warnings.append(
             f"{periods} periods only: standard errors take the residual for white noise, drift is not fitted"
@@ -177,51 +197,43 @@ def _whole_periods(theta: Float, rate_hz: float, harmonics: int) -> tuple[float,
     return float(step * rate_hz / (2.0 * np.pi)), periods, count, tuple(warnings)
 
 
-def _without_ripple(theta: Float, harmonics: int) -> Float:
-    """Remove the part of ``theta`` that repeats within every period, harmonics 1..H; unchanged below four periods.
+def _solved(chunks: Columns) -> tuple[Float, int]:
+    """Return the solution of least squares, float[2 H + 3, n_channels], and the number of samples behind it."""
+    normal: Float | float = 0.0
+    right: Float | float = 0.0
+    lost = 0
+    for chunk in chunks:
+        normal = normal + chunk.design.T @ chunk.design
+        right = right + chunk.design.T @ chunk.data
+        lost += int(chunk.lost.sum())
+        del chunk  # before the next is read
+    _refuse_lost(lost, chunks.count)
+    return least_squares(np.asarray(normal), np.asarray(right)), chunks.count - lost
 
-    The repeating part is fitted to the deviation of the phase from its moving mean over one period, so that slow variations
-    remain.
+
+def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float | None]:
+    """Return sums of squares of the residual, float[n_channels], and its coefficients batch by batch.
+
+    The latter are float[n_batches, 2 H + 1, n_channels]; None below four periods.
     """
-    if theta[-1] - theta[0] < 2.0 * np.pi * (_MIN_BATCHES - 0.5):
-        return theta
-    straight = np.linspace(theta[0], theta[-1], theta.size)
-    period = round(2.0 * np.pi / (straight[1] - straight[0]))
-    mean = np.convolve(theta - straight, np.full(period, 1.0 / period), mode="valid")
-    inside = slice(period // 2, period // 2 + mean.size)
-    columns = _design(straight, harmonics)[:, 1 : 2 * harmonics + 1]
-    weight = np.hanning(mean.size)  # without it the ends of a slow variation leak into the fit
-    swing = (theta - straight)[inside] - mean
-    fitted = _least_squares(columns[inside] * weight[:, None], swing * weight)
-    return np.asarray(theta - columns @ fitted)
-
-
-def _least_squares(columns: Float, values: Float) -> Float:
-    """Solve by the normal equations, which suffice for the few columns of harmonics, as these are nearly orthogonal.
-
-    Columns of zeros get a coefficient of zero.
-    """
-    return np.asarray(np.linalg.lstsq(columns.T @ columns, columns.T @ values, rcond=None)[0])
-
-
-def _design(theta: Float, harmonics: int) -> Float:
-    """float[n, 2 H + 3]: 1, cosines and minus sines (for Re and Im of Y_h), and the drift of the fundamental.
-
-    The drift is left out (its columns are zero) below four periods, where it cannot be separated from the harmonics.
-    """
-    columns = np.zeros((theta.size, 2 * harmonics + 3))
-    columns[:, 0] = 1.0
-    rotation = np.exp(1j * theta)
-    power = np.ones_like(rotation)
-    for harmonic in range(1, harmonics + 1):
-        power = power * rotation
-        columns[:, harmonic] = power.real
-        columns[:, harmonics + harmonic] = -power.imag
-    if theta[-1] - theta[0] > 2.0 * np.pi * (_MIN_BATCHES - 0.5):
-        position = np.linspace(-0.5, 0.5, theta.size)
-        columns[:, -2] = position * rotation.real
-        columns[:, -1] = -position * rotation.imag
-    return columns
+    columns = solution.shape[0] - 2
+    batches = batches_of(periods) if periods >= _MIN_BATCHES else 0
+    squares = np.zeros(solution.shape[1])
+    sums, known = np.zeros((batches, columns, solution.shape[1])), np.zeros(batches, int)
+    borders: Float | None = None
+    for chunk in chunks:
+        residual = chunk.design @ solution
+        np.subtract(chunk.data, residual, out=residual)
+        if borders is None:
+            borders = chunk.theta[0] + 2.0 * np.pi * np.round(np.linspace(0, periods, batches + 1))
+        edges = np.searchsorted(chunk.theta, borders)
+        for batch, (start, stop) in enumerate(pairwise(edges)):
+            if stop > start:
+                sums[batch] += chunk.design[start:stop, :columns].T @ residual[start:stop]
+                known[batch] += int((~chunk.lost[start:stop]).sum())
+        squares += np.sum(np.multiply(residual, residual, out=residual), axis=0)
+        del chunk, residual  # before the next is read
+    return squares, sums / np.maximum(known, 1)[:, None, None] if batches else None
 
 
 def _coefficients(solution: Float, harmonics: int) -> Complex:
@@ -245,23 +257,17 @@ def batches_of(periods: int) -> int:
     return min(_MAX_BATCHES, periods) if periods >= _MIN_BATCHES else _MANY
 
 
-def _standard_errors(theta: Float, design: Float, residual: Float, periods: int, gone: NDArray[np.bool_]) -> Float:
-    """float[n_channels, H + 1]: standard error of Re and of Im of each coefficient."""
-    n, columns = int((~gone).sum()), design.shape[1]
+def _standard_errors(squares: Float, means: Float | None, kept: int, periods: int, columns: int) -> Float:
+    """float[n_channels, H + 1]: standard error of Re and of Im of each coefficient; arguments as from `_residual`."""
     harmonics = (columns - 1) // 2
-    if periods < _MIN_BATCHES:
-        variance = np.sum(residual**2, axis=0) / max(n - columns, 1)
-        white = np.sqrt(np.outer(variance, np.r_[1.0, np.full(harmonics, 2.0)]) / n)
+    if means is None:
+        variance = squares / max(kept - columns, 1)
+        white = np.sqrt(np.outer(variance, np.r_[1.0, np.full(harmonics, 2.0)]) / kept)
         return np.asarray(white)
     batches = batches_of(periods)
-    borders = theta[0] + 2.0 * np.pi * np.round(np.linspace(0, periods, batches + 1))
-    edges = np.searchsorted(theta, borders)
-    means = np.empty((batches, columns, residual.shape[1]))
-    for batch, (start, stop) in enumerate(pairwise(edges)):
-        means[batch] = design[start:stop].T @ residual[start:stop] / max((~gone[start:stop]).sum(), 1)
     # Means of cosine and sine are half the amplitude; the residual's mean over the record is zero: batches - 1 are free.
     squared = np.sum(means**2, axis=0) / ((batches - 1) * batches)
-    result = np.empty((residual.shape[1], harmonics + 1))
+    result = np.empty((squares.size, harmonics + 1))
     result[:, 0] = np.sqrt(squared[0])
     result[:, 1:] = np.sqrt(2.0 * (squared[1 : harmonics + 1] + squared[harmonics + 1 :])).T
     return result

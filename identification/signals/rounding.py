@@ -11,6 +11,8 @@ is unknown, harmonic h has an error of variance ``sum_n (q/(pi n))^2 exp(-4 (pi 
 of it in each of its two parts. With noise above about half a step the error vanishes.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,18 +44,35 @@ def rounding_errors(harmonics: Complex, resolution: Float, residual_rms: Float) 
     """
     out = np.zeros(harmonics.shape)
     orders = np.arange(harmonics.shape[1])
-    turns = np.exp(2j * np.pi * np.outer(np.arange(_INSTANTS) / _INSTANTS, orders[1:]))
+    turns = _turns(orders.size - 1)
     for row in np.flatnonzero(resolution > 0.0):
         step = resolution[row]
-        position = np.real(turns @ harmonics[row, 1:]) / step
         noise = max((residual_rms[row] / step) ** 2 - 1.0 / 12.0, 0.0)
-        variance = np.zeros(orders.size)
+        sizes: list[float] = []
         for order in range(1, _ORDERS + 1):
             size = step / (np.pi * order) * np.exp(-2.0 * (np.pi * order) ** 2 * noise)
             if size < _NEGLIGIBLE * step:
                 break
-            spread = np.abs(np.fft.fft(np.exp(2j * np.pi * order * position)) / _INSTANTS) ** 2
-            variance += size**2 * 0.5 * (spread[orders] + spread[-orders])
+            sizes.append(size)
+        if not sizes:
+            continue
+        position = np.real(turns @ harmonics[row, 1:]) / step
+        first = np.exp(2j * np.pi * position)
+        turn = np.ones_like(first)
+        variance = np.zeros(orders.size)
+        for size in sizes:
+            turn = turn * first
+            spectrum = np.fft.fft(turn)
+            above, below = (np.abs(spectrum[side] / _INSTANTS) ** 2 for side in (orders, -orders))
+            variance += size**2 * 0.5 * (above + below)
         variance[0] *= 0.5
         out[row] = np.sqrt(variance)
     return out
+
+
+@lru_cache(maxsize=4)
+def _turns(harmonics: int) -> Complex:
+    """complex[_INSTANTS, H]: the harmonics 1..H over one period, of size 1."""
+    turns = np.exp(2j * np.pi * np.outer(np.arange(_INSTANTS) / _INSTANTS, np.arange(1, harmonics + 1)))
+    turns.setflags(write=False)
+    return np.asarray(turns)

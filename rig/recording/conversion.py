@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.recording.hdf5_recording import read_recording, recording_integrity, taken_over, write_recording
+from rig.recording.hdf5_recording import opened_recording, read_recording, taken_over, write_recording
 from rig.recording.header import SCHEMA, Column, Header, packed
 from rig.recording.journal import JournalWriter, journal_path, set_aside
 from rig.recording.journal_contents import JournalContents
@@ -41,10 +41,11 @@ def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] 
             contents = stack.enter_context(JournalContents(journal))
             header, parts, unverified = contents.header, list[Part](contents.parts), ""
             if output.exists():
-                old = stack.enter_context(open_file(output))
+                old, integrity = opened_recording(output)
+                stack.enter_context(old)
                 earlier, stored = read_recording(old, output)
                 check_continuation(header, earlier, output)
-                unverified = taken_over(recording_integrity(old, output), header.first_part)
+                unverified = taken_over(integrity, header.first_part)
                 parts = [*stored[: header.first_part], *parts]
                 if header.first_part:
                     header = replace(earlier, row_dtype=header.row_dtype, columns=header.columns)

@@ -30,11 +30,12 @@ def examine(file: Any, size: int) -> None:
     for item in objects_in(file):
         check_attributes(item)
         if hasattr(item, "shape"):
-            _check_storage(item)
-            if item.dtype.kind == "O":
+            dtype = item.dtype  # each look takes time
+            _check_storage(item, dtype)
+            if dtype.kind == "O":
                 texts += item.size
             else:
-                declared += item.size * item.dtype.itemsize
+                declared += item.size * dtype.itemsize
     if declared > max(_SMALL_BYTES, LARGEST_RATIO * size):
         raise RecordingError(
             f"its datasets declare {declared} bytes in a file of {size}; allowed are {LARGEST_RATIO} times its size"
@@ -55,9 +56,10 @@ def objects_in(file: Any) -> Iterator[Any]:
     while waiting:
         group = waiting.pop()
         yield group
+        path = group.name.rstrip("/")
         for name in group:
-            where = f"{group.name.rstrip('/')}/{name}"
-            if type(group.get(name, getlink=True)) is not h5py.HardLink:
+            where = f"{path}/{name}"
+            if group.id.links.get_info(name.encode("utf-8", "surrogateescape")).type != h5py.h5l.TYPE_HARD:
                 raise RecordingError(f"{where} is a link to elsewhere; a file of its own is wanted, without soft links")
             item = group[name]
             address = h5py.h5o.get_info(item.id).addr
@@ -76,33 +78,34 @@ def objects_in(file: Any) -> Iterator[Any]:
 
 def check_attributes(item: Any) -> None:
     """Refuse an object with too many or too large attributes by `RecordingError`, before one of them is read."""
-    if len(item.attrs) > _MOST_ATTRIBUTES:
-        raise RecordingError(f"{item.name} has {len(item.attrs)} attributes; allowed are {_MOST_ATTRIBUTES}")
-    for name in item.attrs:
-        stored = item.attrs.get_id(name)
+    attributes = item.attrs
+    if len(attributes) > _MOST_ATTRIBUTES:
+        raise RecordingError(f"{item.name} has {len(attributes)} attributes; allowed are {_MOST_ATTRIBUTES}")
+    for name in attributes:
+        stored = attributes.get_id(name)
         if prod(stored.shape) * stored.dtype.itemsize > _LARGEST_ATTRIBUTE_BYTES:
             raise RecordingError(f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes")
 
 
-def _check_storage(dataset: Any) -> None:
+def _check_storage(dataset: Any, dtype: Any) -> None:
     """Refuse values stored in other files or not stored at all, and types other than numbers and texts."""
     import h5py
 
     if dataset.is_virtual or dataset.external:
         raise RecordingError(f"{dataset.name} keeps its values in another file; allowed are values of its own")
-    if dataset.shape is None or dataset.dtype.kind not in "biufcSO":
-        raise RecordingError(f"{dataset.name} is {dataset.dtype}; numbers or texts are wanted")
-    if dataset.dtype.kind == "O" and h5py.check_string_dtype(dataset.dtype) is None:
+    if dataset.shape is None or dtype.kind not in "biufcSO":
+        raise RecordingError(f"{dataset.name} is {dtype}; numbers or texts are wanted")
+    if dtype.kind == "O" and h5py.check_string_dtype(dtype) is None:
         raise RecordingError(f"{dataset.name} holds lists or references; numbers or texts are wanted")
     if dataset.size == 0:
         return
     if dataset.chunks is None:
-        if dataset.dtype.kind != "O" and dataset.id.get_storage_size() < dataset.nbytes:
+        if dtype.kind != "O" and dataset.id.get_storage_size() < dataset.nbytes:
             raise RecordingError(
                 f"{dataset.name} declares {dataset.nbytes} bytes and stores {dataset.id.get_storage_size()}"
             )
         return
-    if prod(dataset.chunks) * dataset.dtype.itemsize > _LARGEST_CHUNK_BYTES:
+    if prod(dataset.chunks) * dtype.itemsize > _LARGEST_CHUNK_BYTES:
         raise RecordingError(f"{dataset.name} has chunks of {dataset.chunks}; allowed are {_LARGEST_CHUNK_BYTES} bytes")
     chunks = prod(ceil(length / chunk) for length, chunk in zip(dataset.shape, dataset.chunks, strict=True))
     if dataset.id.get_num_chunks() != chunks:

@@ -54,14 +54,16 @@ class JournalPart(Part):
 
     def read(self, start: int, stop: int) -> NDArray[Any]:
         """Read rows across blocks; see ``Part.read``."""
-        rows = missing_rows(stop - start, self.row_dtype)
+        rows = np.empty(stop - start, self.row_dtype)
         view, itemsize = rows.view(np.uint8).data, self.row_dtype.itemsize
         row, block = start, bisect_right(self._firsts, start) - 1
         while row < stop:
             block_stop = self._firsts[block + 1] if block + 1 < len(self._firsts) else self.n_rows
             taken = min(stop, block_stop) - row
             into = view[(row - start) * itemsize : (row - start + taken) * itemsize]
-            if self._offsets[block] != MISSING:
+            if self._offsets[block] == MISSING:
+                rows[row - start : row - start + taken] = missing_rows(taken, self.row_dtype)
+            else:
                 self._fill(into, self._offsets[block] + (row - self._firsts[block]) * itemsize)
             row, block = row + taken, block + 1
         return rows

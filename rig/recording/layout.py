@@ -17,6 +17,7 @@ from rig.text.printable import error_text
 __all__ = ["file_integrity", "identify", "kind_in", "new_file", "open_file", "open_unchecked", "reading"]
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_CACHE_BYTES = 2**20  # of each dataset: chunks are written whole and once
 _FOREIGN = {
     b"MATLAB 5.0": "a MATLAB 5 file; `rig import` reads those",
     b"VLJB": "a journal; give the name of its recording, without .journal",
@@ -125,7 +126,7 @@ def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]
     part = path.with_name(f"{path.name}.part")
     try:
         with Sink(part) as sink:
-            with h5py.File(sink, "w") as file:
+            with h5py.File(sink, "w", rdcc_nbytes=_CACHE_BYTES) as file:
                 yield file, sink.check
             sink.check()
             append_trailer(sink)

@@ -8,12 +8,11 @@ from typing import Any, NamedTuple, Self
 
 from rig.errors import RecordingError
 from rig.recording.conversion import check_continuation
-from rig.recording.hdf5_recording import read_recording, recording_integrity
+from rig.recording.hdf5_recording import opened_recording, read_recording
 from rig.recording.header import Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
 from rig.recording.journal_contents import JournalContents
-from rig.recording.layout import open_file
 from rig.recording.parts import Part
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
@@ -50,8 +49,8 @@ class Recording:
 
     def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:
         if journal is None or self.path.exists():
-            file = stack.enter_context(open_file(self.path))
-            self.integrity = recording_integrity(file, self.path)
+            file, self.integrity = opened_recording(self.path)
+            stack.enter_context(file)
             header, stored = read_recording(file, self.path)
             if journal is None:
                 return header, stored

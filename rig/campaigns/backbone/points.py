@@ -31,6 +31,7 @@ from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import (
     channels_from,
@@ -80,7 +81,7 @@ class ShortPointResult:
 
 
 def measure_backbone_point(
-    bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray, settling: np.void
+    bench: Bench, plan: BackbonePlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[ShortPointResult]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment.
 
@@ -89,7 +90,7 @@ def measure_backbone_point(
     """
     if plan.evaluation == "slow-flow":
         return _short_point(bench, plan, target, rows)
-    rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
+    rows = rows[within_periods(rows, plan.record_periods)]
     try:
         vibration = recorded_vibration(
             bench, rows, plan.harmonics, phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0
@@ -101,7 +102,7 @@ def measure_backbone_point(
     return with_settling(replace(point, modal=modal), settling)
 
 
-def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: np.ndarray) -> Point[ShortPointResult]:
+def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) -> Point[ShortPointResult]:
     """Evaluate a point from its ramp and the time at the point, whether or not the vibration settled."""
     try:
         flow = recorded_flow(bench, rows, plan.harmonics, plan.plant, other_modes=False)

@@ -50,8 +50,6 @@ class DwellPlan(SettledPlan):
     ``controller.centre_frequency_hz``."""
     record_every: int = Field(60, ge=1, le=10_000)
     """Interval, in means, at which all rows of a mean are stored."""
-    telemetry_s: float = Field(0.1, gt=0, le=60)
-    """Time between stored rows in means of which not all rows are stored, s."""
     ramp_periods: float = Field(40.0, ge=1, le=1e5)
     """Length of the ramp to the level, periods."""
     alarm: DriftLimits = DriftLimits()
@@ -128,10 +126,9 @@ class DwellPlan(SettledPlan):
             out.append(held)
         return tuple(out)
 
-    def row_stride(self, number: int, sample_rate_hz: float) -> int:
-        """Return 1 if all rows of a mean are stored; otherwise the number of rows per stored row."""
-        full = number % self.record_every == 0 or number == self.n_means - 1
-        return 1 if full else max(1, round(self.telemetry_s * sample_rate_hz))
+    def stores_record(self, number: int) -> bool:
+        """Whether all rows of a mean are stored: of every ``record_every``-th and of the last."""
+        return number % self.record_every == 0 or number == self.n_means - 1
 
     def check(self, bench: Bench) -> None:
         """Refuse, before anything moves, what the bench cannot do, and damping limits if the damping cannot be determined."""

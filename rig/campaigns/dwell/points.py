@@ -12,9 +12,10 @@ from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.dwell.plan import DwellPlan
 from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point
-from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.lost_samples import rms_of_force
 from rig.campaigns.evaluation.point import PART, Point, vibration_of
 from rig.campaigns.evaluation.recorded import accepted_points, specimen_of
+from rig.campaigns.evaluation.rows import Rows, turned_rad
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.drive_shape import drive_shape
@@ -96,21 +97,18 @@ class DwellResult:
     """Changes from the first accepted mean; None if this mean was not accepted."""
 
 
-def measure_mean(
-    bench: Bench, plan: DwellPlan, target: Target, rows: np.ndarray, settling: np.void
-) -> Point[DwellResult]:
+def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: Rows, settling: np.void) -> Point[DwellResult]:
     """Evaluate frequency, damping and amplitude of one mean over its whole periods, with its quality."""
-    turned = np.unwrap(rows["theta_rad"].astype(float))
-    cycles = float(turned[-1] - turned[0]) / (2.0 * math.pi) * rows.size / max(1, rows.size - 1)
+    cycles = turned_rad(rows) / (2.0 * math.pi) * rows.size / max(1, rows.size - 1)
     length = Length(cycles_in_mean=cycles, seconds_in_mean=rows.size / bench.sample_rate_hz)
-    rows = rows[within_periods(rows["theta_rad"], int(cycles))]
+    rows = rows[within_periods(rows, int(cycles))]
     try:
         lag_deg = plan.controller.phase_lag_deg + 180.0
         vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg)
         modal = modal_part(vibration, drive_shape(bench, plan.plant))
     except (IdentificationError, ArithmeticError) as error:
         return replace(not_evaluated(plan, target, error, settled=True), result=DwellResult(length=length))
-    force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
+    force_rms_n = rms_of_force(bench, rows)
     missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
     point = settled_point(plan, target, bench, vibration, rows, off_level)

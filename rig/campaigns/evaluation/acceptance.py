@@ -15,6 +15,7 @@ from identification import PeriodicVibration
 from rig.bench import Bench
 from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.point import Lock, Point, Quality, planned_point
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import frequency_scatter
 from rig.campaigns.planning.locked import SettledPlan
@@ -129,20 +130,19 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
 
 
 def settled_point(
-    plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, level: str = ""
+    plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: Rows, level: str = ""
 ) -> Point[Any]:
     """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level.
 
     All campaigns that settle and record at a held lag use this function.
     """
-    scatter, alien = frequency_scatter(rows["theta_rad"]), alien_force(bench, [rows])
+    scatter, alien = frequency_scatter(rows), alien_force(bench, [rows])
+    vibrating = vibration_part(vibration, rows)
     reason = first_of(
         (
             phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg),
             level,
-            alien_objection(
-                alien, plan.accepted_alien_force, float(np.abs(rows["command_v"]).mean()) / bench.output_bit_v
-            ),
+            alien_objection(alien, plan.accepted_alien_force, vibrating.voltage_v / bench.output_bit_v),
             hunting_objection(scatter, plan.accepted_frequency_scatter),
             drift_objection(bench, vibration, plan.accepted_drift),
         )
@@ -154,7 +154,7 @@ def settled_point(
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows),
         alien_force=alien,
-        vibration=vibration_part(vibration, rows),
+        vibration=vibrating,
         lock=Lock(
             phase_error_deg=vibration.phase_error_deg,
             phase_scatter_deg=lag_scatter_deg(rows),

@@ -4,26 +4,41 @@ import math
 
 import numpy as np
 
+from rig.bench import Bench
+from rig.campaigns.evaluation.rows import Rows, std_of, stretches
 from rig.tick.layout import SAMPLE_LOST
 
-__all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of"]
+__all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of", "rms_of_force"]
 
 
-def lost_rows(rows: np.ndarray) -> np.ndarray:
+def lost_rows(rows: Rows) -> np.ndarray:
     """Return bool[n]: rows whose inputs are NaN, either lost in transfer or because the row is missing in a damaged journal."""
-    return np.asarray(((rows["flags"] & SAMPLE_LOST) != 0) | np.isnan(rows["inputs"]).all(axis=1))
+    return np.concatenate([np.zeros(0, bool), *map(_lost_in, stretches(rows))])
 
 
-def lost_warnings(rows: np.ndarray) -> list[str]:
+def _lost_in(rows: Rows) -> np.ndarray:
+    inputs = rows["inputs"]
+    empty = np.isnan(inputs[:, 0])  # the other channels are looked at only if the first has no reading somewhere
+    if empty.any():
+        empty = np.isnan(inputs).all(axis=1)
+    return np.asarray(((rows["flags"] & SAMPLE_LOST) != 0) | empty)
+
+
+def lost_warnings(lost: int, size: int) -> list[str]:
     """Return one line on the number of lost samples; an empty list if none was lost."""
-    lost = int(np.count_nonzero(lost_rows(rows)))
-    return [f"{lost} of {rows.size} samples were lost on their way"] if lost else []
+    return [f"{lost} of {size} samples were lost on their way"] if lost else []
 
 
-def rms_of(rows: np.ndarray) -> list[float]:
+def rms_of(rows: Rows) -> list[float]:
     """RMS of every channel without its mean, in the channel's unit. Lost samples are left out."""
     inputs = rows["inputs"][~lost_rows(rows)].astype(float)
     return [float(value) for value in inputs.std(axis=0)] if inputs.size else [math.nan] * rows["inputs"].shape[1]
+
+
+def rms_of_force(bench: Bench, rows: Rows) -> float:
+    """RMS of the force without its mean, all harmonics included, N, over all rows but the last; gaps are filled."""
+    channel = bench.index_of("force")
+    return std_of(bridged(stretch, slice(channel, channel + 1))[:, 0] for stretch in stretches(rows[: rows.size - 1]))
 
 
 def _turns(theta_rad: np.ndarray) -> np.ndarray:
@@ -32,14 +47,17 @@ def _turns(theta_rad: np.ndarray) -> np.ndarray:
     return np.asarray(np.interp(np.arange(theta_rad.size), known, np.unwrap(theta_rad[known]) / (2.0 * math.pi)))
 
 
-def bridged(rows: np.ndarray) -> np.ndarray:
-    """Return the inputs, float64[n, n_channels], with gaps filled by the mean of the readings one period before and after.
+def bridged(rows: Rows, channels: slice = slice(None)) -> np.ndarray:
+    """Return the inputs of all or some channels, float64[n, n_channels], with gaps filled.
+
+    A gap is filled by the mean of the readings one period before and after.
 
     Both readings are taken at the same phase by linear interpolation. The error for a vibration that grows or drifts steadily
     is therefore of second order. Use this for windows and spectra, which need signals without gaps; the caller must leave out
     results within reach of a gap. Inputs without lost samples are returned as recorded.
     """
-    inputs = np.asarray(rows["inputs"].astype(float))
+    columns = [stretch["inputs"][:, channels].astype(float) for stretch in stretches(rows)]
+    inputs = np.concatenate(columns) if columns else rows["inputs"][:, channels].astype(float)
     lost = lost_rows(rows)
     if not lost.any() or lost.all():
         return inputs

@@ -7,6 +7,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point, Quality
+from rig.campaigns.evaluation.rows import Rows, stretches
 
 __all__ = ["came_and_went", "was_refused_in_passing"]
 
@@ -16,7 +17,7 @@ STANDS_OUT = (
 FEWEST_PERIODS = 4
 
 
-def was_refused_in_passing(point: Point[Any], bench: Bench, rows: np.ndarray, faults: int, steady: bool) -> bool:
+def was_refused_in_passing(point: Point[Any], bench: Bench, rows: Rows, faults: int, steady: bool) -> bool:
     """Return whether a point was refused, but for something that passes, so that it is worth another attempt.
 
     That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached
@@ -25,22 +26,29 @@ def was_refused_in_passing(point: Point[Any], bench: Bench, rows: np.ndarray, fa
     return point.quality is Quality.REJECTED and (faults > 0 or (steady and came_and_went(bench, rows)))
 
 
-def came_and_went(bench: Bench, rows: np.ndarray) -> bool:
+def came_and_went(bench: Bench, rows: Rows) -> bool:
     """Return whether force or drive changed from one period to the next far more somewhere than it usually did.
 
     The RMS of the difference between neighbouring periods, taken at equal phases, is that of the noise in a steady vibration,
     whatever its harmonics. Another mode or a loop that swings adds to it everywhere, a knock in a few periods only.
     """
-    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi) if rows.size else np.zeros(1)
-    periods = int(turns[-1] - turns[0])
-    if not np.isfinite(turns).all() or periods < FEWEST_PERIODS + 1:
+    found = [changes for stretch in stretches(rows) if (changes := _changes(bench, stretch)) is not None]
+    if not found:
         return False
+    return any(changes.max() > STANDS_OUT * np.median(changes) for changes in np.concatenate(found, axis=1))
+
+
+def _changes(bench: Bench, rows: Rows) -> np.ndarray | None:
+    """Return the RMS of the changes of force and drive from period to period, float64[2, n]; None if there are too few."""
+    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi)
+    periods = int(turns[-1] - turns[0]) if np.isfinite(turns).all() else 0
+    if periods < FEWEST_PERIODS + 1:
+        return None
     per_period = rows.size // (periods + 1)
     at = turns[0] + np.arange(periods * per_period) / per_period
     inputs = bridged(rows)
+    out = []
     for role in ("force", "drive"):
         signal = np.interp(at, turns, inputs[:, bench.index_of(role)]).reshape(periods, per_period)
-        changes = np.sqrt(np.mean(np.diff(signal, axis=0) ** 2, axis=1))
-        if changes.max() > STANDS_OUT * np.median(changes):
-            return True
-    return False
+        out.append(np.sqrt(np.mean(np.diff(signal, axis=0) ** 2, axis=1)))
+    return np.array(out)

@@ -7,12 +7,14 @@ import numpy as np
 from identification import PeriodicVibration
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Purity, Spectrum, Vibration
+from rig.campaigns.evaluation.rows import Rows, mean_of, std_of, stretches
 from rig.campaigns.evaluation.vibrations import quantisation_warnings
 from rig.campaigns.planning.plan import Column
 
 __all__ = [
     "PURITY_COLUMNS",
     "lag_scatter_deg",
+    "mean_voltage_v",
     "purity",
     "quality_warnings",
     "vibration_part",
@@ -55,15 +57,18 @@ def purity(vibration: PeriodicVibration) -> Purity:
         )
 
 
-def lag_scatter_deg(rows: np.ndarray) -> float:
+def lag_scatter_deg(rows: Rows) -> float:
     """Standard deviation of the lag as measured by the detector, deg; NaN in open loop."""
-    seen = rows["phase_error_rad"][np.isfinite(rows["phase_error_rad"])].astype(float)
-    return math.degrees(float(seen.std())) if seen.size else math.nan
+    errors = (stretch["phase_error_rad"] for stretch in stretches(rows))
+    return math.degrees(std_of(seen[np.isfinite(seen)].astype(float) for seen in errors))
 
 
-def quality_warnings(
-    bench: Bench, vibration: PeriodicVibration, rows: np.ndarray, held: bool = True
-) -> tuple[str, ...]:
+def mean_voltage_v(rows: Rows) -> float:
+    """Mean amplitude of the output, V."""
+    return mean_of(np.abs(stretch["command_v"]) for stretch in stretches(rows))
+
+
+def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: Rows, held: bool = True) -> tuple[str, ...]:
     """Return warnings about a recorded vibration, one line each. The scatter of a lag that was not ``held`` is ignored."""
     out = [*vibration.warnings, *quantisation_warnings(vibration, bench)]
     scatter = lag_scatter_deg(rows) if held else 0.0
@@ -89,13 +94,13 @@ def quality_warnings(
     return tuple(out)
 
 
-def vibration_part(vibration: PeriodicVibration, rows: np.ndarray) -> Vibration:
+def vibration_part(vibration: PeriodicVibration, rows: Rows) -> Vibration:
     """Return the part of a point that describes the vibration in its ``rows``."""
     return Vibration(
         frequency_hz=vibration.frequency_hz,
         force_n=vibration.force_n,
         amplitude_m=vibration.amplitude_m,
-        voltage_v=float(np.abs(rows["command_v"]).mean()),
+        voltage_v=mean_voltage_v(rows),
         purity=purity(vibration),
         periods=vibration.periods,
         spectrum=Spectrum(

@@ -7,10 +7,12 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from identification import Channel, PeriodicVibration, nonlinear_mode, periodic_vibration
+from identification import Channel, PeriodicVibration, nonlinear_mode
+from identification.signals.fourier import vibration_in
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point, spectrum_of, vibration_of
+from rig.campaigns.evaluation.rows import Rows, phases
 from rig.campaigns.planning.drive_shape import DriveShape
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
 from rig.tick.safety.layout import POLARITY_HINT
@@ -80,23 +82,38 @@ def failed_point(
 
 
 def recorded_vibration(
-    bench: Bench, rows: np.ndarray, harmonics: int, phase_lag_target_deg: float = 90.0
+    bench: Bench, rows: Rows, harmonics: int, phase_lag_target_deg: float = 90.0
 ) -> PeriodicVibration:
     """Return the periodic vibration in recorded rows, with the skew of the channels removed.
 
     Lost rows are left out. Raises `identification.IdentificationError` if the rows contain no vibration.
     """
-    vibration = periodic_vibration(
-        rows["theta_rad"].astype(float),
-        rows["inputs"].astype(float).T,
+    vibration = vibration_in(
+        _Record(rows),
         channels_of(bench),
         sample_rate_hz=bench.sample_rate_hz,
         harmonics=harmonics,
-        lost=lost_rows(rows),
         resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )
     return _without_skew(vibration, bench)
+
+
+class _Record:
+    """Rows as a record that is read in chunks."""
+
+    def __init__(self, rows: Rows) -> None:
+        self._rows = rows
+        self.size = rows.size
+
+    def theta_rad(self, start: int, stop: int) -> np.ndarray:
+        """Phase of a stretch."""
+        return np.asarray(self._rows[start:stop]["theta_rad"].astype(float))
+
+    def samples(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """Inputs of a stretch, and which of them were lost."""
+        rows = self._rows[start:stop]
+        return rows["inputs"].astype(float).T, lost_rows(rows)
 
 
 def modal_part(vibration: PeriodicVibration, shape: DriveShape) -> Modal:
@@ -105,7 +122,8 @@ def modal_part(vibration: PeriodicVibration, shape: DriveShape) -> Modal:
     The standard error of the damping is given if that of the mode shape is known. Raises `identification.IdentificationError`
     if there are no such properties.
     """
-    mode = nonlinear_mode(shape.backbone((vibration,)))
+    backbone = shape.backbone((vibration,))
+    mode = nonlinear_mode(backbone) if shape.std is not None else nonlinear_mode(backbone, draws=0)  # no error is used
     damping, std = float(mode.damping_ratio[0]), float(mode.damping_ratio_std[0])
     return Modal(
         modal_frequency_hz=float(mode.modal_frequency_hz[0]),
@@ -143,18 +161,25 @@ def vibration_from(
     )
 
 
-def within_periods(theta_rad: np.ndarray, periods: int) -> slice:
+def within_periods(rows: Rows, periods: int) -> slice:
     """Return the slice of rows that holds the first ``periods`` periods and one more sample."""
-    turned = np.unwrap(theta_rad.astype(float))
-    return slice(0, int(np.searchsorted(turned - turned[0], 2.0 * math.pi * periods)) + 1)
+    first = math.nan
+    for start, theta in phases(rows):
+        first = first if start else float(theta[0])
+        if theta[-1] - first >= 2.0 * math.pi * periods:
+            return slice(0, start + int(np.searchsorted(theta - first, 2.0 * math.pi * periods)) + 1)
+    return slice(0, rows.size + 1)
 
 
-def frequency_scatter(theta_rad: np.ndarray) -> float:
+def frequency_scatter(rows: Rows) -> float:
     """Standard deviation of the frequency of single periods, relative to the mean frequency."""
-    turned = np.unwrap(theta_rad.astype(float))
-    turns = (turned - turned[0]) / (2.0 * math.pi)
-    ends = np.interp(np.arange(int(turns[-1]) + 1), turns, np.arange(turns.size))
-    lengths = np.diff(ends)
+    first, ends = math.nan, []
+    for start, theta in phases(rows):
+        first = first if start else float(theta[0])
+        turns = (theta - first) / (2.0 * math.pi)
+        begun = np.arange(math.floor(turns[0]) + 1 if start else 0, int(turns[-1]) + 1)
+        ends.append(np.interp(begun, turns, np.arange(start, start + turns.size)))
+    lengths = np.diff(np.concatenate(ends))
     return float(lengths.std() / lengths.mean()) if lengths.size > 1 else 0.0
 
 

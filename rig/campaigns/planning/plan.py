@@ -85,6 +85,11 @@ class Plan(Configured):
     """How often a point is measured again, at most, that was refused for something that passes: held outputs, lost samples, a
     disturbance of the vibration."""
 
+    rows: Literal["all", "records"] = "all"
+    """Rows that are stored: all, or all of the records that are evaluated and few of what lies between."""
+    telemetry_s: float = Field(0.1, gt=0, le=60)
+    """Time between stored rows where not all rows are stored, s."""
+
     @property
     @abstractmethod
     def counts(self) -> dict[str, int]:
@@ -141,9 +146,19 @@ class Plan(Configured):
         """Return the numbers of the targets that are measured together with this one, including its own."""
         return frozenset((number,))
 
-    def row_stride(self, number: int, sample_rate_hz: float) -> int:
-        """Return the number of rows per stored row while a target is measured; 1 stores all rows."""
-        return 1
+    def stores_record(self, number: int) -> bool:
+        """Whether all rows of a target's record are stored."""
+        return True
+
+    def row_stride(self, number: int, sample_rate_hz: float, *, evaluated: bool = True) -> int:
+        """Return the number of rows per stored row while a target (-1: none) is measured; 1 stores all rows.
+
+        ``evaluated``: whether these rows are evaluated, or only lead there.
+        """
+        full = number < 0 or self.stores_record(number)
+        if full and (evaluated or self.rows == "all"):
+            return 1
+        return max(1, round(self.telemetry_s * sample_rate_hz))
 
     def waveforms(self, sample_rate_hz: float) -> np.ndarray | None:
         """Return the waveforms of unit peak that the segments play, float64[n, period]; None if they play none."""

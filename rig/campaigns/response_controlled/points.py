@@ -10,6 +10,7 @@ from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import level_objection, settled_point, with_settling
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
@@ -44,10 +45,10 @@ class ResponseControlledResult:
 
 
 def measure_response_controlled_point(
-    bench: Bench, plan: ResponseControlledPlan, target: Target, rows: np.ndarray, settling: np.void
+    bench: Bench, plan: ResponseControlledPlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[ResponseControlledResult]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
-    rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
+    rows = rows[within_periods(rows, plan.record_periods)]
     try:
         wanted = (target.phase_lag_deg or 0.0) + 180.0
         vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=wanted)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,6 +14,7 @@ from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.skipped import what_was_skipped
 from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.vibrations import failed_point
@@ -70,7 +72,10 @@ class Journal(Protocol):
 
 
 class Execution:
-    """One part of a recording: runs the control loop, writes the journal and evaluates the points."""
+    """One part of a recording: runs the control loop, writes the journal and evaluates the points.
+
+    Rows of a record too long for memory wait for their evaluation in unnamed files in ``folder``.
+    """
 
     def __init__(
         self,
@@ -80,6 +85,7 @@ class Execution:
         journal: Journal,
         progress: Progress,
         before: MeasuredBefore | None = None,
+        folder: Path | None = None,
     ) -> None:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
@@ -102,8 +108,8 @@ class Execution:
         self.next_segment = 0
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
-        self.kept = RowBuffer(loop.tick.row_dtype)
-        self.stored = StoredRows(plan, loop.tick.arrays.segments, bench.sample_rate_hz)
+        self.kept = RowBuffer(loop.tick.row_dtype, folder)
+        self.stored = StoredRows(plan, loop.tick.arrays.segments, self._evaluated(), bench.sample_rate_hz)
         self.evaluations = EvaluationThread()
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
@@ -177,8 +183,9 @@ class Execution:
         first = self.tick.sample - rows.size
         events: list[dict[str, Any]] = []
         for name, kind in (("lock", LockState), ("guard", GuardMode)):
-            values = np.concatenate([[self.last[name]], rows[name]])
-            for index in np.flatnonzero(np.diff(values.astype(int))):
+            values = np.ascontiguousarray(rows[name])
+            begins = [0] if int(values[0]) != self.last[name] else []
+            for index in (*begins, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist()):
                 state = kind(int(rows[name][index])).name.lower()
                 self.locked = self.locked or state == "locked"
                 events.append({"sample": first + int(index), "what": name, "state": state})
@@ -207,10 +214,10 @@ class Execution:
                     self.evaluations.known(failed_point(self.plan, target, entry, locked=self.locked))
                 elif kind in EVALUATED:
                     settling = outcomes[self.next_segment - 1].copy()
-                    rows = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
+                    record = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
                     steady = kind == SegmentKind.RECORD
                     faults = self._faults(self.next_segment, self.next_segment + 1, settled=steady)
-                    self.evaluations.ask(self._measured, first, rows, faults, steady, target, settling)
+                    self.evaluations.ask(self._measured, first, record, faults, steady, target, settling)
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
         while self.evaluations if self.loop.waits else self.evaluations.ready():
@@ -236,9 +243,7 @@ class Execution:
             first = self._point_begins(first - 1)
         return int(self.tick.outcomes["faults"][first:end].sum())
 
-    def _measured(
-        self, first: int, rows: np.ndarray, faults: int, steady: bool, target: Any, *told: Any
-    ) -> list[Point[Any]]:
+    def _measured(self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
         """Evaluate the points in rows that begin with sample ``first``.
 
         ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
@@ -259,6 +264,13 @@ class Execution:
         while self.evaluations:
             for point in self._anyway(self.evaluations.take) or ():
                 self._anyway(self._report, point)
+
+    def _evaluated(self) -> np.ndarray:
+        """Return which segments belong to the rows with which a point is evaluated, bool[n]."""
+        segments = self.tick.arrays.segments
+        if self.in_one_go or self.plan.evaluates_approach:
+            return np.asarray(segments["point"] >= 0)
+        return np.isin(segments["kind"], list(EVALUATED))
 
     def _begin(self, segment: int) -> int:
         """Return the first sample of the rows with which a segment is evaluated."""

@@ -1,38 +1,79 @@
-"""Rows of the points being measured. They are kept in memory until their point is over."""
+"""Rows of the points being measured. They are kept until their point is over: in memory, or in files if they are many."""
 
 from collections import deque
+from pathlib import Path
 
 import numpy as np
 
-__all__ = ["RowBuffer"]
+from rig.campaigns.evaluation.rows import LongRows, Rows, Spool
+from rig.errors import RecordingError
+
+__all__ = ["IN_MEMORY_BYTES", "RowBuffer"]
+
+IN_MEMORY_BYTES = 32 * 2**20
 
 
 class RowBuffer:
-    """Chunks of rows, sorted by the number of their first sample."""
+    """Chunks of rows, sorted by the number of their first sample.
 
-    def __init__(self, dtype: np.dtype) -> None:
-        self._dtype = dtype
+    Above ``in_memory_bytes`` they go to unnamed files in ``folder``, by default the system's for temporary files.
+    """
+
+    def __init__(self, dtype: np.dtype, folder: Path | None = None, *, in_memory_bytes: int = IN_MEMORY_BYTES) -> None:
+        self._dtype, self._folder, self._most = dtype, folder, in_memory_bytes
         self._chunks: deque[tuple[int, np.ndarray]] = deque()
+        self._bytes = 0
+        self._spool: Spool | None = None
+        self._first = 0
+        """Sample of the first row of the spool."""
 
     def add(self, first: int, rows: np.ndarray) -> None:
-        """Add a chunk that begins with sample ``first``."""
-        self._chunks.append((first, rows))
+        """Add a chunk that begins with sample ``first``; raises `RecordingError` if it cannot be kept in files."""
+        try:
+            self._add(first, rows)
+        except OSError as error:
+            where = self._folder or "the folder for temporary files"
+            raise RecordingError(f"{where}: the rows of a long record cannot be kept ({error.strerror})") from error
 
-    def take(self, first: int, end: int) -> np.ndarray:
+    def _add(self, first: int, rows: np.ndarray) -> None:
+        if self._spool is not None:
+            self._spool.add(rows)
+            return
+        self._chunks.append((first, rows))
+        self._bytes += rows.nbytes
+        if self._bytes > self._most:
+            self._first = self._chunks[0][0]
+            self._spool = Spool(self._dtype, self._folder)
+            while self._chunks:
+                self._spool.add(self._chunks.popleft()[1])
+
+    def take(self, first: int, end: int) -> Rows:
         """Return the rows of a point, and drop all rows up to the end of the point."""
+        if self._spool is not None:
+            begin, stop = self._first, self._first + self._spool.size
+            taken = LongRows(self._spool, first - begin, end - begin)
+            rest = LongRows(self._spool, end - begin, self._spool.size)
+            self._spool, self._bytes = None, 0
+            if end < stop:
+                self.add(end, rest.whole())
+            return taken
         out = np.empty(end - first, self._dtype)
         while self._chunks and self._chunks[0][0] < end:
             start, rows = self._chunks.popleft()
+            self._bytes -= rows.nbytes
             if start + rows.size <= first:
                 continue
-            taken = slice(max(0, first - start), min(rows.size, end - start))
-            out[max(0, start - first) : min(end, start + rows.size) - first] = rows[taken]
+            taken_rows = slice(max(0, first - start), min(rows.size, end - start))
+            out[max(0, start - first) : min(end, start + rows.size) - first] = rows[taken_rows]
             if start + rows.size > end:
                 self._chunks.appendleft((start, rows))
+                self._bytes += rows.nbytes
                 break
         return out
 
     def drop_before(self, sample: int) -> None:
         """Drop the chunks that end before a sample."""
+        if self._spool is not None and self._first + self._spool.size <= sample:
+            self._spool, self._bytes = None, 0
         while self._chunks and self._chunks[0][0] + self._chunks[0][1].size <= sample:
-            self._chunks.popleft()
+            self._bytes -= self._chunks.popleft()[1].nbytes

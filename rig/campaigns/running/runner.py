@@ -75,7 +75,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
             _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
             _started(session, settings, output) as loop,
         ):
-            execution = Execution(plan, bench, loop, journal, options.progress)
+            execution = Execution(plan, bench, loop, journal, options.progress, folder=output.absolute().parent)
             execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
     return _with_further_attempts(_whole(output, options.progress), execution, options, facts)
 
@@ -199,7 +199,7 @@ def _with_further_attempts(
 def _execution(
     plan: Plan, bench: Bench, progress: Progress, before: MeasuredBefore, loop: RunningLoop, journal: JournalWriter
 ) -> Execution:
-    return Execution(plan, bench, loop, journal, progress, before)
+    return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent)
 
 
 def _put_back(output: Path, progress: Progress) -> None:

@@ -13,14 +13,18 @@ __all__ = ["StoredRows"]
 class StoredRows:
     """Selects rows on their way to the journal.
 
-    ``segments`` is the table of the sequencer. For points that the plan does not store in full, only rows whose sample number
-    is a multiple of ``plan.row_stride`` are stored. Every change of the stride is recorded as an event. The sample numbers of
-    all rows follow from these events.
+    ``segments`` is the table of the sequencer, and ``evaluated``, bool[n], says which of them are evaluated. Of what the plan
+    does not store in full, only rows whose sample number is a multiple of ``plan.row_stride`` are stored. Every change of the
+    stride is recorded as an event. The sample numbers of all rows follow from these events
+    (`rig.campaigns.evaluation.stored_samples`).
     """
 
-    def __init__(self, plan: Plan, segments: np.ndarray, sample_rate_hz: float) -> None:
-        strides = [plan.row_stride(int(n), sample_rate_hz) if n >= 0 else 1 for n in segments["point"]]
-        self._strides = np.array([*strides, 1])  # the last entry is for rows outside any segment (number -1)
+    def __init__(self, plan: Plan, segments: np.ndarray, evaluated: np.ndarray, sample_rate_hz: float) -> None:
+        points = [*segments["point"].tolist(), -1]  # the last entry is for rows outside any segment (number -1)
+        used = [*evaluated.tolist(), False]
+        self._strides = np.array(
+            [plan.row_stride(n, sample_rate_hz, evaluated=e) for n, e in zip(points, used, strict=True)]
+        )
         self._all = bool((self._strides == 1).all())
         self._changes: list[tuple[int, int, int]] = [(0, 0, 1)]  # first sample, first row, stride
         self._rows = 0

@@ -9,8 +9,9 @@ from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point, with_settling
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
-from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.lost_samples import rms_of_force
 from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.drive_shape import drive_shape
@@ -45,17 +46,17 @@ class SteppedPhaseResult:
 
 
 def measure_stepped_phase_point(
-    bench: Bench, plan: SteppedPhasePlan, target: Target, rows: np.ndarray, settling: np.void
+    bench: Bench, plan: SteppedPhasePlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[SteppedPhaseResult]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     lag_deg = target.phase_lag_deg or 0.0
-    rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
+    rows = rows[within_periods(rows, plan.record_periods)]
     try:
         vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg + 180.0)
         modal = modal_part(vibration, drive_shape(bench, plan.plant))
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=True)
-    force_rms_n = float(bridged(rows)[:-1, bench.index_of("force")].std())
+    force_rms_n = rms_of_force(bench, rows)
     missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
     off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
     point = settled_point(plan, target, bench, vibration, rows, off_level)

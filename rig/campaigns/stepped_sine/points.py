@@ -18,6 +18,7 @@ from rig.campaigns.evaluation.acceptance import (
 from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.point import Point, Quality, planned_point
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Column, Target
@@ -47,10 +48,10 @@ class SteppedSineResult:
 
 
 def measure_stepped_sine_point(
-    bench: Bench, plan: SteppedSinePlan, target: Target, rows: np.ndarray, settling: np.void
+    bench: Bench, plan: SteppedSinePlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[SteppedSineResult]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
-    rows = rows[within_periods(rows["theta_rad"], plan.record_periods)]
+    rows = rows[within_periods(rows, plan.record_periods)]
     try:
         vibration = recorded_vibration(bench, rows, plan.harmonics)
     except (IdentificationError, ArithmeticError) as error:

@@ -15,6 +15,7 @@ from rig.campaigns.evaluation.drift import of_the_result
 from rig.campaigns.evaluation.point import Point, point_name, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import MultisineResult
@@ -166,6 +167,7 @@ def rows_from_rest(recording: Recording, number: int, ratio: Fraction) -> np.nda
                 first = point.rows.first_sample
                 ends = [one.rows.end_sample for one in points if one.rows is not None]
                 begin = max((end for end in ends if end <= first), default=0)
+                begin = max(begin, StoredSamples(part).unbroken_from(first))
                 rows = part.read(begin, first)
                 quiet = np.flatnonzero(np.abs(rows["command_v"]) == 0.0)
                 if not quiet.size:

@@ -218,3 +218,15 @@ def test_what_cannot_be_used_is_named() -> None:
         identify(backbone).interval("q")
     with pytest.raises(IdentificationError, match=r"shapes_std: shape \(1,\), shapes have \(2, 1\)"):
         ModeShapes(("drive", "tip"), SHAPE[:, None], shapes_std=np.zeros(1))
+
+
+def test_without_draws_the_properties_are_the_same_and_their_errors_unknown() -> None:
+    backbone = Backbone((noisy_point(80.0, 1e-3),), drive_mode_shape=PHI)
+    quick, whole = identify(backbone, draws=0), identify(backbone)
+    assert quick.modal_frequency_hz[0] == whole.modal_frequency_hz[0]
+    assert quick.damping_ratio[0] == whole.damping_ratio[0]
+    assert np.isnan(quick.damping_ratio_std).all()
+    assert np.isnan(quick.interval_95).all()
+    assert quick.interval_95.shape == whole.interval_95.shape
+    with pytest.raises(IdentificationError, match="draws: is 99"):
+        identify(backbone, draws=99)

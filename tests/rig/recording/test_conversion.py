@@ -296,3 +296,24 @@ def test_a_conversion_takes_little_memory(tmp_path):
     finally:
         tracemalloc.stop()
     assert peak < 8e6
+
+
+def test_noise_is_stored_as_it_is_and_what_shrinks_is_compressed(tmp_path):
+    values = rows(0, 40_000)
+    values["inputs"] = np.random.default_rng(0).standard_normal(values["inputs"].shape)
+    path = tmp_path / "OUT.h5"
+    with JournalWriter.create(journal_path(path), header()) as writer:
+        writer.part({"first_sample": 0})
+        writer.rows(values)
+        writer.end({"completed": True})
+    finalise(journal_path(path), path)
+    with h5py.File(path) as file:
+        stored = file["parts/0/rows"]
+        assert stored["inputs"].compression is None
+        assert {stored[name].compression for name in stored if stored[name].dtype.kind in "iu"} == {"lzf"}
+        assert stored["inputs"].id.get_storage_size() >= values["inputs"].nbytes
+        for name in ROW.names:  # the last chunk is not full
+            assert stored[name][()].tobytes() == np.ascontiguousarray(values[name]).tobytes()
+    with Recording(path) as recording:
+        assert recording.integrity == "verified"
+        assert recording.parts[0].read(39_000, 40_000).tobytes() == values[39_000:].tobytes()

@@ -1,0 +1,137 @@
+"""Whole periods of a record as columns for least squares, chunk by chunk: harmonics of its phase, and its signals."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.signals.chunks import Line, Phase, Record, spans
+from identification.validation import finite
+
+__all__ = ["Columns", "Stretch", "least_squares"]
+
+Float = NDArray[np.float64]
+
+_MOST_KEPT = 2**22
+"""Numbers that are kept in memory rather than computed again."""
+
+
+class Stretch(NamedTuple):
+    """A stretch of the whole periods of a record; rows of zeros where samples were lost."""
+
+    theta: Float
+    """float[n], without ripple."""
+    design: Float
+    """float[n, 2 H + 3]."""
+    data: Float
+    """float[n, n_channels]."""
+    lost: NDArray[np.bool_]
+    """bool[n]."""
+
+
+class Columns:
+    """The first ``count`` samples of a record, whole periods, in chunks; as often as they are iterated over.
+
+    The ripple of the phase is removed and a drift is fitted if there are ``many`` periods. Few chunks are kept in memory.
+    """
+
+    def __init__(self, record: Record, phase: Phase, count: int, harmonics: int, *, many: bool) -> None:
+        self._record, self._phase, self._harmonics = record, phase, harmonics
+        self.count = count
+        self._straight = Line(phase.first, phase.at(count - 1), count)
+        self._position = Line(-0.5, 0.5, count)
+        self._kept: list[Stretch] = []
+        self._columns: tuple[int, int, Float] | None = None
+        self._drifts = many
+        self._swing = self._ripple() if many else None
+
+    def __iter__(self) -> Iterator[Stretch]:
+        if self._kept:
+            yield from self._kept
+            return
+        kept = []
+        for start, stop in spans(self.count):
+            chunk = self._read(start, stop)
+            if self.count * (chunk.design.shape[1] + chunk.data.shape[1]) <= _MOST_KEPT:
+                kept.append(chunk)
+            yield chunk
+            del chunk  # before the next is read
+        self._kept = kept
+
+    def _read(self, start: int, stop: int) -> Stretch:
+        theta = self._phase.read(start, stop)
+        if self._swing is not None:
+            theta = np.asarray(theta - self._repeating(start, stop) @ self._swing)
+        position = self._position.read(start, stop) if self._drifts else None
+        design = _design(theta, self._harmonics, position)
+        samples, lost = self._record.samples(start, stop)
+        if lost.any():
+            samples = np.where(lost, 0.0, samples)
+        design[lost] = 0.0  # rows of zeros, in the data as well: no effect on the sums of least squares
+        return Stretch(theta, design, finite("samples", samples).T, lost)
+
+    def _repeating(self, start: int, stop: int) -> Float:
+        """float[stop - start, 2 H]: harmonics of a phase that advances uniformly."""
+        if self._columns is None or self._columns[:2] != (start, stop):
+            columns = _design(self._straight.read(start, stop), self._harmonics)
+            self._columns = start, stop, columns[:, 1 : 2 * self._harmonics + 1]
+        return self._columns[2]
+
+    def _ripple(self) -> Float:
+        """float[2 H]: the part of the phase that repeats within every period.
+
+        It is fitted to the deviation of the phase from its moving mean over one period, so that slow variations remain.
+        """
+        straight = self._straight.read(0, 2)
+        period = round(2.0 * np.pi / (straight[1] - straight[0]))
+        size = self.count - period + 1
+        normal: Float | float = 0.0
+        right: Float | float = 0.0
+        for start, stop in spans(size):
+            end = stop + period - 1
+            away = self._phase.read(start, end) - self._straight.read(start, end)
+            mean = np.convolve(away, np.full(period, 1.0 / period), mode="valid")
+            inside = slice(period // 2, period // 2 + mean.size)
+            weight = _hanning(start, stop, size)  # without it the ends of a slow variation leak into the fit
+            columns = self._repeating(start, end)[inside] * weight[:, None]
+            normal = normal + columns.T @ columns
+            right = right + columns.T @ ((away[inside] - mean) * weight)
+        return least_squares(np.asarray(normal), np.asarray(right))
+
+
+def _hanning(start: int, stop: int, size: int) -> Float:
+    """``np.hanning(size)[start:stop]``."""
+    if size == 1:
+        return np.ones(1)
+    return np.asarray(
+        0.5 + 0.5 * np.cos(np.pi * np.arange(1.0 - size + 2 * start, 1 - size + 2 * stop, 2) / (size - 1))
+    )
+
+
+def least_squares(normal: Float, right: Float) -> Float:
+    """Solve the normal equations, which suffice for the few columns of harmonics, as these are nearly orthogonal.
+
+    Columns of zeros get a coefficient of zero.
+    """
+    return np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
+
+
+def _design(theta: Float, harmonics: int, position: Float | None = None) -> Float:
+    """float[n, 2 H + 3]: 1, cosines and minus sines (for Re and Im of Y_h), and the drift of the fundamental.
+
+    ``position`` in the record goes from -1/2 to 1/2. Without it the drift is left out (its columns are zero), as below four
+    periods, where it cannot be separated from the harmonics.
+    """
+    columns = np.zeros((theta.size, 2 * harmonics + 3))
+    columns[:, 0] = 1.0
+    rotation = np.exp(1j * theta)
+    power = np.ones_like(rotation)
+    for harmonic in range(1, harmonics + 1):
+        power = power * rotation
+        columns[:, harmonic] = power.real
+        columns[:, harmonics + harmonic] = -power.imag
+    if position is not None:
+        columns[:, -2] = position * rotation.real
+        columns[:, -1] = -position * rotation.imag
+    return columns
