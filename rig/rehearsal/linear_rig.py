@@ -97,7 +97,7 @@ class LinearRig:
             shape = self.of("drive_shape", mode)
             pole = s**2 + 2.0 * self.of("damping_ratio", mode) * omega * s + omega**2
             ratios = np.array([1.0, *(self.of(f"ratio {name}", mode) for name in self.channels)])
-            out += shape**2 * ratios[:, None] / pole
+            out += shape * shape * ratios[:, None] / pole  # infinite where a fit tries an absurd shape; ** would raise
         return out
 
     def force_per_v(self, s: Complex, receptance: Complex) -> Complex:
