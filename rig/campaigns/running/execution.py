@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from controller import LockState
 from rig.arming.run_options import Progress
@@ -124,7 +125,8 @@ class Execution:
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        with held():  # from the last sample to the end record in the journal
+        # One thread of linear algebra: more would wait for each other over its small matrices, and round otherwise elsewhere.
+        with threadpool_limits(limits=1, user_api="blas"), held():  # signals: until the end record is in the journal
             with asking(self.loop.request_stop):
                 try:
                     for rows in self.loop.run():
