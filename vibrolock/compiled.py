@@ -33,7 +33,6 @@ __all__ = [
     "kernel",
     "kernel_cache_folder",
     "note_use",
-    "on_compiling",
     "unlocked_kernel",
 ]
 
@@ -46,9 +45,6 @@ Record: TypeAlias = Any
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "_nrt": False}
 """Options of numba: IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so that arrays inside them
 need no reference counts, which would cost a third of the time of a sample."""
-
-on_compiling: list[Callable[[str], None]] = []
-"""Called with the name of each kernel that is about to be compiled, for it is not in the cache."""
 
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 _UNUSED_AFTER_DAYS = 30

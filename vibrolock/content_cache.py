@@ -13,7 +13,8 @@ import llvmlite.binding
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
-from vibrolock.compiled import content_digest, kernel_cache_folder, note_use, on_compiling
+from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
+from vibrolock.compiling import on_compiling
 
 __all__ = ["c_function", "dispatcher", "inner_dispatcher"]
 

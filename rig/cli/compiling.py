@@ -3,7 +3,7 @@
 import sys
 import time
 
-from vibrolock.compiled import on_compiling
+from vibrolock.compiling import on_compiling
 
 __all__ = ["say_what_is_compiled"]
 

@@ -165,7 +165,7 @@ def test_without_a_compiler_kernels_are_plain_functions():
 
 def test_a_kernel_called_by_kernels_is_compiled_once_for_all_constants_and_told(tmp_path):
     code = """
-from vibrolock.compiled import on_compiling
+from vibrolock.compiling import on_compiling
 told = []
 on_compiling.append(told.append)
 

@@ -25,7 +25,7 @@ frequency_window_hz = [21.933, 26.807]
 
 LIGHT = {
     *("typer", "shellingham", "annotated_doc", "click"),
-    *("typing_extensions", "typing_inspection", "annotated_types", "pydantic_core"),
+    *("typing_extensions", "typing_inspection", "annotated_types", "pydantic_core", "threadpoolctl"),
 }
 """Libraries of other libraries that take no time."""
 
