@@ -36,6 +36,7 @@ THRESHOLDS = np.dtype(
         ("locked_periods", "i8"),
         ("lost_rad", "f8"),
         ("lost_periods", "i8"),
+        ("waiting_rad", "f8"),
         ("smallest_force_n", "f8"),
         ("smallest_response", "f8"),
     ]
@@ -53,8 +54,8 @@ LOCK = np.dtype(
     ]
 )
 """State of the phase lock (one record). ``close_periods``, ``far_periods``: in a row, up to the present one;
-``astray_periods``: far periods less close ones at a held level; ``strays``: the error of the present period exceeds half of
-what counts as far; ``gained``: there has been a lock before."""
+``astray_periods``: far periods less close ones at a held level; ``strays``: the error of the present period exceeds that at
+which ramps wait; ``gained``: there has been a lock before."""
 
 
 class LockRule(Settings):
@@ -68,6 +69,8 @@ class LockRule(Settings):
     """Mean phase error of a period above which the period counts as far, deg."""
     lost_periods: int = Field(20, ge=1, le=1000)
     """Far periods in a row, at a held level, that lose a lock; or three times as many, less the close ones between them."""
+    waiting_deg: float = Field(30.0, gt=0, le=180)
+    """Mean phase error of a period above which an upward ramp of the level waits, once there has been a lock."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -82,6 +85,7 @@ class LockRule(Settings):
         out["locked_periods"] = self.locked_periods
         out["lost_rad"] = math.radians(self.lost_deg)
         out["lost_periods"] = self.lost_periods
+        out["waiting_rad"] = math.radians(self.waiting_deg)
         out["smallest_force_n"] = smallest_force_n
         out["smallest_response"] = smallest_response
         return out
@@ -110,7 +114,7 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     if lock.state == SEARCHING:
         lock.state = ACQUIRING
     lock.close_periods = lock.close_periods + 1 if size < thresholds.locked_rad else 0
-    lock.strays = 1 if size > 0.5 * thresholds.lost_rad else 0
+    lock.strays = 1 if size > thresholds.waiting_rad else 0
     if not held:
         lock.astray_periods = 0
     elif size > thresholds.lost_rad:

@@ -19,6 +19,7 @@ HARMONICS = 5
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
 SHORTEST_TIME_OUT = 1000
 LOST_PERIODS = 20  # at least
+WAITING_DEG = 15.0  # error above which a ramp waits: the loops are quick
 
 
 def plan_text(
@@ -51,6 +52,7 @@ def plan_text(
         if volts
         else _line("levels_m", list(levels.levels_m)),
     ]
+    lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
     if not volts:
         head += [
             "# Voltage of the lowest level on the linear plant.",
@@ -82,7 +84,7 @@ def plan_text(
         _line("centre_frequency_hz", significant(hertz, 6)),
         _line("frequency_window_hz", [window.lowest_hz, window.highest_hz]),
         "# A lock counts as lost where twice the time in which the frequency follows has not brought it back.",
-        f"lock = {{ lost_periods = {max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))} }}",
+        f"lock = {{ lost_periods = {lost_periods}, waiting_deg = {WAITING_DEG:g} }}",
     ]
     settle = [
         "",

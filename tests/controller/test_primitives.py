@@ -116,6 +116,7 @@ def _lock():
     thresholds = np.zeros(1, THRESHOLDS)
     thresholds["locked_rad"], thresholds["locked_periods"] = math.radians(5), 10
     thresholds["lost_rad"], thresholds["lost_periods"] = math.radians(30), 20
+    thresholds["waiting_rad"] = math.radians(30)
     return np.zeros(1, LOCK), thresholds
 
 
