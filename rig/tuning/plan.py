@@ -63,7 +63,7 @@ def plan_text(
     head += [
         "# Slow enough that force and frequency follow with the damping as measured.",
         _line("ramp_periods", ramp_periods(plant, chosen.tracking_periods)),
-        "# A level without a lock is left out; the next one seeks it again.",
+        "# A level that loses the lock is left out, and those above it.",
         _line("on_lost_lock", "skip"),
     ]
     if levels.accepted_alien is not None:

@@ -48,8 +48,8 @@ SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
 STOP = int(OnFailure.STOP)
 
-LONGEST_WAIT = 200.0
-RETURN_PERIODS = 20.0
+LONGEST_WAIT = 200.0  # periods of a ramp that waits for the phase; a loop that hunts at a level hunts more at the next
+RETURN_PERIODS = 20.0  # of the way back to the last level with a lock
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
 
@@ -253,7 +253,7 @@ def advance(
     climbs = is_ramp(segment.kind) and segment.level > progress.level
     if climbs and progress.unreached == 1:
         progress.frozen_cycles += passed
-    if climbs and must_wait(progress, segment, lock):
+    elif climbs and must_wait(progress, segment, lock):
         progress.waited_cycles += passed
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
