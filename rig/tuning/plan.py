@@ -11,7 +11,7 @@ from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.tuning.design import Chosen, gains_of
 from rig.tuning.levels import LevelChoice, significant
-from rig.tuning.shifts import Window, ramp_periods, start_periods
+from rig.tuning.shifts import Window, ramp_periods, start_periods, start_voltage
 
 __all__ = ["plan_text"]
 
@@ -55,8 +55,8 @@ def plan_text(
     lost_periods = max(LOST_PERIODS, math.ceil(2.0 * chosen.tracking_periods))
     if not volts:
         head += [
-            "# Voltage of the lowest level on the linear plant.",
-            _line("start_v", significant(levels.needed_v[0], 4)),
+            "# Voltage of the lowest level on the linear plant, or less: a structure still at rest takes more force.",
+            _line("start_v", significant(start_voltage(bench, plant, levels.needed_v[0]), 4)),
             "# Until vibration and frequency have come to rest there.",
             _line("start_periods", start_periods(plant, chosen.tracking_periods)),
         ]

@@ -10,13 +10,14 @@ from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 
-__all__ = ["Window", "frequency_window", "ramp_periods", "start_periods"]
+__all__ = ["Window", "frequency_window", "ramp_periods", "start_periods", "start_voltage"]
 
 Real = NDArray[np.float64]
 SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
 STANDS_OUT = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 TIMES = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
 SHORTEST, LONGEST = 20.0, 300.0  # ramps, periods
+START_SHARE = 0.5  # of the force limit, for a structure that is still at rest
 SHORTEST_START, LONGEST_START = 40.0, 600.0  # periods
 PLAUSIBLE = 0.005  # change of the frequency from level to level
 
@@ -92,6 +93,16 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
     grows = TIMES / (2.0 * math.pi * plant.damping_ratio)
     follows = 0.5 * math.pi * PLAUSIBLE * tracking_periods / (0.5 * plant.damping_ratio)
     return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), SHORTEST), LONGEST))
+
+
+def start_voltage(bench: Bench, plant: PlantModel, needed_v: float) -> float:
+    """Return the voltage (V peak) that sets the rig in motion: ``needed_v``, that of the lowest level, or less.
+
+    At resonance a lightly damped structure takes a small part of the force that the same voltage gives while it is still at
+    rest, u / alpha. That force may reach half of the bench's limit.
+    """
+    alpha = abs(complex(plant.exciter(1j * plant.lock_frequency_rad_s())[0]))
+    return min(needed_v, START_SHARE * bench.limits.force_n * alpha)
 
 
 def start_periods(plant: PlantModel, tracking_periods: float) -> float:

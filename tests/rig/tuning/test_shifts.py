@@ -1,5 +1,6 @@
 """Windows and ramps that leave room for hardening and softening."""
 
+import dataclasses
 import math
 from types import SimpleNamespace
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
-from rig.tuning.shifts import frequency_window, other_modes, ramp_periods
+from rig.tuning.shifts import frequency_window, other_modes, ramp_periods, start_voltage
 from tests.controller.tuning.rigs import plant_of
 
 HERTZ = 24.37
@@ -60,3 +61,12 @@ def test_ramps_are_longer_with_little_damping_and_with_slow_loops():
     assert ramp_periods(plant.at(damping_ratio=0.5 * plant.damping_ratio), 6.0) > 1.5 * usual
     assert ramp_periods(plant, 60.0) > usual
     assert 20.0 <= usual <= 300.0
+
+
+def test_the_rig_is_set_in_motion_by_a_voltage_whose_force_at_rest_is_half_of_the_limit_at_most():
+    plant, bench = plant_of("magnet-beam"), load_bench("magnet-beam")
+    assert start_voltage(bench, plant, 0.1) == 0.1
+    small = bench.model_copy(update={"limits": bench.limits.model_copy(update={"force_n": 0.01})})
+    omega = plant.lock_frequency_rad_s()
+    blocked = dataclasses.replace(plant, drive_shape=1e-6 * plant.drive_shape, residual_per_kg=(0.0, 0.0))
+    assert abs(blocked.force_per_v(1j * omega)) * start_voltage(small, plant, 0.1) == pytest.approx(0.005, rel=1e-3)
