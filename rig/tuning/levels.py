@@ -18,11 +18,14 @@ LAG_STD_DEG = 0.75  # standard deviation of the lag before the settle rule avera
 RAISED = 3.0  # factor by which the lowest force may be raised
 
 
-def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float) -> tuple[float, float, str]:
+def low_pass(
+    plant: PlantModel, densities: tuple[float, float], lowest_n: float, highest_n: float = math.inf
+) -> tuple[float, float, str]:
     """Return the largest low-pass (rad/s), the lowest force (N) at which the lag can be measured with it, and the reason.
 
-    At that force the standard deviation of the lag is `LAG_STD_DEG`. If at most `RAISED` times the wanted force is needed, the
-    force is raised and the low-pass is kept, because a slow low-pass costs time at every level.
+    At that force the standard deviation of the lag is `LAG_STD_DEG`. If at most `RAISED` times the wanted force is needed, and
+    less than ``highest_n`` (N) by `LEAST_SPAN`, the force is raised and the low-pass is kept, because a slow low-pass costs
+    time at every level.
     """
     omega = plant.lock_frequency_rad_s()
     accelerance = abs(complex(plant.accelerance(1j * omega)))
@@ -41,7 +44,7 @@ def low_pass(plant: PlantModel, densities: tuple[float, float], lowest_n: float)
             f"the lag then fluctuates by {choice.lag_std_deg:.2g} deg at {lowest_n:.3g} N",
         )
     why = f"the lag then fluctuates by {LAG_STD_DEG:g} deg at"
-    if needed_n <= RAISED * lowest_n:
+    if needed_n <= min(RAISED * lowest_n, highest_n / LEAST_SPAN):
         return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for that"
     choice = fluctuation(lowest_n)
     force_n = lowest_n * max(1.0, choice.lag_std_deg / LAG_STD_DEG)

@@ -21,6 +21,7 @@ from rig.tuning.levels import (
     choose_levels,
     low_pass,
     lowest_force,
+    needed_n,
     reach_m,
 )
 from rig.tuning.linear_test import LinearTest, measure
@@ -142,7 +143,7 @@ def tune(
     highest_m = PART * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
     lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
     densities = (test.force_density, test.acceleration_density)
-    largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n)
+    largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n, needed_n(plant, highest_m))
     chosen = choose(plant, test.responses, request.law, largest, noise)
     levels = choose_levels(
         bench,
