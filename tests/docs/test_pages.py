@@ -34,6 +34,7 @@ NOT_RUN = {
     ("docs/user-guide.md", "a minute of wall clock"),
     ("docs/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/writing-a-driver.md", "installs a package"),
+    ("docs/benchmarks.md", "takes minutes"),
 }
 
 

@@ -12,6 +12,7 @@ from rig.bench.user_code import named_code
 from rig.campaigns.running.continuation import what_is_left
 from rig.cli import main
 from rig.errors import ConfigurationError
+from rig.measurements import sweeps
 from rig.recording.reader import Recording
 
 MODULE = """
@@ -129,7 +130,7 @@ def test_a_recording_is_shown_plotted_exported_and_completed_without_its_code(la
         assert status == 0, (line, err)
     with Recording("run.h5") as recording:
         assert what_is_left(recording).to_measure == ()
-        assert len(rig.api.sweeps(recording)) == 1
+        assert len(sweeps(recording)) == 1
     assert not Path("imported.txt").exists()
     assert lab not in sys.modules
 
