@@ -50,7 +50,7 @@ def loop() -> Iterator[Ratio]:
         if "recorded_us_per_sample" in found:
             fused, whole = found["fused_us_per_sample"], found["recorded_us_per_sample"]
             yield Ratio(f"a whole backbone with journal and file, {bench}", "fused loop", whole / fused)
-    yield Ratio("real time", f"fused loop, {bench}", measured["magnet-beam"]["fused_realtime_factor"])
+    yield Ratio("real time, magnet-beam", "fused loop", measured["magnet-beam"]["fused_realtime_factor"])
 
 
 def commands() -> Iterator[Ratio]:

@@ -24,7 +24,7 @@ class _Lines:
             return
         self.due_s = time.monotonic() + EVERY_S
         so_far = f" ({self.count} kernels so far)" if self.count > FEW else ""
-        print(f"compiling for this processor, once; less than half a minute{so_far}", file=sys.stderr, flush=True)
+        print(f"compiling, once; some fifteen seconds of one core{so_far}", file=sys.stderr, flush=True)
 
 
 def say_what_is_compiled() -> None:

@@ -125,7 +125,7 @@ class Execution:
         for remark in self.loop.remarks:
             self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        # One thread of linear algebra: more would wait for each other over its small matrices, and round otherwise elsewhere.
+        # One thread of linear algebra: more would wait for each other over its small matrices.
         with threadpool_limits(limits=1, user_api="blas"), held():  # signals: until the end record is in the journal
             with asking(self.loop.request_stop):
                 try:
