@@ -19,6 +19,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -70,8 +71,8 @@ def commands() -> Iterator[Ratio]:
         times: dict[str, list[float]] = {name: [] for name in ("", *asked)}
         for number in range(ROUNDS + 1):
             for name, arguments in asked.items():
-                times[name].append(_processor_s(lambda: _rig(*arguments)))  # noqa: B023 (called at once)
-            times[""].append(_processor_s(lambda: _python("-c", "import numpy")))
+                times[name].append(_processor_s(partial(_rig, *arguments)))
+            times[""].append(_processor_s(partial(_python, "-c", "import numpy")))
             if number == 0:
                 times = {name: [] for name in times}  # the first round compiles and fills caches
         base = statistics.median(times.pop(""))
@@ -159,7 +160,7 @@ def main() -> None:
     given = parser.parse_args()
     parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, pnlss]
     if given.minutes > 0.0 and shutil.which("cyclictest"):
-        parts.append(lambda: wall_clock(given.minutes))
+        parts.append(partial(wall_clock, given.minutes))
     ratios: list[Ratio] = []
     for part in parts:
         for ratio in part():

@@ -22,7 +22,7 @@ import time
 import types
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import Any, ParamSpec, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -71,8 +71,7 @@ def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, R]:
-    declared: Any = _Kernel(function, options)
-    return declared  # type: ignore[no-any-return]
+    return cast("Callable[P, R]", _Kernel(function, options))
 
 
 class _Kernel:

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from io import FileIO
 from pathlib import Path
 from tempfile import TemporaryFile
 from threading import Lock
-from typing import IO, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class Spool:
     def __init__(self, dtype: np.dtype[Any], folder: Path | None = None) -> None:
         self.dtype, self.size = dtype, 0
         self._lock = Lock()  # an evaluation reads while rows are added
-        self._files: Mapping[str, IO[bytes]] = {
+        self._files: Mapping[str, FileIO] = {
             name: TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115
             for name in dtype.names or ()
         }
@@ -59,7 +60,7 @@ class Spool:
             file = self._files[name]
             file.seek(start * self.dtype[name].itemsize)
             while view:
-                got = file.readinto(view)  # type: ignore[attr-defined]
+                got = file.readinto(view)
                 if not got:
                     raise OSError(f"rows {start} to {stop}: the file of {name} has become shorter")
                 view = view[got:]
