@@ -64,7 +64,7 @@ def commands() -> Iterator[Ratio]:
             "rig --help": ("--help",),
             "rig list": ("list",),
             "rig show": ("show", recording),
-            "rig plot": ("plot", recording, "-o", figure, "--overwrite"),
+            "rig plot": ("plot", recording, "-o", figure),
             "rig identify": ("identify", recording, "-o", str(Path(folder) / "model.h5"), "--overwrite"),
             "rig run magnet-beam/backbone": ("run", "magnet-beam/backbone", "-o", recording, "--overwrite"),
         }
