@@ -17,6 +17,7 @@ from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import GuardMode
 from rig.tick.tick import Tick
+from vibrolock.compiled import bound
 
 __all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
 
@@ -66,6 +67,11 @@ class WallClockLoop(DrivenLoop):
         # Spread over the blocks of a chunk, as each chore costs as much time as a block; a one-block chunk does both at once.
         chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
         self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
+        slot, block = memory.to_fill(), daq.block
+        inputs = np.empty((block, len(daq.channels)))
+        self._tick_block = bound(
+            tick_block, tick.arrays, inputs, daq.flags, slot.readings[:block], slot.rows[:block], self._voltages
+        )
         self._samples = 0
         self.disturbances: dict[str, int] = {}
 
@@ -94,7 +100,7 @@ class WallClockLoop(DrivenLoop):
         """Fill a slot block by block; return the number of rows in it."""
         tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
         arrays, block, by_device = tick.arrays, self.daq.block, self._pace.by_device
-        chores = self._chores
+        chores, tick_block = self._chores, self._tick_block
         guard = arrays.guard.view(np.int64).data
         for first in range(0, self._memory.layout.chunk, block):
             if words[STOP]:
