@@ -208,15 +208,12 @@ class VirtualDAQ(DAQ):
                 self._arrays = arrays
                 self._swap(exchange_block, voltages[part], inputs[part], self.flags[part])
             return
-        voltages = np.ascontiguousarray(voltages, float)
         if self._exchange_bound is None:
             fixed = self._arrays, self._state, self._exchanged
             self._exchange_bound = bound(exchange_block, *fixed, self._first, voltages, inputs, self.flags)
         self._swap(self._exchange_bound, voltages, inputs, self.flags)
 
-    def _swap(
-        self, kernel: Callable[..., None], voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray
-    ) -> None:
+    def _swap(self, kernel: Callable[..., None], voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
         """Exchange samples during which the plant does not change."""
         kernel(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
         self._first += voltages.size

@@ -99,7 +99,7 @@ class WallClockLoop(DrivenLoop):
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; return the number of rows in it."""
         tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
-        arrays, block, by_device = tick.arrays, self.daq.block, self._pace.by_device
+        arrays, block = tick.arrays, self.daq.block
         chores, tick_block = self._chores, self._tick_block
         guard = arrays.guard.view(np.int64).data
         for first in range(0, self._memory.layout.chunk, block):
@@ -109,15 +109,16 @@ class WallClockLoop(DrivenLoop):
                 chores[first]()
                 if self.failure is not None:  # the ring may be full
                     return first
+            end = first + block
+            readings, rows = slot.readings[first:end], slot.rows[first:end]
             self._account()
-            pace.wait()
-            begun = 0 if by_device else _now()
+            begun = pace.wait()
             swapped = self._swap()
             if swapped is None:
                 return first
-            begun = _now() if by_device else begun
-            end = first + block
-            tick_block(arrays, *swapped, slot.readings[first:end], slot.rows[first:end], voltages)
+            begun = begun or _now()
+            inputs, flags = swapped
+            tick_block(arrays, inputs, flags, readings, rows, voltages)
             self.times.begun(begun)
             self._samples += block
             if guard[0] == OFF and tick.over:
