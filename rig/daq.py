@@ -6,6 +6,7 @@ outputs passed in call j are on the converter at the instants ``(j + q) n ... (j
 sample-synchronous hardware.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from enum import Enum
@@ -65,10 +66,9 @@ def largest_of(voltages: np.ndarray) -> float:
     """Return the largest magnitude among ``voltages``; NaN if one of them is."""
     largest = 0.0
     for voltage in voltages:
-        if not abs(voltage) <= largest:
-            largest = abs(voltage)
-            if largest != largest:
-                break
+        if math.isnan(voltage):
+            return math.nan
+        largest = max(largest, abs(voltage))
     return largest
 
 
