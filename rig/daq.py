@@ -6,6 +6,7 @@ outputs passed in call j are on the converter at the instants ``(j + q) n ... (j
 sample-synchronous hardware.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from enum import Enum
@@ -18,6 +19,7 @@ from pydantic import Field
 from rig.bench.channels import Channel, Role
 from rig.bench.configuration import Configured
 from rig.errors import DaqError, DaqRefused, RigError, as_daq_error
+from vibrolock.compiled import bound, kernel
 
 __all__ = ["DAQ", "HELD", "LOST", "Capabilities", "Channel", "Role", "State", "flag_names"]
 
@@ -54,6 +56,20 @@ class State(Enum):
     CLOSED = "closed"
     OPEN = "open"
     RUNNING = "running"
+
+
+RUNNING = State.RUNNING  # a member of an Enum is looked up slowly, and `DAQ.exchange` asks for it at every block
+
+
+@kernel
+def largest_of(voltages: np.ndarray) -> float:
+    """Return the largest magnitude among ``voltages``; NaN if one of them is."""
+    largest = 0.0
+    for voltage in voltages:
+        if math.isnan(voltage):
+            return math.nan
+        largest = max(largest, abs(voltage))
+    return largest
 
 
 class _AsDaqError:
@@ -193,6 +209,8 @@ class DAQ(ABC):
             raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
         self.block = block
         self.flags = np.zeros(block, np.uint16)
+        self._shape = block, len(self.channels)
+        self._largest_of = bound(largest_of, np.zeros(block))
         self._driven = False
         with _AS_DAQ_ERROR:
             self._start()
@@ -203,21 +221,26 @@ class DAQ(ABC):
 
         Voltages beyond the output range, or that are not finite, are refused before anything is sent.
         """
-        if self.state is not State.RUNNING:
+        if self.state is not RUNNING:
             raise DaqRefused(f"the device is {self.state.value}; samples are exchanged while it is running")
         if voltages.shape != (self.block,):
             raise DaqRefused(
                 f"voltages of shape {voltages.shape}: allowed is ({self.block},), the block given to start"
             )
-        largest = np.abs(voltages).max()
+        voltages = np.ascontiguousarray(voltages, float)
+        largest = self._largest_of(voltages)
         if not largest <= self.output_range_v:
             worst = float(voltages[np.argmax(np.where(np.isfinite(voltages), np.abs(voltages), np.inf))])
             raise DaqRefused(f"an output of {worst:g} V was demanded: allowed is +-{self.output_range_v:g} V")
         if largest > 0.0:
             self._driven, self._blocks_of_zero = True, 0
-        inputs = np.empty((self.block, len(self.channels)))
-        with _AS_DAQ_ERROR:
+        inputs = np.empty(self._shape)
+        try:  # not `_AS_DAQ_ERROR`, which calls two methods a block
             self._exchange(voltages, inputs)
+        except RigError:
+            raise
+        except Exception as error:
+            raise as_daq_error(error) from error
         self._blocks_of_zero += int(largest == 0.0)
         return inputs
 

@@ -28,6 +28,7 @@ import numpy as np
 
 __all__ = [
     "Record",
+    "bound",
     "content_digest",
     "inner_kernel",
     "kernel",
@@ -68,6 +69,19 @@ def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
     sensors.
     """
     return _compiled(function, {**OPTIONS, "forceinline": True})
+
+
+def bound(kernel: Callable[P, R], *examples: P.args, **named: P.kwargs) -> Callable[P, R]:
+    """Return a kernel's machine code for arguments of the types of ``examples``, loaded or compiled here; it is not run.
+
+    A kernel finds out the types of its arguments at every call, which for bundles of arrays takes several microseconds, more
+    than a sample. What is returned takes them as they come: call it by position with the same types only, down to the memory
+    layout of arrays.
+    """
+    made = cast("_Kernel", kernel)._made()
+    if made is cast("_Kernel", kernel).py_func:  # numba is told not to compile
+        return kernel
+    return cast("Callable[P, R]", made.compile(tuple(map(made.typeof_pyval, examples))))
 
 
 def _compiled(function: Callable[P, R], options: dict[str, Any]) -> Callable[P, R]:

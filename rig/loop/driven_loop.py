@@ -1,6 +1,6 @@
 """The part of the loop common to all processes: exchange blocks, and bring the output to 0 V whatever the driver raises."""
 
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,11 +13,8 @@ from rig.tick.tick import Tick
 __all__ = ["Block", "DrivenLoop", "end_by_driver"]
 
 
-class Block(NamedTuple):
-    """A block of inputs, V [n, n_channels], and the device's flags [n]."""
-
-    inputs: np.ndarray
-    flags: np.ndarray
+Block: TypeAlias = tuple[np.ndarray, np.ndarray]
+"""A block of inputs, V [n, n_channels], and the device's flags [n]."""
 
 
 def end_by_driver(tick: Tick, error: DaqError) -> None:
@@ -78,7 +75,7 @@ class DrivenLoop:
         """Exchange the present voltages for the next block; None if the loop has failed."""
         daq = self.daq
         try:
-            return Block(daq.exchange(self._voltages), daq.flags)
+            return daq.exchange(self._voltages), daq.flags
         except Exception as error:
             self._fail(as_daq_error(error))
         except BaseException as error:  # KeyboardInterrupt, SystemExit: the rig is ramped down first
@@ -98,4 +95,4 @@ class DrivenLoop:
             self.cause = " ".join(f"{type(error).__name__} was raised in the driver: {error}".split()).rstrip(":")
         self.tick.request_stop()
         daq = self.daq
-        return Block(np.full((daq.block, len(daq.channels)), np.nan), np.full(daq.block, LOST, np.uint16))
+        return np.full((daq.block, len(daq.channels)), np.nan), np.full(daq.block, LOST, np.uint16)

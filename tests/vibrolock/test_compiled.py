@@ -163,6 +163,43 @@ def test_without_a_compiler_kernels_are_plain_functions():
     assert run("print(quarter(1.0), hasattr(quarter, 'signatures'))", NUMBA_DISABLE_JIT="1") == ["0.25", "False"]
 
 
+BOUND = """
+import numpy as np
+from typing import NamedTuple
+from vibrolock.compiled import bound
+
+class Pair(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+@kernel
+def add(pair, factor):
+    pair.first[0] += factor * pair.second[0]
+
+pair = Pair(np.ones(1), np.ones(1))
+fast = bound(add, pair, 2.0)
+print(pair.first[0])
+fast(Pair(pair.first, np.full(1, 3.0)), 2.0)
+print(pair.first[0], len(getattr(add, "signatures", "1")))
+"""
+
+
+@pytest.mark.parametrize("told", ["0", "1"])
+def test_a_bound_kernel_is_made_but_not_run_and_then_does_what_the_kernel_does(told):
+    assert run(BOUND, NUMBA_DISABLE_JIT=told) == ["1.0", "7.0", "1"]
+
+
+def test_a_bound_kernel_refuses_what_is_no_array_and_items_of_another_size():
+    code = """
+for wrong in ([1.0], np.ones(1, np.float32)):
+    try:
+        fast(Pair(pair.first, wrong), 2.0)
+    except TypeError:
+        print("refused")
+"""
+    assert run(BOUND + code)[3:] == ["refused"] * 2
+
+
 def test_a_kernel_called_by_kernels_is_compiled_once_for_all_constants_and_told(tmp_path):
     code = """
 from vibrolock.compiling import on_compiling

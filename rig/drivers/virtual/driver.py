@@ -1,7 +1,7 @@
 """`VirtualDAQ`: a virtual rig behind the DAQ contract, with any block size and any latency."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from rig.tick.safety.kernels import is_over
 from simulators.layout import Flag, RigArrays
 from simulators.sensing.parts import LOWEST_INTERNAL_RATE_HZ
 from simulators.virtual_rig import VirtualRig
+from vibrolock.compiled import bound
 
 __all__ = ["VirtualDAQ"]
 
@@ -76,6 +77,7 @@ class VirtualDAQ(DAQ):
         self._bench_block = bench.block
         self._exchanged = Converters(np.zeros(0), self._counts, loopback_of(self.channels, 0.0), self._faults())
         self._first = 0
+        self._exchange_bound: Callable[..., None] | None = None
 
     def _faults(self) -> FaultArrays:
         return self._queue_options.faults.build(self._seed, self.sample_rate_hz, self._bench_block)
@@ -204,13 +206,16 @@ class VirtualDAQ(DAQ):
         if self._wears:
             for arrays, part in self._pieces(voltages.size):
                 self._arrays = arrays
-                self._swap(voltages[part], inputs[part], self.flags[part])
-        else:
-            self._swap(voltages, inputs, self.flags)
+                self._swap(exchange_block, voltages[part], inputs[part], self.flags[part])
+            return
+        if self._exchange_bound is None:
+            fixed = self._arrays, self._state, self._exchanged
+            self._exchange_bound = bound(exchange_block, *fixed, self._first, voltages, inputs, self.flags)
+        self._swap(self._exchange_bound, voltages, inputs, self.flags)
 
-    def _swap(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
+    def _swap(self, kernel: Callable[..., None], voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
         """Exchange samples during which the plant does not change."""
-        exchange_block(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
+        kernel(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
         self._first += voltages.size
 
     def _pieces(self, n: int) -> Iterator[tuple[RigArrays, slice]]:

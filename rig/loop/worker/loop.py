@@ -17,6 +17,7 @@ from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import GuardMode
 from rig.tick.tick import Tick
+from vibrolock.compiled import bound
 
 __all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
 
@@ -66,6 +67,11 @@ class WallClockLoop(DrivenLoop):
         # Spread over the blocks of a chunk, as each chore costs as much time as a block; a one-block chunk does both at once.
         chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
         self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
+        slot, block = memory.to_fill(), daq.block
+        inputs = np.empty((block, len(daq.channels)))
+        self._tick_block = bound(
+            tick_block, tick.arrays, inputs, daq.flags, slot.readings[:block], slot.rows[:block], self._voltages
+        )
         self._samples = 0
         self.disturbances: dict[str, int] = {}
 
@@ -93,8 +99,8 @@ class WallClockLoop(DrivenLoop):
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; return the number of rows in it."""
         tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
-        arrays, block, by_device = tick.arrays, self.daq.block, self._pace.by_device
-        chores = self._chores
+        arrays, block = tick.arrays, self.daq.block
+        chores, tick_block = self._chores, self._tick_block
         guard = arrays.guard.view(np.int64).data
         for first in range(0, self._memory.layout.chunk, block):
             if words[STOP]:
@@ -103,15 +109,16 @@ class WallClockLoop(DrivenLoop):
                 chores[first]()
                 if self.failure is not None:  # the ring may be full
                     return first
+            end = first + block
+            readings, rows = slot.readings[first:end], slot.rows[first:end]
             self._account()
-            pace.wait()
-            begun = 0 if by_device else _now()
+            begun = pace.wait()
             swapped = self._swap()
             if swapped is None:
                 return first
-            begun = _now() if by_device else begun
-            end = first + block
-            tick_block(arrays, *swapped, slot.readings[first:end], slot.rows[first:end], voltages)
+            begun = begun or _now()
+            inputs, flags = swapped
+            tick_block(arrays, inputs, flags, readings, rows, voltages)
             self.times.begun(begun)
             self._samples += block
             if guard[0] == OFF and tick.over:

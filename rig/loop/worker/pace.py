@@ -25,8 +25,11 @@ class Pace(Protocol):
     has_clock: bool
     """Whether time goes on without the loop, so that it can be late."""
 
-    def wait(self) -> None:
-        """Wait until the next block is due; return at once if `DAQ.exchange` waits."""
+    def wait(self) -> int:
+        """Wait until the next block is due and return the time then (monotonic clock, ns).
+
+        If `DAQ.exchange` waits, return 0 at once.
+        """
 
     def release(self, begun_ns: int) -> int:
         """Return when the block that began at ``begun_ns`` was due (monotonic clock, ns)."""
@@ -62,8 +65,8 @@ class HostPace:
         """Start the clock now."""
         self._began, self._number = _now(), 0
 
-    def wait(self) -> None:
-        """Sleep until the next block is due."""
+    def wait(self) -> int:
+        """Sleep until the next block is due; return the time of waking."""
         self._number += 1
         self._due = self._began + int(self._number * self._period_ns)
         early = self._due - _now()
@@ -74,6 +77,7 @@ class HostPace:
             self._skipped += missed
             self._number += missed
             self._due = self._began + int(self._number * self._period_ns)
+        return _now()
 
     def release(self, begun_ns: int) -> int:
         """Return the deadline of the present block."""
@@ -104,8 +108,9 @@ class DevicePace:
         self._earliest = self._lately = math.inf
         self._number = 0
 
-    def wait(self) -> None:
-        """Do nothing: the exchange waits."""
+    def wait(self) -> int:
+        """Return 0: the exchange waits."""
+        return 0
 
     def release(self, begun_ns: int) -> int:
         """Return when the block that arrived at ``begun_ns`` was due."""
@@ -131,8 +136,9 @@ class Lockstep:
     def begin(self) -> None:
         """Do nothing: there is no clock."""
 
-    def wait(self) -> None:
-        """Do nothing, because the exchange waits."""
+    def wait(self) -> int:
+        """Return 0, because the exchange waits."""
+        return 0
 
     def release(self, begun_ns: int) -> int:
         """Return the block's arrival time."""

@@ -1,5 +1,6 @@
 """The loop process: it opens the driver, takes orders from the campaign, runs the loop and reports the result."""
 
+import select
 import signal
 import sys
 from collections.abc import Callable
@@ -80,7 +81,9 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         daq.start(bench.block)
         if daq.latency_samples > presumed:
             layout, memory = _shared(daq, settings, daq.latency_samples, ring_s, descriptor)
-        loop = _begin(daq, settings, memory, facts, lambda: _asked(came, commands))
+        released = select.poll()  # `Connection.poll` makes one anew at every call, which takes as long as a block
+        released.register(commands, select.POLLIN)
+        loop = _begin(daq, settings, memory, facts, lambda: _asked(came, released))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
         try:
             loop.run()
@@ -142,11 +145,11 @@ def _listen() -> list[str]:
     return came
 
 
-def _asked(came: list[str], commands: Connection) -> str:
+def _asked(came: list[str], released: select.poll) -> str:
     """Return one sentence on what has asked this process to end (a signal, a campaign that is gone), or an empty text."""
     if came:
         return f"the loop's process was asked to end ({came[0]})"
-    return "the campaign has let go of the loop" if commands.poll() else ""  # readable: it was closed
+    return "the campaign has let go of the loop" if released.poll(0) else ""  # readable: it was closed
 
 
 def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from identification import nonlinear_mode
 from rig.bench import Bench
 from rig.conformance import with_loopback
 from rig.drivers import make_daq
-from rig.errors import ConfigurationError
+from rig.errors import ConfigurationError, DaqRefused
 from rig.loop.loop import Loop
 from tests.rig.rigs import bench_with, tick_for
 from tests.simulators.references import UNFILTERED
@@ -154,3 +154,28 @@ def test_wear_that_leaves_nothing_is_refused_in_one_line() -> None:
     assert str(error.value) == (
         "driver.options: wear: until_s = 200: allowed is below 100, where frequency_per_s = -0.01 reaches -100 %"
     )
+
+
+def test_outputs_of_any_type_and_memory_layout_are_the_same_voltages() -> None:
+    voltages = np.array([0.5, -0.25, 1.0, 0.0])  # exact in every type
+    forms = (voltages, voltages.astype(np.float32), np.repeat(voltages, 3)[::3], voltages[::-1].copy()[::-1])
+    readings = []
+    for form in forms:
+        with make_daq(bench_with()) as daq:
+            daq.start(4)
+            readings.append(np.vstack([daq.exchange(form), daq.exchange(form)]))
+    for other in readings[1:]:
+        np.testing.assert_array_equal(other, readings[0])
+    assert np.ptp(readings[0], axis=0).all()
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 10.5, -10.5])
+def test_an_output_beyond_the_range_is_refused_wherever_it_stands(wrong: float) -> None:
+    with make_daq(bench_with({"output_range_v": 10.0})) as daq:
+        daq.start(3)
+        for place in range(3):
+            voltages = np.array([1.0, -10.0, 10.0])
+            voltages[place] = wrong
+            with pytest.raises(DaqRefused, match="was demanded"):
+                daq.exchange(voltages)
+        assert daq.exchange(np.array([1.0, -10.0, 10.0])).shape[0] == 3
