@@ -209,6 +209,7 @@ class DAQ(ABC):
             raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
         self.block = block
         self.flags = np.zeros(block, np.uint16)
+        self._flags = self.flags
         self._shape = block, len(self.channels)
         self._largest_of = bound(largest_of, np.zeros(block))
         self._driven = False
@@ -241,6 +242,8 @@ class DAQ(ABC):
             raise
         except Exception as error:
             raise as_daq_error(error) from error
+        if self.flags is not self._flags:  # the loop's machine code takes it as it was made
+            raise DaqError("the driver has replaced `flags`; allowed is to fill the array that `start` has made")
         self._blocks_of_zero += int(largest == 0.0)
         return inputs
 

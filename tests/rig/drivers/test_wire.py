@@ -650,3 +650,15 @@ def said_of(daq: MemoryDAQ) -> str:
     except DaqError as error:
         return str(error)
     return ""
+
+
+def test_a_driver_that_replaces_its_flags_is_told_so() -> None:
+    class Replaces(MemoryDAQ):
+        def _exchange(self, voltages, inputs):
+            super()._exchange(voltages, inputs)
+            self.flags = self.flags.copy()
+
+    with Replaces(bench_with()) as daq:
+        daq.start()
+        with pytest.raises(DaqError, match="replaced `flags`"):
+            daq.exchange(np.zeros(1))
