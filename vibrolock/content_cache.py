@@ -3,6 +3,7 @@
 Kernels are declared with `vibrolock.compiled`, which comes here when one is first called.
 """
 
+import importlib
 import os
 import platform
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 
 import llvmlite.binding
 import numba
+import numba.np.linalg
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
@@ -36,7 +38,21 @@ def _choose_processor() -> None:
         setattr(numba.config, "CPU_FEATURES", "")  # noqa: B010
 
 
+def _leave_linear_algebra() -> None:
+    """Keep numba from importing `scipy.linalg` at its first kernel, which takes a fifth of a second.
+
+    It would look for the BLAS that ``np.dot`` calls inside kernels, of which there is none here; one that had it would find it.
+    """
+    linalg: Any = numba.np.linalg
+    looks, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = looks
+
+
 _choose_processor()
+_leave_linear_algebra()
 setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
 
 
