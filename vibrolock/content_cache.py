@@ -3,6 +3,7 @@
 Kernels are declared with `vibrolock.compiled`, which comes here when one is first called.
 """
 
+import functools
 import importlib
 import os
 import platform
@@ -12,7 +13,6 @@ from typing import Any
 
 import llvmlite.binding
 import numba
-import numba.np.linalg
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
@@ -38,12 +38,13 @@ def _choose_processor() -> None:
         setattr(numba.config, "CPU_FEATURES", "")  # noqa: B010
 
 
+@functools.cache
 def _leave_linear_algebra() -> None:
     """Keep numba from importing `scipy.linalg` at its first kernel, which takes a fifth of a second.
 
     It would look for the BLAS that ``np.dot`` calls inside kernels, of which there is none here; one that had it would find it.
     """
-    linalg: Any = numba.np.linalg
+    linalg: Any = importlib.import_module("numba.np.linalg")
     looks, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
         importlib.import_module("numba.np.arraymath")
@@ -52,7 +53,6 @@ def _leave_linear_algebra() -> None:
 
 
 _choose_processor()
-_leave_linear_algebra()
 setattr(numba.config, "CACHE_DIR", str(kernel_cache_folder()))  # noqa: B010 (made at run time, unknown to type checkers)
 
 
@@ -144,6 +144,7 @@ class _ContentCache(FunctionCache):
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         self._open()
+        _leave_linear_algebra()
         found = None
         try:
             found = super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
