@@ -24,7 +24,8 @@ def exponential(matrix: Matrix) -> Matrix:
     """
     scale = balancing(matrix)
     balanced = matrix * scale / scale[:, None]
-    halvings = max(0, math.ceil(math.log2(max(np.linalg.norm(balanced, 1), _LARGEST) / _LARGEST)))
+    norm = float(np.linalg.norm(balanced, 1))
+    halvings = math.ceil(math.log2(max(1.0, norm / _LARGEST)))
     small = balanced / 2.0**halvings
     one = np.eye(len(matrix))
     total = one
