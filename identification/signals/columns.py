@@ -123,15 +123,14 @@ def _design(theta: Float, harmonics: int, position: Float | None = None) -> Floa
     ``position`` in the record goes from -1/2 to 1/2. Without it the drift is left out (its columns are zero), as below four
     periods, where it cannot be separated from the harmonics.
     """
-    columns = np.zeros((theta.size, 2 * harmonics + 3))
-    columns[:, 0] = 1.0
-    rotation = np.exp(1j * theta)
-    power = np.ones_like(rotation)
+    columns = np.zeros((2 * harmonics + 3, theta.size))
+    columns[0] = 1.0
+    power = rotation = np.exp(1j * theta)
     for harmonic in range(1, harmonics + 1):
+        columns[harmonic] = power.real
+        columns[harmonics + harmonic] = -power.imag
         power = power * rotation
-        columns[:, harmonic] = power.real
-        columns[:, harmonics + harmonic] = -power.imag
     if position is not None:
-        columns[:, -2] = position * rotation.real
-        columns[:, -1] = -position * rotation.imag
-    return columns
+        columns[-2] = position * rotation.real
+        columns[-1] = -position * rotation.imag
+    return columns.T

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import Channel, find_name, find_role
 from identification.errors import IdentificationError
+from identification.signals.chunks import unwrapped
 from identification.validation import finite_array, positive
 
 __all__ = ["Transient", "demodulate"]
@@ -125,7 +126,7 @@ def demodulate(
         If values are NaN or infinite, lengths differ, the phase falls, there are fewer than 8 samples per period, or the
         record is too short.
     """
-    theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
+    theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     single = np.asarray(samples).dtype == np.float32  # as recorded; stretches are computed in double precision
     data = finite_array("samples", samples, np.float32 if single else np.float64, 2)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")

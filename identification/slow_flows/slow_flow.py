@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
+from identification.signals.chunks import unwrapped
 from identification.slow_flows.fits import LocalFit, as_settled, local_fit, noise_variances
 from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, between_harmonics, derivatives
 from identification.validation import finite_array, positive
@@ -221,7 +222,7 @@ def slow_flow(
         If values are NaN or infinite, lengths differ, the phase falls, there are too few samples per period, the record is
         too short, or roles are missing.
     """
-    theta = np.unwrap(finite_array("theta_rad", theta_rad, np.float64, 1))
+    theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     data = finite_array("samples", samples, np.float64, 2)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if data.shape != (len(channels), theta.size):

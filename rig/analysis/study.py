@@ -135,20 +135,12 @@ class Study(ABC):
 
 def draw(study: Study, figure: Path) -> None:
     """Draw an analysis into ``figure`` (png, pdf or svg, by its suffix); raise `RecordingError` if it cannot be written."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    from rig.figures.style import STYLE
+    from rig.figures.page import page_for
 
     check_ending(figure)
-    with mpl.rc_context(STYLE):
-        page = Figure(figsize=study.figure_in, layout="constrained")
+    with page_for(figure, study.figure_in) as page:
         study.draw_on(page)
         page.suptitle(f"{study.subject.bench.specimen.name}: {study.title}", fontsize=11, x=0.01, ha="left")
-        try:
-            page.savefig(figure)
-        except OSError as error:
-            raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
 
 
 def check_ending(figure: Path) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from rig.check.assessment import Assessment, assess
 from rig.check.reference import on_lines_of
-from rig.errors import RecordingError
-from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, say_why_empty, title
+from rig.figures.page import page_for
+from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -26,16 +26,8 @@ VERDICTS = {"fail": SECOND, "warn": "#b07d00", "not tested": "#707070"}
 
 def write_check(found: Assessment, figure: Path) -> None:
     """Draw a check into a file; raise `RecordingError` if it cannot be written."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context(STYLE):
-        page = Figure(figsize=(9.0, 6.4), layout="constrained")
+    with page_for(figure, (9.0, 6.4)) as page:
         draw_check(page, found)
-        try:
-            page.savefig(figure)
-        except OSError as error:
-            raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
 
 
 def draw_recorded_check(page: "Figure", recording: Recording) -> None:

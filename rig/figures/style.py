@@ -33,7 +33,7 @@ STYLE: dict[Any, Any] = {
     "axes.formatter.useoffset": False,
     "lines.linewidth": 1.2,
     "legend.frameon": False,
-    "savefig.dpi": 150,
+    "figure.dpi": 150,
 }
 
 TRACE_BINS = 1200

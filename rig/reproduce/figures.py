@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.pnlss.error_table import SAME_LEVEL
-from rig.errors import RecordingError
-from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, title
+from rig.figures.page import page_for
+from rig.figures.style import MAIN, REJECTED, SECOND, title
 from rig.reproduce.steady import Steady
 from rig.reproduce.study import Study
 from rig.reproduce.sweeps import COUPLED
@@ -31,17 +31,8 @@ def draw_study(study: Study) -> None:
 
 
 def _write(study: Study, name: str, draw: Callable[["Figure", Study], None], size: tuple[float, float]) -> None:
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    path = study.options.result(f"{name}.png")
-    with mpl.rc_context(STYLE):
-        page = Figure(figsize=size, layout="constrained")
+    with page_for(study.options.result(f"{name}.png"), size) as page:
         draw(page, study)
-        try:
-            page.savefig(path)
-        except OSError as error:
-            raise RecordingError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 def _errors(page: "Figure", study: Study) -> None:

@@ -6,7 +6,7 @@ from pkgutil import resolve_name
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
 from rig.errors import RecordingError
-from rig.figures.style import STYLE
+from rig.figures.page import page_for
 from rig.models.files.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -23,9 +23,6 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
     With ``lateness``, draw the timing of the recording's control loop instead. Raises `RecordingError` if the file cannot be
     read or the figure cannot be written.
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
     if figure.is_dir():
@@ -33,13 +30,12 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
     if figure.exists() and source.exists() and figure.samefile(source):
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
     kind = kind_of(source)
-    with mpl.rc_context(STYLE):
-        page = Figure(figsize=(9.0, 6.4), layout="constrained")
+    size_in = KINDS[kind].figure_in if kind in KINDS and not lateness else (9.0, 6.4)
+    with page_for(figure, size_in) as page:
         if lateness:
             with Recording(source) as recording:
                 draw_lateness(page, recording)
         elif kind in KINDS:
-            page.set_size_inches(*KINDS[kind].figure_in)
             found = load(source)
             with understood(source, kind):
                 resolve_name(KINDS[kind].draw)(page, found)
@@ -47,7 +43,3 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
             with Recording(source) as recording:
                 draw = CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw
                 resolve_name(draw)(page, recording)
-        try:
-            page.savefig(figure)
-        except OSError as error:
-            raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None

@@ -8,7 +8,8 @@ import numpy as np
 
 from controller.tuning import Design
 from rig.errors import RecordingError
-from rig.figures.style import MAIN, REJECTED, SECOND, STYLE, say_why_empty, title
+from rig.figures.page import page_for
+from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,12 +35,8 @@ def check_figure(figure: Path, overwrite: bool) -> None:
 
 def draw_tuning(tuning: "Tuning", figure: Path) -> None:
     """Write the figure (png, pdf or svg, by its suffix)."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     designs = (tuning.chosen.design, *tuning.chosen.others)
-    with mpl.rc_context(STYLE):
-        page = Figure(figsize=(11.0, 6.8), layout="constrained")
+    with page_for(figure, (11.0, 6.8)) as page:
         axes = page.subplots(2, 3)
         _draw_plant(axes[0, 0], axes[1, 0], tuning)
         _draw_bode(axes[0, 1], axes[1, 1], designs)
@@ -51,10 +48,6 @@ def draw_tuning(tuning: "Tuning", figure: Path) -> None:
             f"{tuning.bench.specimen.name}: tuned at {tuning.test.level_rms_v:.3g} V RMS, law {tuning.chosen.law}, low-pass "
             f"{tuning.chosen.low_pass_rad_s:.4g} rad/s, locked at {law.omega_rad_s / 2.0 / math.pi:.4g} Hz",
         )
-        try:
-            page.savefig(figure)
-        except OSError as error:
-            raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
 
 
 def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:

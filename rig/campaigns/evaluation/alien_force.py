@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.signals.chunks import unwrapped
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.rows import Rows
@@ -62,14 +63,14 @@ def _spectrum(bench: Bench, rows: Rows) -> tuple[np.ndarray, Any] | None:
     """
     if rows.size < 2:
         return None
-    theta = np.unwrap(rows["theta_rad"].astype(float))
+    theta = unwrapped(rows["theta_rad"].astype(float))
     periods = float(theta[-1] - theta[0]) / (2.0 * math.pi)
     if periods < FEWEST_PERIODS - 0.5:
         return None
     channel = bench.index_of("force")
     force = bridged(rows, slice(channel, channel + 1))[:, 0]
     turns = 2.0 * math.pi * np.arange(force.size) / force.size
-    window = sum(factor * np.cos(order * turns) for order, factor in enumerate(WINDOW))
+    window = np.polynomial.chebyshev.chebval(np.cos(turns), WINDOW)  # cos(k x) = T_k(cos x)
     power = np.abs(np.fft.rfft(window * (force - force.mean()))) ** 2
     orders = np.arange(power.size) / (periods * force.size / (force.size - 1))
     between = np.abs(orders - np.rint(orders)) > MAIN_LOBE / periods

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.signals.chunks import unwrapped
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point, Quality
@@ -40,7 +41,7 @@ def came_and_went(bench: Bench, rows: Rows) -> bool:
 
 def _changes(bench: Bench, rows: Rows) -> np.ndarray | None:
     """Return the RMS of the changes of force and drive from period to period, float64[2, n]; None if there are too few."""
-    turns = np.unwrap(rows["theta_rad"].astype(float)) / (2.0 * np.pi)
+    turns = unwrapped(rows["theta_rad"].astype(float)) / (2.0 * np.pi)
     periods = int(turns[-1] - turns[0]) if np.isfinite(turns).all() else 0
     if periods < FEWEST_PERIODS + 1:
         return None

@@ -10,7 +10,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from identification.signals.chunks import spans
+from identification.signals.chunks import spans, unwrapped
 
 __all__ = ["LongRows", "Rows", "Spool", "mean_of", "phases", "std_of", "stretches", "turned_rad"]
 
@@ -112,7 +112,7 @@ def phases(rows: Rows) -> Iterator[tuple[int, np.ndarray]]:
     last = 0.0
     for start, stop in spans(rows.size):
         before = max(0, start - 1)
-        theta = np.unwrap(rows[before:stop]["theta_rad"].astype(float))
+        theta = unwrapped(rows[before:stop]["theta_rad"].astype(float))
         if start:
             theta += _TURN * np.rint((last - theta[0]) / _TURN)
         last = float(theta[-1])
