@@ -3,8 +3,6 @@
 Kernels are declared with `vibrolock.compiled`, which comes here when one is first called.
 """
 
-import functools
-import importlib
 import os
 import platform
 from collections.abc import Callable
@@ -36,20 +34,6 @@ def _choose_processor() -> None:
     if platform.machine().lower() in ("x86_64", "amd64") and all(features.get(name, False) for name in LEVEL_3):
         setattr(numba.config, "CPU_NAME", "x86-64-v3")  # noqa: B010 (made at run time, unknown to type checkers)
         setattr(numba.config, "CPU_FEATURES", "")  # noqa: B010
-
-
-@functools.cache
-def _leave_linear_algebra() -> None:
-    """Keep numba from importing `scipy.linalg` at its first kernel, which takes a fifth of a second.
-
-    It would look for the BLAS that ``np.dot`` calls inside kernels, of which there is none here; one that had it would find it.
-    """
-    linalg: Any = importlib.import_module("numba.np.linalg")
-    looks, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    try:
-        importlib.import_module("numba.np.arraymath")
-    finally:
-        linalg.ensure_blas = looks
 
 
 _choose_processor()
@@ -144,7 +128,6 @@ class _ContentCache(FunctionCache):
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         self._open()
-        _leave_linear_algebra()
         found = None
         try:
             found = super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]

@@ -23,9 +23,6 @@ def plot_(
     lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
 ) -> None:
     """Draw what is in a file."""
-    from matplotlib import artist
-
-    artist.kwdoc = lambda artist: ""  # it lists all properties of all classes at import: a tenth of this command
     from rig.show.figure import plot
 
     plot(file, output, lateness=lateness)

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from simulators.exciter import Exciter
 from simulators.layout import CHANNEL, CONVERTER, PLANT, RigArrays, RigState
 from simulators.plant.assembly import LinearPlant
-from simulators.plant.exponential import exponential
 from simulators.plant.sites import local_sites
 from simulators.sensing.filters import channel_sections, output_sections, ring_size, skew_taps
 from simulators.sensing.parts import Converter, Sensor
@@ -56,8 +56,8 @@ def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrice
     augmented[:n, :n] = step_s * dynamics
     augmented[:n, n : n + k] = step_s * columns
     augmented[n : n + k, n + k :] = np.eye(k)
-    whole = exponential(augmented)
-    return PhiMatrices(whole[:n, :n], whole[:n, n : n + k], whole[:n, n + k :])
+    exponential = scipy.linalg.expm(augmented)
+    return PhiMatrices(exponential[:n, :n], exponential[:n, n : n + k], exponential[:n, n + k :])
 
 
 class StepColumns(NamedTuple):

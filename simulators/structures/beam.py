@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
@@ -117,11 +118,10 @@ def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> t
     The problem is solved as ``M v = mu (K + shift M) v``. The wanted modes are then the largest eigenvalues and lose no digits
     to the highest modes, and K may be singular (rigid-body modes). ``shift`` (rad/s)^2 is about ``omega^2`` of the lowest mode.
     """
-    with threadpool_limits(limits=1, user_api="blas"):  # more would wait for each other
-        lower = np.linalg.cholesky(stiffness + shift * mass)
-        mu, reduced = np.linalg.eigh(np.linalg.solve(lower, np.linalg.solve(lower, mass).T))
-        mu, reduced = mu[: -n_mode - 1 : -1], reduced[:, : -n_mode - 1 : -1]
-        return np.maximum(1.0 / mu - shift, 0.0), np.linalg.solve(lower.T, reduced) / np.sqrt(mu)
+    n = mass.shape[0]
+    with threadpool_limits(limits=1, user_api="blas"):  # more would wait for each other over so small a matrix
+        mu, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
+    return np.maximum(1.0 / mu[::-1] - shift, 0.0), vectors[:, ::-1] / np.sqrt(mu[::-1])
 
 
 def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[Matrix, Matrix]:

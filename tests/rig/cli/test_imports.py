@@ -48,9 +48,9 @@ ALLOWED = {
     "plot mode.h5 -o mode.svg": FILES | MATPLOTLIB,
     "identify run.h5 -o again.h5": FILES,
     "export run.h5 -o run.csv": FILES | {"identification.pnlss"},
-    "analyse modes --bench magnet-beam": {"numpy", "pydantic", "simulators"} | NUMBA,
+    "analyse modes --bench magnet-beam": {"numpy", "pydantic", "simulators"} | NUMBA | {"scipy.linalg"},
     "doctor": {"numpy", "pydantic", "serial", "rig.loop", "multiprocessing"},
-    "run plan.toml -o new.h5": FILES | NUMBA | {"simulators", "rig.loop", "multiprocessing"},
+    "run plan.toml -o new.h5": FILES | NUMBA | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
     "check --bench magnet-beam -o check.h5": FILES | NUMBA | OPTIMIZE | {"simulators", "rig.loop", "multiprocessing"},
 }
 """What a command may load beyond Python and what is `LIGHT`: libraries, subpackages of scipy, and the heavy ones of `PARTS`."""
@@ -104,7 +104,7 @@ def test_a_command_loads_what_it_uses_and_nothing_else(folder, line):
     [
         ("show run.h5", {"h5py", "numpy"}),
         ("plot run.h5 -o run.png", {"matplotlib"}),
-        ("run plan.toml -o newer.h5", {"numba", "rig.loop", "simulators"}),
+        ("run plan.toml -o newer.h5", {"numba", "rig.loop", "simulators", "scipy.linalg"}),
     ],
 )
 def test_what_a_command_uses_is_seen(folder, line, used):
