@@ -1,5 +1,6 @@
 """The loop: it passes blocks from the driver through the tick and back, and yields telemetry in chunks."""
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -83,6 +84,10 @@ class RunningLoop(Protocol):
         """Ramp to 0 V if the loop still runs, and wait for its end; for a caller that takes no more rows."""
 
     @property
+    def lateness_us(self) -> tuple[float, float, float, float]:
+        """Response times of the loop so far, us: p50, p99, p99.9 and the largest; NaN where no clock paces it."""
+
+    @property
     def counters(self) -> dict[str, int]:
         """The driver's counters."""
 
@@ -153,6 +158,11 @@ class Loop(DrivenLoop):
         """Request the ramp to 0 V; it begins with the next chunk."""
         self.cause = self.cause or cause
         self.tick.request_stop()
+
+    @property
+    def lateness_us(self) -> tuple[float, float, float, float]:
+        """Unknown: this loop counts late chunks alone."""
+        return (math.nan,) * 4
 
     @property
     def remarks(self) -> tuple[str, ...]:

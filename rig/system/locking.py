@@ -11,7 +11,7 @@ from rig.errors import RecordingError
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["exclusive", "lock", "synchronise_folder"]
+__all__ = ["exclusive", "is_locked", "lock", "synchronise_folder"]
 
 
 def lock(descriptor: int, path: Path) -> None:
@@ -31,6 +31,25 @@ def lock(descriptor: int, path: Path) -> None:
             return
         if os.fstat(descriptor).st_nlink == 0:
             raise RecordingError(f"{path}: has just been finished by another process; try again")
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether a process holds the lock of the file at ``path``; False where there is no file, and always on Windows."""
+    if sys.platform == "win32":
+        return False
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(descriptor)
+    return False
 
 
 @contextmanager

@@ -31,6 +31,7 @@ from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
 from rig.daq import flag_names
 from rig.errors import RecordingError
+from rig.live.publisher import Live, Unpublished
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.system.stop_signals import asking, held
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
@@ -87,10 +88,11 @@ class Execution:
         progress: Progress,
         before: MeasuredBefore | None = None,
         folder: Path | None = None,
+        live: Live | None = None,
     ) -> None:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
-        self.journal, self.progress = journal, progress
+        self.journal, self.progress, self.live = journal, progress, live or Unpublished()
         self.measure = KINDS[plan.kind].measure
         self.in_one_go = KINDS[plan.kind].in_one_go
         self.watch = KINDS[plan.kind].watch
@@ -121,13 +123,13 @@ class Execution:
         ``information`` is written to the journal before the first row of the part. A run that ends early raises no error.
         """
         flags = {"points_done": self.done, "device_flags": flag_names(self.loop.counters)}
-        self._write(self.journal.part, {**information, **flags})
+        self._write("part", {**information, **flags})
         for remark in self.loop.remarks:
-            self._write(self.journal.event, {"sample": 0, "what": "remark", "text": remark})
+            self._write("event", {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
         # One thread of linear algebra: more would wait for each other over its small matrices.
         with threadpool_limits(limits=1, user_api="blas"), held():  # signals: until the end record is in the journal
-            with asking(self.loop.request_stop):
+            with asking(self.loop.request_stop), self.live.heeding(self.loop.request_stop):
                 try:
                     for rows in self.loop.run():
                         self._take(rows)
@@ -139,7 +141,7 @@ class Execution:
             self._report_rest()
             self._attempt(self._mark_unlocked)
             self.evaluations.close()
-            self._write(self.journal.end, self._end())
+            self._write("end", self._end())
         if self.failure is not None:
             raise self.failure
         if self.write_error is not None:
@@ -149,12 +151,13 @@ class Execution:
         """Record and evaluate a chunk of rows."""
         stored, events = self.stored.take(self.tick.sample - rows.size, rows)
         if stored.size:
-            self._write(self.journal.rows, stored)
+            self._write("rows", stored)
         for event in events:
-            self._write(self.journal.event, event)
+            self._write("event", event)
         self._attempt(self._note_changes, rows)
         self._attempt(self._collect, rows)
         self._attempt(self.progress.advance, rows, self.tick)
+        self.live.take(rows, self.loop, self.finished, len(self.targets))
 
     def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
         """Run a step outside the control loop. If it fails, the rig is ramped down, and the error is raised at the end."""
@@ -170,12 +173,17 @@ class Execution:
             self.loop.request_stop()
             return None
 
-    def _write(self, method: Any, what: Any) -> None:
-        """Write to the journal. If that fails, bring the rig down; the run continues unrecorded until it is at rest."""
+    def _write(self, what: str, told: Any) -> None:
+        """Write to the journal. If that fails, bring the rig down; the run continues unrecorded until it is at rest.
+
+        ``what`` names the method of `Journal`. All but rows can be watched as well.
+        """
+        if what != "rows":
+            self.live.line(what, told)
         if self.write_error is not None:
             return
         try:
-            method(what)
+            getattr(self.journal, what)(told)
         except RecordingError as error:
             self.write_error = error
             self.loop.request_stop()
@@ -193,7 +201,7 @@ class Execution:
                 events.append({"sample": first + int(index), "what": name, "state": state})
             self.last[name] = int(rows[name][-1])
         for event in sorted(events, key=lambda event: event["sample"]):
-            self._write(self.journal.event, event)
+            self._write("event", event)
 
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the current point, and request the evaluation of points that are over."""
@@ -232,7 +240,7 @@ class Execution:
             self.attempts[number] = (*self.attempts.get(number, ()), attempt)
             name, tried = point_name(self.numbers[number]), len(self.attempts[number])
             text = f"{name}, attempt {tried}: {attempt.reason}; measured again"
-            self._write(self.journal.event, {"sample": sample, "what": "attempt", "state": "refused", "text": text})
+            self._write("event", {"sample": sample, "what": "attempt", "state": "refused", "text": text})
             self.progress.remark(text)
 
     def _faults(self, first: int, end: int, *, settled: bool) -> int:
@@ -332,7 +340,7 @@ class Execution:
             self.passing.discard(number)
         point = replace(point, number=self.numbers[number])
         self.known.append(point)
-        self._write(self.journal.point, stored(point))
+        self._write("point", stored(point))
         self.reported[point.number] = point
         self.finished += 1
         self.accepted += 1 if point.accepted else 0

@@ -1,7 +1,7 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import fields, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -16,7 +16,7 @@ from rig.arming.run_facts import calibration_remarks
 from rig.arming.run_options import Progress, RunOptions
 from rig.bench import Bench
 from rig.bench.user_code import imported_code, refuse_code
-from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import Plan
@@ -25,7 +25,9 @@ from rig.campaigns.running.execution import Execution, nothing_left
 from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
 from rig.campaigns.running.tripped_level import refuse_tripped
+from rig.campaigns.running.watched import watched_facts
 from rig.errors import RigError
+from rig.live.publisher import Live, published
 from rig.loop.loop import RunningLoop
 from rig.loop.session import Session, open_session
 from rig.recording.conversion import continue_recording, finalise
@@ -57,27 +59,30 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
     seed = options.seed or 0
     _put_back(output, options.progress)
     make_way(output, options.overwrite)
-    with open_session(bench, seed, realtime=options.realtime) as session:
-        facts = _facts(plan, bench, session, options)
-        header = Header(
-            kind=plan.kind,
-            configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
-            channels=[channel.model_dump(mode="json") for channel in bench.channels],
-            row_dtype=recorded_row(len(bench.channels)),
-            columns=[Column(**column) for column in ROW_COLUMNS],
-            software_version=vibrolock.__version__,
-            started=datetime.now(UTC).isoformat(timespec="seconds"),
-            seed=seed,
-        )
-        settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz))
-        with (
-            set_aside(output),
-            _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
-            _started(session, settings, output) as loop,
-        ):
-            execution = Execution(plan, bench, loop, journal, options.progress, folder=output.absolute().parent)
-            execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-    return _with_further_attempts(_whole(output, options.progress), execution, options, facts)
+    with ExitStack() as watched:
+        with open_session(bench, seed, realtime=options.realtime) as session:
+            facts = _facts(plan, bench, session, options)
+            header = Header(
+                kind=plan.kind,
+                configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
+                channels=[channel.model_dump(mode="json") for channel in bench.channels],
+                row_dtype=recorded_row(len(bench.channels)),
+                columns=[Column(**column) for column in ROW_COLUMNS],
+                software_version=vibrolock.__version__,
+                started=datetime.now(UTC).isoformat(timespec="seconds"),
+                seed=seed,
+            )
+            settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz))
+            live = watched.enter_context(_published(plan, bench, output, facts, options.progress))
+            with (
+                set_aside(output),
+                _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
+                _started(session, settings, output) as loop,
+            ):
+                folder = output.absolute().parent
+                execution = Execution(plan, bench, loop, journal, options.progress, folder=folder, live=live)
+                execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
+        return _with_further_attempts(_whole(output, options.progress), execution, options, facts, live)
 
 
 @ended_in_order()
@@ -124,12 +129,16 @@ def take_up(
     if segments := plan.segments(bench.sample_rate_hz, left.done):
         if not trust_code:
             refuse_code(bench, output.name)
-        with open_session(bench, drawn, realtime=options.realtime) as session:
-            facts = _facts(plan, bench, session, options)
-            settings = tick_settings(plan, bench, segments)
-            begin = partial(_execution, plan, bench, progress, before)
-            execution = _further_part(output, session, settings, begin, {**information, "about": facts})
-        return _with_further_attempts(_whole(output, progress), execution, options, facts)
+        with ExitStack() as watched:
+            with open_session(bench, drawn, realtime=options.realtime) as session:
+                facts = _facts(plan, bench, session, options)
+                settings = tick_settings(plan, bench, segments)
+                live = watched.enter_context(_published(plan, bench, output, facts, progress))
+                for point in points:
+                    live.line("point", stored(point))
+                begin = partial(_execution, plan, bench, progress, live, before)
+                execution = _further_part(output, session, settings, begin, {**information, "about": facts})
+            return _with_further_attempts(_whole(output, progress), execution, options, facts, live)
     if not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
@@ -166,7 +175,7 @@ def _further_part(
 
 
 def _with_further_attempts(
-    recording: Recording, execution: Execution, options: RunOptions, facts: Mapping[str, Any]
+    recording: Recording, execution: Execution, options: RunOptions, facts: Mapping[str, Any], live: Live
 ) -> Recording:
     """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
 
@@ -190,16 +199,31 @@ def _with_further_attempts(
             about = {**facts, "device": session.identity}
             information = {"first_sample": first_sample, "seed": seed, "about": about}
             settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, before.done | before.given_up))
-            begin = partial(_execution, plan, bench, progress, before)
+            begin = partial(_execution, plan, bench, progress, live, before)
             execution = _further_part(output, session, settings, begin, information)
         recording = _whole(output, progress)
     return recording
 
 
 def _execution(
-    plan: Plan, bench: Bench, progress: Progress, before: MeasuredBefore, loop: RunningLoop, journal: JournalWriter
+    plan: Plan,
+    bench: Bench,
+    progress: Progress,
+    live: Live,
+    before: MeasuredBefore,
+    loop: RunningLoop,
+    journal: JournalWriter,
 ) -> Execution:
-    return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent)
+    return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent, live)
+
+
+def _published(
+    plan: Plan, bench: Bench, output: Path, facts: Mapping[str, Any], progress: Progress
+) -> AbstractContextManager[Live]:
+    """Let the run be watched and stopped by other processes of the user."""
+    started = datetime.now(UTC).isoformat(timespec="seconds")
+    told = watched_facts(plan, bench, output, facts, started=started)
+    return published(told, len(bench.channels), progress.remark)
 
 
 def _put_back(output: Path, progress: Progress) -> None:

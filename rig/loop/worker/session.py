@@ -85,6 +85,12 @@ class WorkerLoop:
             pass
 
     @property
+    def lateness_us(self) -> tuple[float, float, float, float]:
+        """Response times so far, us: p50, p99, p99.9 and the largest."""
+        told = self._memory.histograms["response"].report()
+        return told["p50"], told["p99"], told["p99_9"], told["largest"]
+
+    @property
     def report(self) -> dict[str, Any]:
         """Statistics for the record: how late each block began, how long it took, and both together, us."""
         periods = int(self.tick.arrays.loop["cycles"][0])

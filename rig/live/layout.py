@@ -1,0 +1,81 @@
+"""What a run publishes, as records: the frame with the present state, and the bins of the traces."""
+
+from typing import Any
+
+import numpy as np
+
+__all__ = ["BINS", "BIN_S", "FRAME", "WINDOW_BYTES", "bin_dtype", "window_rows"]
+
+FRAME = np.dtype(
+    [
+        ("written_ns", "i8"),
+        ("sample", "i8"),
+        ("part", "i8"),
+        ("lock", "i8"),
+        ("guard", "i8"),
+        ("reason", "i8"),
+        ("channel", "i8"),
+        ("value", "f8"),
+        ("segment", "i8"),
+        ("kind", "i8"),
+        ("drive", "i8"),
+        ("point", "i8"),
+        ("finished", "i8"),
+        ("total", "i8"),
+        ("level", "f8"),
+        ("target", "f8"),
+        ("frequency_hz", "f8"),
+        ("phase_error_rad", "f8"),
+        ("voltage_v", "f8"),
+        ("force_n", "f8"),
+        ("drive_m_s2", "f8"),
+        ("displacement_m", "f8"),
+        ("good_periods", "i8"),
+        ("settled_periods", "i8"),
+        ("left_s", "f8"),
+        ("lost", "i8"),
+        ("overruns", "i8"),
+        ("late_us", "f8", (4,)),
+        ("window", "i8"),
+    ]
+)
+"""State of a run at its last row (one record).
+
+``written_ns``: the system's monotonic clock, ns. ``part`` counts the parts from 1. ``lock``, ``guard``, ``reason``:
+`controller.LockState`, `rig.tick.safety.layout.GuardMode` and ``EndReason``, the last with its ``channel`` (-1 if none) and
+``value``. ``segment``, ``kind``, ``drive``, ``point``: place in the plan, -1 if none. ``finished`` of ``total`` points are
+over. ``level``, ``target``: present and final level of the segment, in the plan's unit. ``phase_error_rad``: mean over the
+last rows; NaN while there is none. ``voltage_v``, ``force_n``, ``drive_m_s2``, ``displacement_m``: amplitudes of the
+fundamentals, the last two at the drive point. ``good_periods`` of ``settled_periods`` are reached while settling.
+``left_s``: estimate of the time left. ``lost``: samples lost in a row; ``overruns``: blocks that came too late;
+``late_us``: p50, p99, p99.9 and largest response time of the loop, NaN without a clock. ``window``: number of rows that
+follow the record."""
+
+WINDOW_BYTES = 1 << 18
+MOST_ROWS = 4096
+BINS = 3000
+BIN_S = 0.1
+"""Least duration of a bin of the traces, s of the test: five minutes are kept of a test by the clock."""
+
+
+def window_rows(row_dtype: np.dtype[Any]) -> int:
+    """Return how many of the last rows a frame holds at most."""
+    return min(MOST_ROWS, WINDOW_BYTES // row_dtype.itemsize)
+
+
+def bin_dtype(n_channels: int) -> np.dtype[Any]:
+    """Return the record of a bin: its end in s of the part, lock and guard, and least and greatest values within it."""
+    pair = ("f4", (2,))
+    return np.dtype(
+        [
+            ("end_s", "f8"),
+            ("part", "i4"),
+            ("lock", "u1"),
+            ("guard", "u1"),
+            ("frequency_hz", *pair),
+            ("phase_error_rad", *pair),
+            ("voltage_v", *pair),
+            ("level", *pair),
+            ("inputs", "f4", (n_channels, 2)),
+        ]
+    )

@@ -1,0 +1,221 @@
+"""The campaign's side: publishes a run, waits for nobody, and never lets what it publishes harm the run.
+
+Facts and lines are files that only grow. Frame and traces are memory of a fixed size, reserved at the start, so that writing to
+it cannot fail: the frame carries a checksum by which a reader knows that it has read a whole one; a bin counts once the number
+of bins has been raised.
+"""
+
+import mmap
+import os
+import shutil
+import time
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from rig.live.layout import BIN_S, BINS, FRAME, bin_dtype, window_rows
+from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, new_folder
+from rig.live.stopping import heeding
+from rig.live.time_left import time_left_s
+from rig.loop.loop import RunningLoop
+from rig.recording.jsontext import encode
+from rig.tick.layout import recorded_row
+
+__all__ = ["Live", "Publisher", "Unpublished", "published"]
+
+FRAMES_PER_S = 30.0
+LATENESS_S = 1.0
+HEAD = 8  # bytes before a frame (its checksum) and before the bins (their number)
+
+
+class Live(Protocol):
+    """Takes what is to be seen of a run."""
+
+    def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
+        """Take telemetry rows, with the loop as it is after them and the number of points that are over."""
+
+    def line(self, what: str, told: Mapping[str, Any]) -> None:
+        """Take a point, an event, a remark or how the part began or ended: ``what`` is to be told of it."""
+
+    def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
+        """Let requests to stop reach ``stop`` while the rig is driven."""
+
+
+class Unpublished:
+    """Takes all and shows nothing."""
+
+    def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
+        """Do nothing."""
+
+    def line(self, what: str, told: Mapping[str, Any]) -> None:
+        """Do nothing."""
+
+    def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
+        """Do nothing."""
+        return nullcontext()
+
+
+class Publisher:
+    """Publishes a run in a folder of its own, which is removed at the end.
+
+    Raises:
+        OSError, RecordingError: the folder or its memory cannot be had.
+    """
+
+    def __init__(self, facts: Mapping[str, Any], n_channels: int) -> None:
+        self.folder, self._lock = new_folder()
+        try:
+            rows = recorded_row(n_channels)
+            self._recent: list[np.ndarray] = []  # chunks that hold the last rows, for the frame's window
+            self._most_rows = window_rows(rows)
+            self._frame = np.zeros(1, FRAME)
+            self._frame["late_us"] = np.nan
+            self._bins = np.zeros(1, bin_dtype(n_channels))
+            self._rows: list[np.ndarray] = []  # of the bin that is not over
+            self._n_bins = 0
+            self._written = self._lateness = -np.inf
+            (self.folder / FACTS).write_bytes(encode(facts, what="facts of the run"))
+            self._lines = os.open(self.folder / LINES, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+            self._frames = _reserved(self.folder / FRAME_FILE, HEAD + FRAME.itemsize + self._most_rows * rows.itemsize)
+            self._traces = _reserved(self.folder / TRACES, HEAD + BINS * self._bins.itemsize)
+        except BaseException:
+            os.close(self._lock)
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise
+
+    def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
+        """Add rows to the traces, and publish a frame if one is due."""
+        if not rows.size:
+            return
+        self._keep(rows)
+        self._add_to_traces(rows, loop)
+        now = time.monotonic()
+        state = int(rows["guard"][-1]), int(rows["lock"][-1])
+        changed = state != (int(self._frame["guard"][0]), int(self._frame["lock"][0]))
+        if changed or loop.tick.over or now - self._written >= 1.0 / FRAMES_PER_S:
+            self._written = now
+            self._publish(rows, loop, finished, total)
+
+    def line(self, what: str, told: Mapping[str, Any]) -> None:
+        """Append a line. Where the memory is full, it is left out."""
+        if what == "part":
+            self._frame["part"] += 1
+            self._rows.clear()
+            self._recent.clear()
+        with suppress(OSError):
+            os.write(self._lines, encode({**told, "is": what}, what=what) + b"\n")
+
+    def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
+        """Look for requests to stop, in a thread of its own."""
+        return heeding(self.folder, stop)
+
+    def close(self) -> None:
+        """Remove the folder. Readers keep what they have open."""
+        self._frames.close()
+        self._traces.close()
+        os.close(self._lines)
+        shutil.rmtree(self.folder, ignore_errors=True)
+        os.close(self._lock)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _keep(self, rows: np.ndarray) -> None:
+        """Keep the chunks that hold the last rows."""
+        self._recent.append(rows)
+        while sum(chunk.size for chunk in self._recent[1:]) >= self._most_rows:
+            del self._recent[0]
+
+    def _add_to_traces(self, rows: np.ndarray, loop: RunningLoop) -> None:
+        self._rows.append(rows)
+        rate = loop.tick.bench.sample_rate_hz
+        if sum(part.size for part in self._rows) < BIN_S * rate:
+            return
+        taken = self._rows[0] if len(self._rows) == 1 else np.concatenate(self._rows)
+        self._rows.clear()
+        one = self._bins[0]
+        one["end_s"], one["part"] = loop.tick.sample / rate, self._frame["part"][0]
+        one["lock"], one["guard"] = taken["lock"][-1], taken["guard"][-1]
+        for name, values in (
+            ("frequency_hz", taken["frequency_hz"]),
+            ("phase_error_rad", taken["phase_error_rad"]),
+            ("voltage_v", np.abs(taken["command_v"])),
+        ):
+            one[name] = np.fmin.reduce(values), np.fmax.reduce(values)
+        one["level"] = loop.tick.arrays.progress["level"][0]
+        inputs = np.ascontiguousarray(taken["inputs"].T)  # each channel in one piece: five times as quick
+        one["inputs"][:, 0], one["inputs"][:, 1] = np.fmin.reduce(inputs, axis=1), np.fmax.reduce(inputs, axis=1)
+        at = HEAD + (self._n_bins % BINS) * self._bins.itemsize
+        self._traces[at : at + self._bins.itemsize] = self._bins.tobytes()
+        self._n_bins += 1
+        self._traces[:HEAD] = self._n_bins.to_bytes(HEAD, "little")
+
+    def _publish(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
+        frame, t = self._frame[0], loop.tick.arrays
+        progress, guard, vibration = t.progress[0], t.guard[0], t.control["vibration"][0]
+        frame["sample"], frame["lock"], frame["guard"] = loop.tick.sample, rows["lock"][-1], guard["mode"]
+        for name in ("reason", "channel", "value"):
+            frame[name] = guard[name]
+        at = int(progress["segment"])
+        segment = t.segments[at] if 0 <= at < t.segments.size else None
+        frame["segment"] = at if segment is not None else -1
+        for name in ("kind", "drive", "point"):
+            frame[name] = -1 if segment is None else segment[name]
+        frame["target"] = 0.0 if segment is None else segment["level"]
+        frame["finished"], frame["total"] = finished, total
+        frame["level"], frame["voltage_v"] = progress["level"], guard["amplitude_v"]
+        frame["frequency_hz"] = loop.tick.frequency_hz
+        errors = rows["phase_error_rad"]
+        known = errors[np.isfinite(errors)]
+        frame["phase_error_rad"] = known.mean() if known.size else np.nan
+        for name in ("force_n", "drive_m_s2", "displacement_m"):
+            frame[name] = vibration[name]
+        frame["good_periods"] = t.settling["good_periods"][0]
+        frame["settled_periods"] = t.rule["settled_periods"][0]
+        frame["left_s"] = time_left_s(t)
+        frame["lost"], frame["overruns"] = t.loop["lost"][0], loop.statistics.overruns
+        if self._written - self._lateness >= LATENESS_S:
+            self._lateness = self._written
+            frame["late_us"] = loop.lateness_us
+        window = np.concatenate(self._recent)[-self._most_rows :]
+        frame["window"] = window.size
+        frame["written_ns"] = time.monotonic_ns()
+        content = self._frame.tobytes() + window.tobytes()
+        self._frames[HEAD : HEAD + len(content)] = content
+        self._frames[:HEAD] = zlib.crc32(content).to_bytes(HEAD, "little")
+
+
+def _reserved(path: Path, size: int) -> mmap.mmap:
+    """Return memory behind a file whose space is reserved: writing to it later must not find the memory full."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(descriptor, 0, size)
+        else:
+            os.write(descriptor, bytes(size))
+        return mmap.mmap(descriptor, size)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def published(facts: Mapping[str, Any], n_channels: int, remark: Callable[[str], None]) -> Iterator[Live]:
+    """Publish a run; where that cannot be done, say so in a ``remark`` and go on without.
+
+    ``facts``: what does not change while it goes on.
+    """
+    try:
+        publisher = Publisher(facts, n_channels)
+    except Exception as error:  # whatever it is, the test is more important than its picture
+        remark(f"the run cannot be watched or stopped from another terminal: {error}")
+        yield Unpublished()
+        return
+    with publisher:
+        yield publisher

@@ -1,0 +1,68 @@
+"""A request to stop, left for a run by another process of the same user, and the thread of the run that looks for it.
+
+The request is a file in the run's folder: it needs no socket, no page and no script, and it stays until the run has ended, for
+further parts of it as well.
+"""
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rig.errors import RecordingError
+from rig.live.place import STOP
+from rig.text.printable import printable
+
+__all__ = ["heeding", "request_stop"]
+
+LOOK_S = 0.05
+LONGEST = 300
+
+
+def request_stop(folder: Path, cause: str) -> None:
+    """Ask the run with this folder to ramp down; ``cause`` says who asks, in one line. A first request is kept.
+
+    Raises:
+        RecordingError: the request cannot be left, because the run has ended or the memory is full.
+    """
+    path = folder / STOP
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        return
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be written ({error.strerror}); use the hardware stop") from error
+    with suppress(OSError):  # an empty file is a request as well
+        os.write(descriptor, cause.encode()[:LONGEST])
+    os.close(descriptor)
+
+
+@contextmanager
+def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
+    """Look for a request while the rig is driven, in a thread of its own; ``stop`` gets its cause, once."""
+    over = threading.Event()
+
+    def look() -> None:
+        while not over.wait(LOOK_S):
+            if (folder / STOP).exists():
+                with suppress(OSError):
+                    over.wait(LOOK_S)  # for its text
+                stop(_cause(folder / STOP))
+                return
+
+    watch = threading.Thread(target=look, name="requests to stop", daemon=True)
+    watch.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watch.join()
+
+
+def _cause(path: Path) -> str:
+    try:
+        text = path.read_bytes()[:LONGEST].decode(errors="replace")
+    except OSError:
+        text = ""
+    return printable(text.strip()) or "stopped by request"
