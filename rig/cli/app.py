@@ -24,6 +24,7 @@ from rig.cli.rehearse import rehearse_
 from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
 from rig.cli.show import plot_, show
+from rig.cli.stop import stop
 from rig.cli.tune import tune_
 
 __all__ = ["app", "main"]
@@ -64,6 +65,7 @@ app.command()(resume)
 app.command()(show)
 app.command("plot")(plot_)
 app.command()(doctor)
+app.command()(stop)
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from rig.live.binning import put_bin
-from rig.live.layout import BIN_S, BINS, FRAME, bin_dtype, window_rows
+from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
 from rig.live.place import FACTS, FRAME_FILE, LINES, STOP, TRACES, new_folder
 from rig.live.stopping import heeding
 from rig.live.time_left import time_left_s
@@ -31,7 +31,6 @@ __all__ = ["Live", "Publisher", "Unpublished", "published"]
 
 FRAMES_PER_S = 30.0
 LATENESS_S = 1.0
-HEAD = 8  # bytes before a frame (its checksum) and before the bins (their number)
 
 
 class Live(Protocol):
@@ -198,7 +197,9 @@ class Publisher:
     def _publish(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         frame, t = self._frame[0], loop.tick.arrays
         progress, guard, vibration = t.progress[0], t.guard[0], t.control["vibration"][0]
-        frame["sample"], frame["lock"], frame["guard"] = loop.tick.sample, rows["lock"][-1], guard["mode"]
+        frame["sample"], frame["lock"] = loop.tick.sample, rows["lock"][-1]
+        # Where the driver has failed, nobody knows more of the output than what was put out last.
+        frame["guard"] = guard["mode"] if loop.failure is None else rows["guard"][-1]
         for name in ("reason", "channel", "value"):
             frame[name] = guard[name]
         at = int(progress["segment"])

@@ -12,9 +12,8 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.live.layout import BINS, FRAME, bin_dtype
+from rig.live.layout import BINS, FRAME, HEAD, bin_dtype
 from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, lives, runs
-from rig.live.publisher import HEAD
 from rig.live.stopping import request_stop
 from rig.tick.layout import recorded_row
 
@@ -150,7 +149,7 @@ def run_into(recording: Path | None = None) -> LiveRun | None:
     for folder in runs():
         with suppress(RecordingError):
             run = LiveRun(folder)
-            if recording is None or Path(run.facts["recording"]) == recording.absolute():
+            if recording is None or Path(run.facts["recording"]).resolve() == recording.resolve():
                 return run
             run.close()
     return None

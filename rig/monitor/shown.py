@@ -37,7 +37,7 @@ def state_of(frame: Frame | None) -> str:
     guard, reason = GuardMode(int(state["guard"])), EndReason(int(state["reason"]))
     if guard is GuardMode.DISARMED:
         return "not armed"
-    if guard is GuardMode.OFF or (guard is GuardMode.RAMPING and reason.is_trip):
+    if guard is GuardMode.OFF or reason.is_trip:
         if reason.is_trip:
             return "tripped"
         return "finished" if reason is EndReason.COMPLETED else "stopped"
@@ -105,7 +105,7 @@ def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[M
         "force_n": float(state["force_n"]),
         "acceleration_m_s2": float(state["drive_m_s2"]),
         "displacement_mm": 1e3 * float(state["displacement_m"]),
-        "settled": [int(state["good_periods"]), int(state["settled_periods"])],
+        "settled": _settled(state),
         "left_s": float(state["left_s"]),
         "late_us": [float(value) for value in state["late_us"]],
         "overruns": int(state["overruns"]),
@@ -114,6 +114,12 @@ def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[M
         "scope": _scope(window, facts),
         "harmonics": _harmonics(bands, facts),
     }
+
+
+def _settled(state: np.void) -> list[int] | None:
+    """Return how many periods of how many were within the tolerance; None where that was not recorded."""
+    good = int(state["good_periods"])
+    return None if good < 0 else [good, int(state["settled_periods"])]
 
 
 def shown_bins(bins: np.ndarray, facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -23,7 +23,7 @@ FACTS = {
 def made_loop():
     """A loop that runs nothing: its tick can be set to any sample."""
     tick = tick_for(BENCH, 21.0)
-    return SimpleNamespace(tick=tick, statistics=SimpleNamespace(overruns=0), lateness_us=(np.nan,) * 4)
+    return SimpleNamespace(tick=tick, failure=None, statistics=SimpleNamespace(overruns=0), lateness_us=(np.nan,) * 4)
 
 
 def chunk(loop, number):
