@@ -26,6 +26,7 @@ from rig.cli.run import resume, run
 from rig.cli.show import plot_, show
 from rig.cli.stop import stop
 from rig.cli.tune import tune_
+from rig.cli.watch import watch_
 
 __all__ = ["app", "main"]
 
@@ -65,6 +66,7 @@ app.command()(resume)
 app.command()(show)
 app.command("plot")(plot_)
 app.command()(doctor)
+app.command("watch")(watch_)
 app.command()(stop)
 
 
