@@ -21,6 +21,7 @@ from rig.cli.list import list_
 from rig.cli.options import say_what_is_imported
 from rig.cli.predict import predict
 from rig.cli.rehearse import rehearse_
+from rig.cli.replay import replay_
 from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
 from rig.cli.show import plot_, show
@@ -67,6 +68,7 @@ app.command()(show)
 app.command("plot")(plot_)
 app.command()(doctor)
 app.command("watch")(watch_)
+app.command("replay")(replay_)
 app.command()(stop)
 
 

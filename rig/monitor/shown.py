@@ -11,7 +11,7 @@ from rig.live.reader import Frame
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind
 
-__all__ = ["as_json", "shown_bins", "shown_frame", "state_of"]
+__all__ = ["as_json", "fundamentals_of", "shown_bins", "shown_frame", "state_of"]
 
 SCOPE_PERIODS = 3
 SCOPE_POINTS = 400
@@ -84,7 +84,7 @@ def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[M
     state, window = frame.state, frame.window
     guard = GuardMode(int(state["guard"]))
     omega = 2.0 * math.pi * float(state["frequency_hz"])
-    bands = _fundamentals(window, facts)
+    bands = fundamentals_of(window, facts)
     return {
         "state": state_of(frame),
         "cause": cause_of(frame, facts, lines),
@@ -171,8 +171,11 @@ def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
     return window[begins[max(begins.size - 1 - periods, 0)] : begins[-1]]
 
 
-def _fundamentals(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
-    """complex[n_channels, H + 1]: mean and harmonics of every channel over the last periods by least squares, if any."""
+def fundamentals_of(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
+    """Return mean and harmonics of every channel over the last periods, complex[n_channels, H + 1]; [0, H + 1] if there are none.
+
+    By least squares on the recorded phase of the oscillator.
+    """
     rows = _last_periods(window, SCOPE_PERIODS)
     inputs = rows["inputs"].astype(float)
     good = np.isfinite(inputs).all(axis=1)

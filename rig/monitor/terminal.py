@@ -129,40 +129,41 @@ def _replayed(replay: Mapping[str, Any], width: int) -> Text:
 
 
 def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[RenderableType]:
-    """Return four lines of numbers with their units."""
-    table = Table.grid(padding=(0, 1), expand=True)
-    for _ in range(2):
-        table.add_column(style="grey62", no_wrap=True)
-        table.add_column(justify="right", style="bold", no_wrap=True)
-        table.add_column(no_wrap=True, ratio=1)
-    level = facts["level_unit"]
-    settled = shown["settled"]
-    progress = Text("-", style="grey62") if settled is None else _progress(settled)
+    """Return four lines of numbers with their units, and one on the loop where that is known."""
+    unit = facts["level_unit"]
+    settled = shown["settled"] if shown["state"] == "settling" else None
     cells = [
         ("frequency", figure(shown["frequency_hz"], ".4f"), "Hz"),
         ("phase error", figure(shown["phase_error_deg"], ".2f"), "deg"),
         ("force", figure(shown["force_n"], ".4f"), "N"),
         ("displacement", figure(shown["displacement_mm"], ".4f"), "mm"),
         ("voltage", figure(shown["voltage_v"], ".4f"), "V"),
-        ("level", figure(shown["level"], ".4g"), f"{level}, to be {figure(shown['target'], '.4g')} {level}"),
+        ("level", figure(shown["level"], ".4g"), f"{unit}, to {figure(shown['target'], '.4g')} {unit}"),
         ("time", figure(shown["time_s"], ".1f"), f"s of part {shown['part']}"),
+        ("settled", "-" if settled is None else str(settled[0]), "" if settled is None else _progress(settled)),
     ]
-    late = shown["late_us"]
-    for one, other in zip(cells[::2], cells[1::2], strict=False):
-        table.add_row(*one, *other)
-    table.add_row(*cells[-1], "settled", progress, "")
+    table = Table.grid(expand=True)
+    table.add_column(ratio=1, no_wrap=True)
+    table.add_column(ratio=1, no_wrap=True)
+    texts = [
+        Text.assemble((f"{name:<13}", "grey62"), (f"{value:>10} ", "bold"), what, overflow="ellipsis")
+        for name, value, what in cells
+    ]
+    for one, other in zip(texts[::2], texts[1::2], strict=True):
+        table.add_row(one, other)
     told: list[RenderableType] = [table]
+    late = shown["late_us"]
     if any(math.isfinite(value) for value in late) or shown["overruns"] or shown["lost"]:
         p50, p99, p999, most = (figure(value, ".0f") for value in late)
-        text = f"loop: {p50}, {p99}, {p999} us late in 50, 99, 99.9 %, {most} us at most; {shown['overruns']} overruns"
-        told.append(Text(text + (f", {shown['lost']} samples lost" if shown["lost"] else ""), style="grey62"))
+        text = f"late {p50} / {p99} / {p999} us (50, 99, 99.9 %), {most} us at most; {shown['overruns']} overruns"
+        text += f", {shown['lost']} samples lost" if shown["lost"] else ""
+        told.append(Text(text, style="grey62", no_wrap=True, overflow="ellipsis"))
     return told
 
 
-def _progress(settled: Sequence[int]) -> Text:
+def _progress(settled: Sequence[int]) -> str:
     good, needed = settled
-    part = min(good / needed, 1.0) if needed > 0 else 0.0
-    return Text(f"{good} of {needed} periods {_bar(part, 10)}")
+    return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 8)}"
 
 
 def _bar(part: float, length: int) -> str:
