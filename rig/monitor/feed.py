@@ -29,7 +29,8 @@ __all__ = ["Feed", "Look", "Moment", "Place"]
 TICK_S = 1.0 / 30.0
 STILL_S = 0.25
 """Longest time between two messages where nothing changes: they show that the server lives."""
-UNWATCHED_S = 1.0
+UNWATCHED_S, WAITING_S = 1.0, 0.2
+"""Time between two looks while nobody watches: at a run, and for a run to begin."""
 BULKY = ("harmonics", "harmonics_std")
 """Keys of a point that are left out: numbers for every channel and harmonic."""
 
@@ -98,7 +99,7 @@ class Feed:
             else:
                 self._wanted.clear()
                 with suppress(TimeoutError):
-                    await asyncio.wait_for(self._wanted.wait(), UNWATCHED_S)
+                    await asyncio.wait_for(self._wanted.wait(), UNWATCHED_S if self.view else WAITING_S)
 
     def close(self) -> None:
         """End the thread."""
