@@ -43,7 +43,10 @@ LARGEST_FORM = 1024
 FORM_S = 5.0
 NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
 ELSEWHERE = "Or type in a terminal of the same user: rig stop"
-HOW_TO_ENTER = "Open the address that `rig monitor` or `rig run --monitor` has printed; each works once. `rig monitor` prints another."
+HOW_TO_ENTER = (
+    "Open the address that rig monitor or rig run --monitor has printed. Each address works once, in one browser; "
+    "rig monitor prints another."
+)
 
 
 @dataclass(frozen=True)
