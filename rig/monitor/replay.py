@@ -1,5 +1,6 @@
 """A recording as it was while it was made: what was to be seen of the run, at any time of it."""
 
+import math
 import threading
 import time
 from bisect import bisect_right
@@ -131,6 +132,22 @@ class Replay:
         with self._lock:
             self._at_s, self._since_s = self._now_s(), None if self._since_s is None else time.monotonic()
             self.speed = speed
+
+    def control(self, action: str, value: float) -> None:
+        """Do what is asked on a page: ``pause``, ``play``, ``seek`` to a time in s, ``speed``; ValueError for anything else."""
+        if not math.isfinite(value):
+            raise ValueError(f"{action} {value}: a number is wanted")
+        if action == "speed":
+            try:
+                self.set_speed(value)
+            except RecordingError as error:
+                raise ValueError(str(error)) from error
+        elif action == "seek":
+            self.seek(value)
+        elif action in ("pause", "play"):
+            (self.pause if action == "pause" else self.play)()
+        else:
+            raise ValueError(f"{action!r}: pause, play, seek or speed is wanted")
 
     def request_stop(self, cause: str) -> None:
         """Refuse by `RecordingError`: nothing moves."""
