@@ -156,7 +156,7 @@ def test_watching_in_plain_lines_begins_before_the_run_and_ends_with_it(running)
     out, err = watching.communicate(timeout=120)
     assert (watching.returncode, err) == (0, "")
     lines = out.splitlines()
-    assert any(" s  searching  level " in line for line in lines)
+    assert any(re.match(r"[\d.]+ s  (searching|settling)  point 1 of 2  level 0\.\d+ V  ", line) for line in lines)
     assert any(line.endswith("guard: ramping") for line in lines)
     assert re.search(r"end: stopped by `rig stop` \(process \d+\)", out)
 
