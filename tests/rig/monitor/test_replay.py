@@ -83,7 +83,7 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
             assert now["time_s"] == before["time_s"]
             assert now["frequency_hz"] == pytest.approx(before["frequency_hz"], rel=5e-3)
             assert now["target"] == pytest.approx(before["target"])
-            assert now["voltage_v"] == pytest.approx(before["voltage_v"], abs=0.002)
+            assert now["voltage_v"] == pytest.approx(before["voltage_v"], abs=0.01)  # a row has what is on the converter
             assert now["level"] == pytest.approx(before["level"], abs=0.01)
             if before["state"] == "recording":
                 assert now["force_n"] == pytest.approx(before["force_n"], rel=0.1)
@@ -235,7 +235,7 @@ def test_every_kind_is_replayed_with_its_segments_and_points(name, tmp_path):
                 inside = [p for p in points if p["first_sample"] <= time_s * RATE < p["end_sample"]]
                 assert not inside or shown["point"] in [p["number"] + 1 for p in inside]
         assert "recording" in states
-        assert states >= ({"driven"} if name in ("multisine-1", "sweep-1", "stepped-sine-up") else {"searching"})
+        assert ("driven" in states) is (name in ("multisine-1", "sweep-1", "stepped-sine-up"))
 
 
 def test_a_resumed_recording_with_another_plan_goes_on_in_its_parts(tmp_path):
