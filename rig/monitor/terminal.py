@@ -58,9 +58,10 @@ def draw(
     if "guard" not in shown:
         return Group(*head, Text("nothing has been published yet", style="grey50"))
     rest = height - (7 if height >= 36 else 5) - (replay is not None)
-    numbers = _numbers(shown, facts)
+    across = 1 if width >= WIDE else 2
+    numbers = _numbers(shown, facts, across)
     if width >= WIDE:
-        left = [*_section("", numbers), *_section("share of limits and ranges", _shares(shown, rest - 8, width // 2))]
+        left = [*_section("", numbers), *_section("share of limits and ranges", _shares(shown, rest - 11, width // 2))]
         events = _events(lines, facts, min(10, max(2, rest // 4)), width // 2 - 2)
         points = _points(lines, facts, rest - len(events) - 4, width // 2 - 2)
         right = [*_section("points", points), *_section("events", events)]
@@ -128,8 +129,8 @@ def _replayed(replay: Mapping[str, Any], width: int) -> Text:
     return Text(text, style="bold", no_wrap=True, overflow="ellipsis")
 
 
-def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[RenderableType]:
-    """Return four lines of numbers with their units, and one on the loop where that is known."""
+def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any], across: int) -> list[RenderableType]:
+    """Return numbers with their units, so many in a line, and a line on the loop where that is known."""
     unit = facts["level_unit"]
     settled = shown["settled"] if shown["state"] == "settling" else None
     cells = [
@@ -143,14 +144,14 @@ def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[Rendera
         ("settled", "-" if settled is None else str(settled[0]), "" if settled is None else _progress(settled)),
     ]
     table = Table.grid(expand=True)
-    table.add_column(ratio=1, no_wrap=True)
-    table.add_column(ratio=1, no_wrap=True)
+    for _ in range(across):
+        table.add_column(ratio=1, no_wrap=True)
     texts = [
-        Text.assemble((f"{name:<13}", "grey62"), (f"{value:>10} ", "bold"), what, overflow="ellipsis")
+        Text.assemble((f"{name:<12} ", "grey62"), (f"{value:>8} ", "bold"), what, overflow="ellipsis")
         for name, value, what in cells
     ]
-    for one, other in zip(texts[::2], texts[1::2], strict=True):
-        table.add_row(one, other)
+    for first in range(0, len(texts), across):
+        table.add_row(*texts[first : first + across])
     told: list[RenderableType] = [table]
     late = shown["late_us"]
     if any(math.isfinite(value) for value in late) or shown["overruns"] or shown["lost"]:
@@ -163,7 +164,7 @@ def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[Rendera
 
 def _progress(settled: Sequence[int]) -> str:
     good, needed = settled
-    return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 8)}"
+    return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 4)}"
 
 
 def _bar(part: float, length: int) -> str:
