@@ -18,6 +18,7 @@ from rig.cli.flags import with_flags
 from rig.cli.group import Group
 from rig.cli.identify import identify
 from rig.cli.list import list_
+from rig.cli.monitor import monitor
 from rig.cli.options import say_what_is_imported
 from rig.cli.predict import predict
 from rig.cli.rehearse import rehearse_
@@ -61,6 +62,7 @@ app.command("rehearse")(rehearse_)
 app.command("reproduce")(reproduce_)
 app.command()(run)
 app.command()(resume)
+app.command()(monitor)
 app.command()(show)
 app.command("plot")(plot_)
 app.command()(doctor)

@@ -3,6 +3,7 @@
 const PATIENCE_MS = 1500;
 const LOOK_MS = 250;
 const KEY = "Escape";
+const DONE = ["off", "none"]; // states of the server in which nothing more will change
 const HARDWARE = "USE THE HARDWARE STOP";
 
 export class Stop {
@@ -21,9 +22,11 @@ export class Stop {
     });
   }
 
-  say(state, text) {
+  say(state, heading, text = "") {
     this.form.dataset.asked = state;
-    if (this.words.textContent !== text) this.words.textContent = text;
+    const [large, small] = this.words.children;
+    if (large.textContent !== heading) large.textContent = heading;
+    if (small.textContent !== text) small.textContent = text;
   }
 
   async press() {
@@ -52,12 +55,14 @@ export class Stop {
     return answer.json();
   }
 
+  /** Show an answer: its first sentence in large letters, as on the server's own page. */
   show({ state, text }) {
-    this.say(state, text);
+    const [heading, ...more] = text.split(". ");
+    this.say(state, heading, more.join(". "));
   }
 
   async follow() {
-    while (this.form.dataset.asked !== "off") {
+    while (!DONE.includes(this.form.dataset.asked)) {
       await new Promise((done) => setTimeout(done, LOOK_MS));
       try {
         this.show(await this.ask("/stopping"));

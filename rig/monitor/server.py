@@ -1,0 +1,239 @@
+"""The page's server: one page, its files, the feed, the stop, and figures of a folder. It can do nothing else.
+
+Paths of requests are looked up in tables; none is ever a path in the file system.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any
+from urllib.parse import parse_qs
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Scope
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from rig.monitor.connections import MOST_SOCKETS
+from rig.monitor.feed import Feed, Place
+from rig.monitor.plain_pages import HARDWARE, plain_page
+from rig.monitor.security import Guard, Keys
+from rig.monitor.stopping import Stopping
+
+__all__ = ["Site", "application"]
+
+PAGE = Path(__file__).parent / "page"
+TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".txt": "text/plain; charset=utf-8",
+}
+LARGEST_FORM = 1024
+FORM_S = 5.0
+NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
+ELSEWHERE = "Or type in a terminal of the same user: rig stop"
+HOW_TO_ENTER = "Open the address that `rig monitor` or `rig run --monitor` has printed; each works once. `rig monitor` prints another."
+
+
+@dataclass(frozen=True)
+class Site:
+    """What is served."""
+
+    feed: Feed
+    keys: Keys
+    title: str
+    scheme: str
+    hosts: frozenset[str]
+    stopping: Stopping
+
+
+def application(site: Site) -> ASGIApp:
+    """Return the application."""
+    pages = _Pages(site)
+
+    @contextlib.asynccontextmanager
+    async def reading(app: Starlette) -> AsyncIterator[None]:
+        task = asyncio.create_task(site.feed.run())
+        try:
+            yield
+        finally:
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+            site.feed.close()
+
+    routes = [
+        Route("/", pages.index),
+        Route("/page/{name}", pages.file),
+        Route("/state", pages.state),
+        WebSocketRoute("/feed", pages.follow),
+        Route("/stop", pages.stop, methods=["POST"]),
+        Route("/stopping", pages.stopping),
+        Route("/replay", pages.replay, methods=["POST"]),
+    ]
+    handlers: Mapping[Any, Any] = {HTTPException: pages.refused}
+    return Guard(
+        Starlette(routes=routes, lifespan=reading, exception_handlers=handlers), site.scheme, site.hosts, _refusal
+    )
+
+
+class _Pages:
+    def __init__(self, site: Site) -> None:
+        self._site, self._feed, self._keys = site, site.feed, site.keys
+        self._files = {path.name: (path.read_bytes(), TYPES[path.suffix]) for path in _files()}
+        self._index = Template((PAGE / "index.html").read_text(encoding="utf-8"))
+
+    async def index(self, request: Request) -> Response:
+        """The page, or the door to it: an address with its token sets the cookie, once."""
+        token = request.query_params.get("token")
+        if token is not None and self._keys.admit(token):
+            # Not a redirect: after one from elsewhere, such as from the file of --open, a strict cookie would be withheld.
+            response = plain_page("Opening the page", onward="/", after_s=0)
+            secure = self._site.scheme == "https"
+            response.set_cookie(
+                self._keys.cookie_name, self._keys.cookie, path="/", secure=secure, httponly=True, samesite="strict"
+            )
+            return response
+        self._must_be_known(request)
+        if token is not None:  # of a browser that is in already
+            return plain_page("Opening the page", onward="/", after_s=0)
+        moment = await self._feed.fresh()
+        facts = moment.facts or {}
+        title = " · ".join(part for part in (facts.get("bench", ""), facts.get("kind", ""), self._site.title) if part)
+        text = self._index.safe_substitute(
+            action_token=self._keys.action,
+            title=escape(title),
+            replay="yes" if hasattr(moment.view, "replay_state") else "no",
+            folder="no",
+        )
+        return Response(text, media_type="text/html; charset=utf-8")
+
+    async def file(self, request: Request) -> Response:
+        """A file of the page."""
+        found = self._files.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        return Response(found[0], media_type=found[1])
+
+    async def state(self, request: Request) -> Response:
+        """Everything at once, for a page whose socket is dead."""
+        self._must_be_known(request)
+        if not self._keys.acts(request.headers.get("x-token")):
+            raise HTTPException(403)
+        text = await self._feed.message(await self._feed.fresh())
+        return Response(text, media_type="application/json")
+
+    async def follow(self, socket: WebSocket) -> None:
+        """Send what is new, to as many as may watch."""
+        if not (self._keys.known(socket.headers) and self._keys.acts(socket.query_params.get("token"))):
+            await socket.close(1008)  # before it is accepted: answered with status 403
+            return
+        await socket.accept()
+        if self._feed.clients >= MOST_SOCKETS:
+            await socket.close(1013, "too many pages are open")
+            return
+        self._feed.clients += 1
+        sending = asyncio.create_task(self._send(socket))
+        try:
+            while (await socket.receive())["type"] != "websocket.disconnect":
+                pass  # whatever it says
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._feed.clients -= 1
+            sending.cancel()
+            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, OSError, RuntimeError):
+                await sending
+
+    async def _send(self, socket: WebSocket) -> None:
+        place = Place()
+        while True:
+            text, place = await self._feed.following(place)
+            await socket.send_text(text)
+
+    async def stop(self, request: Request) -> Response:
+        """Ask the run to ramp down, and say what comes of it."""
+        await self._form(request)
+        self._site.stopping.ask(self._feed.view or (await self._feed.fresh()).view)
+        return await self._where_the_ramp_is(request)
+
+    async def stopping(self, request: Request) -> Response:
+        """Where the ramp is."""
+        self._must_be_known(request)
+        return await self._where_the_ramp_is(request)
+
+    async def _where_the_ramp_is(self, request: Request) -> Response:
+        word, heading, text = self._site.stopping.state(await self._feed.fresh())
+        if "application/json" in request.headers.get("accept", ""):
+            return JSONResponse({"state": word, "text": f"{heading}. {text}"})
+        onward = "" if word in ("none", "off", "driven") else "/stopping"
+        return plain_page(heading, text, "This is no emergency stop.", kind=word, onward=onward)
+
+    async def replay(self, request: Request) -> Response:
+        """Pause, play, seek, or set the speed of a replay."""
+        control = getattr(self._feed.view, "control", None)
+        form = await self._form(request)
+        if control is None:
+            raise HTTPException(404)
+        try:
+            control(form.get("action", ""), float(form.get("value", "0")))
+        except ValueError as error:
+            raise HTTPException(400) from error
+        return JSONResponse({"replay": "ok"})
+
+    async def _form(self, request: Request) -> dict[str, str]:
+        """Return the fields of a form that comes from the page."""
+        self._must_be_known(request)
+        if request.headers.get("content-type", "").partition(";")[0].strip() != "application/x-www-form-urlencoded":
+            raise HTTPException(415)
+        body = b""
+        try:
+            async with asyncio.timeout(FORM_S):
+                async for part in request.stream():
+                    body += part
+                    if len(body) > LARGEST_FORM:
+                        raise HTTPException(413)
+        except (TimeoutError, ClientDisconnect):
+            raise HTTPException(408) from None
+        try:
+            fields = parse_qs(body.decode("ascii"), max_num_fields=8)
+        except ValueError:
+            raise HTTPException(400) from None
+        if not self._keys.acts(fields.get("token", [""])[0]):
+            raise HTTPException(403)
+        return {name: values[0] for name, values in fields.items()}
+
+    def _must_be_known(self, request: Request) -> None:
+        if not self._keys.known(request.headers):
+            raise HTTPException(403)
+
+    async def refused(self, request: Request, error: Exception) -> Response:
+        """Say in plain words what is wrong."""
+        status = error.status_code if isinstance(error, HTTPException) else 500
+        texts = {403: "This browser is not known here.", 404: "There is no such page."}
+        return _refusal(request.scope, status, texts.get(status, "The request cannot be understood."))
+
+
+def _refusal(scope: Scope, status: int, text: str) -> Response:
+    """Return the answer to a request that is refused; if it was to stop, say that it did not."""
+    stops = scope["path"] == "/stop"
+    accepts = dict(scope["headers"]).get(b"accept", b"")
+    heading = NOT_STOPPED if stops else "Not here"
+    if b"application/json" in accepts:
+        return JSONResponse({"state": "failed" if stops else "refused", "text": f"{heading}. {text}"}, status)
+    return plain_page(
+        heading, text, ELSEWHERE if stops else HOW_TO_ENTER, status=status, kind="failed" if stops else ""
+    )
+
+
+def _files() -> list[Path]:
+    return [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]

@@ -1,0 +1,91 @@
+"""Which run the page shows: the one that is given, the youngest under way, the one into a file, those into a folder."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, cast
+
+from rig.errors import RecordingError
+from rig.live.place import runs
+from rig.live.reader import LiveRun, View
+
+__all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
+
+LOOK_S = 0.5
+Wanted = Callable[[Path], bool]
+
+
+def always(view: View) -> Callable[[View | None], View]:
+    """Return the choice of one view for good."""
+    return lambda shown: view
+
+
+class Latest:
+    """Chooses the youngest run whose recording is ``wanted``. One that has ended is shown until another begins.
+
+    ``instead`` is shown until a run begins.
+    """
+
+    def __init__(self, wanted: Wanted = lambda recording: True, instead: View | None = None) -> None:
+        self._wanted, self._instead = wanted, instead
+        self._looked_s = float("-inf")
+
+    def __call__(self, shown: View | None) -> View | None:
+        """Return the view to show, given the one that is shown."""
+        shown = shown or self._instead
+        under_way = isinstance(shown, LiveRun) and shown.connected
+        if under_way or time.monotonic() - self._looked_s < LOOK_S:
+            return shown
+        self._looked_s = time.monotonic()
+        return self._found(shown) or shown
+
+    def _found(self, shown: View | None) -> LiveRun | None:
+        for folder in runs():
+            if isinstance(shown, LiveRun) and folder == shown.folder:
+                continue
+            with suppress(RecordingError):  # it has just ended, or was started by another version
+                run = LiveRun(folder)
+                if self._wanted(Path(run.facts["recording"])):
+                    return run
+                run.close()
+        return None
+
+
+def chosen(what: Path | None) -> Latest:
+    """Return what to show for a recording (of a run that may still be to come), for a folder, or for the youngest run.
+
+    Raises:
+        RecordingError: the file is no recording that can be shown, or lies in no folder.
+    """
+    if what is None:
+        return Latest()
+    path = what.absolute()
+    if path.is_dir():
+        return Latest(lambda recording: recording.parent == path)
+    if not path.parent.is_dir():
+        raise RecordingError(f"{what}: there is no folder {what.parent}")
+    chosen = Latest(lambda recording: recording == path)
+    if chosen(None) is None and path.exists():
+        return Latest(lambda recording: recording == path, recorded(path))
+    return chosen
+
+
+def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
+    """Return a recording as a view.
+
+    Raises:
+        RecordingError: it cannot be read, or is none.
+    """
+    if find_spec("rig.monitor.replay") is None:
+        raise RecordingError(f"{path}: finished recordings cannot be shown yet")
+    replay: Any = import_module("rig.monitor.replay")
+    return cast(View, replay.Replay(path, speed=speed, at_end=at_end))
+
+
+def of_an_earlier_run(path: Path) -> dict[str, Any]:
+    """Return facts and points of a recording, to be drawn under those of the run that is shown."""
+    view = recorded(path)
+    return {"facts": view.facts, "lines": [line for line in view.lines(0) if line["is"] == "point"]}
