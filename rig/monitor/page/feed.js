@@ -1,6 +1,6 @@
-// What the server says: by a socket while there is one, else by asking once a second.
+// What the server says: by a socket while there is one, else by asking twice a second.
 
-const POLL_MS = 1000;
+const POLL_MS = 500; // a second would look stale
 const PATIENCE_MS = 2000; // a socket that says nothing for so long is closed and opened anew
 const RETRY_MS = [250, 500, 1000, 2000];
 
@@ -26,6 +26,7 @@ export class Feed {
       if (socket !== this.socket) return;
       this.tries = 0;
       this.since = performance.now();
+      this.polled = false;
       this.hear(JSON.parse(event.data));
     };
     socket.onclose = () => {
@@ -55,7 +56,9 @@ export class Feed {
       const asked = { headers: { "X-Token": this.token }, signal: AbortSignal.timeout(PATIENCE_MS) };
       const answer = await fetch("/state", asked);
       if (!answer.ok) throw new Error(`status ${answer.status}`);
-      this.hear(await answer.json());
+      const message = await answer.json();
+      this.polled = true;
+      this.hear(message);
     } catch {
       this.refused = true;
     } finally {

@@ -144,8 +144,8 @@ export class Points {
       padding: [8, 12, lowest ? 0 : 4, 0],
       scales: { x: { time: false, range: () => this.extent[0] }, y: { range: () => this.extent[which + 1] } },
       axes: [
-        axis({ size: lowest ? 22 : 8, label: lowest ? () => this.title(0) : undefined, labelSize: lowest ? 16 : 0, space: 60, values: (u, all) => (lowest ? ticks(u, all) : []) }),
-        axis({ size: 48, space: 28, label: () => this.title(which + 1), values: ticks }),
+        axis({ size: lowest ? 22 : 8, label: lowest ? () => this.title(0) : undefined, labelSize: lowest ? 16 : 0, space: 60, values: (made, all) => (lowest ? this.ticks(0, made, all) : []) }),
+        axis({ size: 48, space: 28, label: () => this.title(which + 1), values: (made, all) => this.ticks(which + 1, made, all) }),
       ],
       series: [{}, { stroke: "transparent", points: { show: false } }],
       cursor: { show: false },
@@ -155,18 +155,24 @@ export class Points {
 
   extent = [[0, 1], [0, 1], [0, 1]];
 
+  ticks(which, made, all) {
+    return this.empty?.[which] === false ? ticks(made, all) : [];
+  }
+
   title(which) {
     return this.axes?.[which] ? title(this.axes[which]) : "";
   }
 
   fit(made, which) {
     const all = [...this.points.values(), ...this.earlier].filter((point) => point.accepted || point[this.axes[1].key] != null);
+    this.empty = [];
     this.extent = this.axes.map(({ key }, index) => {
       const values = all.flatMap((point) => {
         const [value, error] = [point[key], point.errors[key] ?? 0];
         return value == null ? [] : [value - error, value + error];
       });
-      if (this.present?.[index] != null && (index === 0 || values.length)) values.push(this.present[index]);
+      if (this.present?.[index] != null && values.length) values.push(this.present[index]);
+      this.empty[index] = !values.length;
       return around(values.reduce((low, one) => Math.min(low, one), Infinity), values.reduce((high, one) => Math.max(high, one), -Infinity));
     });
     made.setData([this.extent[0], this.extent[which + 1]]);

@@ -25,7 +25,7 @@ export class Scope {
     });
     this.plot = plot(place(parent, "canvas", "Output, force and response over the last periods"), {
       scales,
-      axes: [axis({ size: 20, space: 70, values: (made, all) => ticks(made, all).map((text) => `${text} ms`) }), axis({ scale: "y0", size: 12, values: () => [], ticks: { show: false } })],
+      axes: [axis({ size: 20, space: 70, values: (made, all) => (this.scope?.t_ms?.length ? ticks(made, all).map((text) => `${text} ms`) : []) }), axis({ scale: "y0", size: 12, values: () => [], ticks: { show: false } })],
       series: [{}, ...series],
       cursor: { show: false },
     });

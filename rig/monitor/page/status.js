@@ -125,7 +125,7 @@ export class Status {
     return {
       waiting: "waiting for the first data",
       none: "no run is under way",
-      live: this.message?.replay ? "replay of a recording" : this.feed.socket ? "live" : "live, once a second",
+      live: this.message?.replay ? "replay of a recording" : this.feed.polled ? "live, without a socket" : "live",
       stale: `stale: last data ${age} s ago`,
       over: "the run is over",
       died: "the run's process ended without a word",
@@ -136,10 +136,11 @@ export class Status {
   draw() {
     const { frame } = this.message;
     const facts = this.facts;
-    if (!facts || !frame) return;
+    if (!facts || frame?.time_s == null) return;
     const running = frame.frequency_hz != null && !frame.output_off;
     say(at("level"), frame.points ? `${Math.max(frame.point || frame.finished, 1)} of ${frame.points}` : "–");
-    say(at("level-value"), `${quantity(frame.level, facts.level_unit)} of ${quantity(frame.target, facts.level_unit)}`);
+    const [level, target] = [frame.level, frame.target].map((value) => quantity(value, facts.level_unit));
+    say(at("level-value"), frame.target ? `${level} of ${target}` : level);
     say(at("left"), running ? duration(frame.left_s) : "–");
     say(at("time"), `time of test ${duration(frame.time_s)}`);
     say(at("frequency"), quantity(frame.frequency_hz, "Hz", 6));

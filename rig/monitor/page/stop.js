@@ -10,7 +10,7 @@ export class Stop {
   constructor(form, words) {
     this.form = form;
     this.words = words;
-    this.asked = false;
+    this.asked = this.failed = false;
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this.press();
@@ -31,12 +31,14 @@ export class Stop {
 
   async press() {
     if (this.asked) return;
+    if (this.failed) return this.form.submit(); // the second time without this script
     this.asked = true;
     this.say("sent", "STOP SENT");
     try {
       await this.send();
     } catch (error) {
-      this.asked = false; // the next press tries again
+      this.asked = false;
+      this.failed = true;
       if (error instanceof TypeError) return this.say("failed", `NOT SENT: ${HARDWARE}`);
       return this.form.submit(); // no answer, or a refusal: the form without this script, and the server's own page
     }

@@ -81,8 +81,8 @@ export class Traces {
       padding: [6, 8, lowest ? 0 : 6, 0],
       scales: { x: { time: false, range: () => this.range() }, y: { range: (_, low, high) => this.rangeOf(strip, low, high) } },
       axes: [
-        axis({ size: lowest ? 22 : 0, values: (_, values) => (lowest ? values.map(clock) : values.map(() => "")) }),
-        axis({ size: 58, space: 22, values: ticks }),
+        axis({ size: lowest ? 22 : 0, values: (_, values) => (lowest && this.time.length ? values.map(clock) : []) }),
+        axis({ size: 58, space: 22, values: (made, all) => (this.time.length ? ticks(made, all) : []) }),
       ],
       series: [{}, line, line],
       bands: [{ series: [1, 2], fill: () => faint(ink[strip.ink], 0.45) }],
