@@ -54,7 +54,8 @@ def begin(tmp_path, monkeypatch):
     yield run
     for process in begun:
         process.kill()
-        process.communicate()
+        process.wait()
+        process.stdout.close()
 
 
 def test_a_backbone_is_followed_from_its_first_point_to_its_last(browser, serve, begin, tmp_path):
