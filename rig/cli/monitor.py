@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.run_options import with_run_options
+from rig.cli.run_options import with_options
 
 if TYPE_CHECKING:
     from rig.monitor.process import Serving
@@ -39,7 +39,7 @@ def of_a_page(
     return Serving(address=address, over=over, open_browser=open_)
 
 
-@with_run_options(of_a_page)
+@with_options(of_a_page)
 def monitor(
     *,
     what: Annotated[

@@ -29,7 +29,8 @@ __all__ = ["Feed", "Look", "Moment", "Place"]
 TICK_S = 1.0 / 30.0
 STILL_S = 0.25
 """Longest time between two messages where nothing changes: they show that the server lives."""
-UNWATCHED_S = 1.0
+UNWATCHED_S, WAITING_S = 1.0, 0.2
+"""Time between two looks while nobody watches: at a run, and for a run to begin."""
 
 Look = Callable[[View | None], View | None]
 """Given the view that is shown, returns the one to show."""
@@ -96,7 +97,7 @@ class Feed:
             else:
                 self._wanted.clear()
                 with suppress(TimeoutError):
-                    await asyncio.wait_for(self._wanted.wait(), UNWATCHED_S)
+                    await asyncio.wait_for(self._wanted.wait(), UNWATCHED_S if self.view else WAITING_S)
 
     def close(self) -> None:
         """End the thread."""

@@ -9,7 +9,9 @@ __all__ = ["HARDWARE", "plain_page"]
 HARDWARE = "USE THE HARDWARE STOP"
 
 
-def plain_page(heading: str, *texts: str, status: int = 200, kind: str = "", onward: str = "", after_s: int = 1) -> HTMLResponse:
+def plain_page(
+    heading: str, *texts: str, status: int = 200, kind: str = "", onward: str = "", after_s: int = 1
+) -> HTMLResponse:
     """Return a page with a heading in large letters.
 
     ``kind`` is its class for colours: ``asked``, ``ramping``, ``off`` or ``failed``. ``onward`` is a path that the browser

@@ -3,6 +3,7 @@
 import asyncio
 import ipaddress
 import logging
+import os
 import socket
 import ssl
 import time
@@ -19,19 +20,20 @@ from rig.live.reader import View
 from rig.monitor.certificate import from_files, self_signed
 from rig.monitor.connections import MOST_CONNECTIONS, FeedConnection, WebConnection
 from rig.monitor.feed import Feed, Look
+from rig.monitor.folder import Folder
 from rig.monitor.opening import open_in_browser
 from rig.monitor.security import Keys
 from rig.monitor.server import Site, application
 from rig.monitor.sources import always, of_an_earlier_run
-from rig.monitor.stopping import Stopping
 from rig.system.stop_signals import ended_in_order
 
-__all__ = ["Address", "PageServer", "Serving", "serve"]
+__all__ = ["Address", "PageServer", "Serving", "lower_priority", "serve"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 LARGEST_HEADERS = 16384
 LARGEST_MESSAGE = 1024
 GRACE_S = 2
+NICE = 5
 LINGER_S = 60.0
 """Time after which a server whose run is over ends, once nobody watches any more."""
 
@@ -91,14 +93,14 @@ class Address:
         except (OSError, UnicodeError) as error:
             raise ConfigurationError(f"`bind` = {self.bind!r}: is no address of this machine ({error})") from error
         try:
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if os.name == "posix":  # a port that was closed just now may be used again; elsewhere this means any port
+                listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listening.bind(address)
             listening.listen(MOST_CONNECTIONS)
         except OSError as error:
             listening.close()
-            raise ConfigurationError(
-                f"`bind` = {self.bind}, `port` = {self.port}: cannot be used ({error.strerror}); choose another `port`, 0 for a free one"
-            ) from error
+            where = f"`bind` = {self.bind}, `port` = {self.port}"
+            raise ConfigurationError(f"{where}: cannot be used ({error.strerror}); 0 chooses a free `port`") from error
         return listening
 
     def secured(self) -> tuple[ssl.SSLContext, str] | None:
@@ -118,19 +120,21 @@ class PageServer:
     earlier: Mapping[str, Any] | None = None
     folder: Path | None = None
     alone: Callable[[], bool] = lambda: False
-    """Whether whoever started the server has gone, so that it ends by itself some time after the run."""
+    """Whether whoever started the server has gone, so that it ends by itself: at once where there never was a run, else some
+    time after the run."""
 
     def __post_init__(self) -> None:
         self.keys = Keys()
         secured = self.address.secured()
-        self.context, self.fingerprint = secured or (None, "")
+        self.fingerprint = secured[1] if secured else ""
         self.socket = self.address.listen()
         self.port = int(self.socket.getsockname()[1])
         self.scheme = "https" if secured else "http"
         names = (self.address.host, *LOOPBACK) if self.address.loopback else (self.address.host,)
         self.hosts = frozenset(f"{name}:{self.port}" for name in names)
         self.feed = Feed(self.look, self.earlier)
-        site = Site(self.feed, self.keys, self.title, self.scheme, self.hosts, Stopping())
+        folder = None if self.folder is None else Folder(self.folder)
+        site = Site(self.feed, self.keys, self.title, self.scheme, self.hosts, folder)
         config = uvicorn.Config(
             application(site),
             http=WebConnection,
@@ -148,7 +152,7 @@ class PageServer:
             timeout_graceful_shutdown=GRACE_S,
         )
         config.load()
-        config.ssl = self.context
+        config.ssl = secured[0] if secured else None
         self._server = uvicorn.Server(config)
         logging.getLogger("uvicorn").setLevel(logging.CRITICAL)
 
@@ -176,11 +180,10 @@ class PageServer:
         while True:
             await asyncio.sleep(1.0)
             view = self.feed.view
-            if self.alone() and not (view is not None and view.connected) and not self.feed.clients:
-                if time.monotonic() - self.feed.last_seen_s > LINGER_S:
-                    self.end()
-            else:
+            if not self.alone() or (view is not None and view.connected) or self.feed.clients:
                 self.feed.last_seen_s = time.monotonic()
+            elif view is None or time.monotonic() - self.feed.last_seen_s > LINGER_S:
+                self.end()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,6 +205,7 @@ def serve(show: View | Look, serving: Serving | None = None, *, folder: Path | N
         RecordingError: the recording to compare with cannot be read.
         Terminated: another signal than Ctrl-C came; the server has ended in order.
     """
+    lower_priority()
     serving = serving or Serving()
     look = show if callable(show) else always(show)
     earlier = None if serving.over is None else of_an_earlier_run(serving.over)
@@ -229,6 +233,12 @@ def _way_in(server: PageServer, open_browser: bool) -> Iterator[None]:
     finally:
         if file is not None:
             file.unlink(missing_ok=True)
+
+
+def lower_priority() -> None:
+    """Let the loop go first where processors are few; what this process starts does the same."""
+    with suppress(OSError, AttributeError):  # not on Windows
+        os.nice(NICE)
 
 
 def _say(line: str) -> None:

@@ -6,7 +6,7 @@ Paths of requests are looked up in tables; none is ever a path in the file syste
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from string import Template
@@ -23,9 +23,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rig.monitor.connections import MOST_SOCKETS
 from rig.monitor.feed import Feed, Place
+from rig.monitor.folder import Folder
 from rig.monitor.plain_pages import HARDWARE, plain_page
 from rig.monitor.security import Guard, Keys
 from rig.monitor.stopping import Stopping
+from rig.system.child import ChildFailed
 
 __all__ = ["Site", "application"]
 
@@ -41,7 +43,10 @@ LARGEST_FORM = 1024
 FORM_S = 5.0
 NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
 ELSEWHERE = "Or type in a terminal of the same user: rig stop"
-HOW_TO_ENTER = "Open the address that `rig monitor` or `rig run --monitor` has printed; each works once. `rig monitor` prints another."
+HOW_TO_ENTER = (
+    "Open the address that rig monitor or rig run --monitor has printed. Each address works once, in one browser; "
+    "rig monitor prints another."
+)
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,8 @@ class Site:
     title: str
     scheme: str
     hosts: frozenset[str]
-    stopping: Stopping
+    folder: Folder | None = None
+    stopping: Stopping = field(default_factory=Stopping)
 
 
 def application(site: Site) -> ASGIApp:
@@ -79,6 +85,9 @@ def application(site: Site) -> ASGIApp:
         Route("/stop", pages.stop, methods=["POST"]),
         Route("/stopping", pages.stopping),
         Route("/replay", pages.replay, methods=["POST"]),
+        Route("/folder", pages.folder),
+        Route("/folder/{n:int}/figure.png", pages.figure),
+        Route("/folder/{n:int}/table.txt", pages.table),
     ]
     handlers: Mapping[Any, Any] = {HTTPException: pages.refused}
     return Guard(
@@ -113,7 +122,7 @@ class _Pages:
             action_token=self._keys.action,
             title=escape(title),
             replay="yes" if hasattr(moment.view, "replay_state") else "no",
-            folder="no",
+            folder="no" if self._site.folder is None else "yes",
         )
         return Response(text, media_type="text/html; charset=utf-8")
 
@@ -190,6 +199,32 @@ class _Pages:
             raise HTTPException(400) from error
         return JSONResponse({"replay": "ok"})
 
+    async def folder(self, request: Request) -> Response:
+        """What lies in the folder."""
+        return JSONResponse({"entries": await self._folder(request).entries()})
+
+    async def figure(self, request: Request) -> Response:
+        """The figure of a file."""
+        return Response(await self._of_file(request, "figure"), media_type="image/png")
+
+    async def table(self, request: Request) -> Response:
+        """The table of a file."""
+        return Response(await self._of_file(request, "table"), media_type="text/plain; charset=utf-8")
+
+    def _folder(self, request: Request) -> Folder:
+        self._must_be_known(request)
+        if self._site.folder is None:
+            raise HTTPException(404)
+        return self._site.folder
+
+    async def _of_file(self, request: Request, what: str) -> bytes:
+        try:
+            return await self._folder(request).made(what, request.path_params["n"])
+        except KeyError:
+            raise HTTPException(404) from None
+        except ChildFailed as error:
+            raise HTTPException(422, f"It cannot be shown: {error}.") from error
+
     async def _form(self, request: Request) -> dict[str, str]:
         """Return the fields of a form that comes from the page."""
         self._must_be_known(request)
@@ -220,7 +255,10 @@ class _Pages:
         """Say in plain words what is wrong."""
         status = error.status_code if isinstance(error, HTTPException) else 500
         texts = {403: "This browser is not known here.", 404: "There is no such page."}
-        return _refusal(request.scope, status, texts.get(status, "The request cannot be understood."))
+        told = (
+            error.detail if isinstance(error, HTTPException) and status == 422 else "The request cannot be understood."
+        )
+        return _refusal(request.scope, status, texts.get(status, told))
 
 
 def _refusal(scope: Scope, status: int, text: str) -> Response:

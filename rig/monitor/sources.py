@@ -1,7 +1,7 @@
 """Which run the page shows: the one that is given, the youngest under way, the one into a file, those into a folder."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,8 +15,8 @@ from rig.monitor.shown import shown_line
 
 __all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
 
-LOOK_S = 0.5
-Wanted = Callable[[Path], bool]
+LOOK_S = 0.2
+Wanted = Callable[[Mapping[str, Any]], bool]
 
 
 def always(view: View) -> Callable[[View | None], View]:
@@ -25,12 +25,12 @@ def always(view: View) -> Callable[[View | None], View]:
 
 
 class Latest:
-    """Chooses the youngest run whose recording is ``wanted``. One that has ended is shown until another begins.
+    """Chooses the youngest run whose facts say that it is ``wanted``. One that has ended is shown until another begins.
 
     ``instead`` is shown until a run begins.
     """
 
-    def __init__(self, wanted: Wanted = lambda recording: True, instead: View | None = None) -> None:
+    def __init__(self, wanted: Wanted = lambda facts: True, instead: View | None = None) -> None:
         self._wanted, self._instead = wanted, instead
         self._looked_s = float("-inf")
 
@@ -49,7 +49,7 @@ class Latest:
                 continue
             with suppress(RecordingError):  # it has just ended, or was started by another version
                 run = LiveRun(folder)
-                if self._wanted(Path(run.facts["recording"])):
+                if self._wanted(run.facts):
                     return run
                 run.close()
         return None
@@ -65,13 +65,14 @@ def chosen(what: Path | None) -> Latest:
         return Latest()
     path = what.absolute()
     if path.is_dir():
-        return Latest(lambda recording: recording.parent == path)
+        return Latest(lambda facts: Path(facts["recording"]).parent == path)
     if not path.parent.is_dir():
         raise RecordingError(f"{what}: there is no folder {what.parent}")
-    chosen = Latest(lambda recording: recording == path)
-    if chosen(None) is None and path.exists():
-        return Latest(lambda recording: recording == path, recorded(path))
-    return chosen
+
+    def into(facts: Mapping[str, Any]) -> bool:
+        return Path(facts["recording"]) == path
+
+    return Latest(into, recorded(path) if path.exists() and Latest(into)(None) is None else None)
 
 
 def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:

@@ -1,5 +1,7 @@
 """What is said after STOP, until the output is at 0 V."""
 
+import time
+
 from rig.errors import RecordingError
 from rig.live.reader import View
 from rig.monitor.feed import Moment
@@ -8,6 +10,8 @@ from rig.monitor.plain_pages import HARDWARE
 __all__ = ["Stopping"]
 
 SILENT_S = 2.0
+REST_S = 10.0
+"""Time beyond the ramp for what a run may be doing before it looks."""
 BY_PAGE = "stopped on the page"
 
 
@@ -16,13 +20,16 @@ class Stopping:
 
     def __init__(self) -> None:
         self._asked: View | None = None
+        self._asked_s = 0.0
         self._refused = ""
 
     def ask(self, view: View | None) -> None:
         """Ask the run that is shown to ramp down."""
         if view is None:
             return
-        self._asked, self._refused = view, ""
+        if view is not self._asked:
+            self._asked, self._asked_s = view, time.monotonic()
+        self._refused = ""
         try:
             view.request_stop(BY_PAGE)
         except RecordingError as error:
@@ -34,21 +41,25 @@ class Stopping:
         The word is ``none`` (no run), ``driven`` (nobody has asked here), ``asked``, ``ramping``, ``off`` or ``failed``.
         """
         shown = moment.shown or {}
-        if moment.view is None:
+        cause = f" {shown['cause']}." if shown.get("cause") else ""
+        if moment.view is None or moment.facts is None:
             return "none", "NO RUN IS UNDER WAY", "There is nothing to stop here."
-        if moment.ended and not moment.connected:
-            return "off", "OUTPUT AT 0 V", f"The run is over. {shown.get('cause', '')}".strip()
-        if moment.connected and shown.get("output_off") and shown.get("cause"):
-            return "off", "OUTPUT AT 0 V", f"{shown['cause']}."
         if not moment.connected:
-            text = "The run's process has ended without a word: what the output does is not known here."
-            return "failed", HARDWARE, text
-        if self._refused and self._asked is moment.view:
-            return "failed", HARDWARE, f"The request could not be left: {self._refused}"
+            if shown.get("output_off") or (moment.ended and "guard" not in shown):  # the last: nothing was driven
+                return "off", "OUTPUT AT 0 V", f"The run is over.{cause}"
+            how = cause or " Its process has ended without a word."
+            return "failed", HARDWARE, f"The run is over, and what the output does is not known here.{how}"
+        if shown.get("output_off") and cause:
+            return "off", "OUTPUT AT 0 V", cause.strip()
         if self._asked is not moment.view:
             return "driven", "NO STOP WAS ASKED FOR", f"The run is under way: {shown.get('state', 'starting')}."
+        if self._refused:
+            return "failed", HARDWARE, f"The request could not be left: {self._refused}."
         if shown.get("age_s", 0.0) > SILENT_S:
-            return "failed", HARDWARE, f"A stop is asked for, but the run has not answered for {shown['age_s']:.0f} s."
+            return "failed", HARDWARE, f"A stop is asked for, but the run has said nothing for {shown['age_s']:.0f} s."
+        waited_s = time.monotonic() - self._asked_s
+        if waited_s > moment.facts["limits"]["ramp_down_s"] + REST_S:
+            return "failed", HARDWARE, f"The output is not at 0 V after {waited_s:.0f} s.{cause}"
         if shown.get("guard") == "ramping down":
-            return "ramping", "RAMPING DOWN", f"Output {shown['voltage_v']:.3f} V. {shown.get('cause', '')}".strip()
-        return "asked", "STOP IS ASKED FOR", "The ramp begins within a tenth of a second."
+            return "ramping", "RAMPING DOWN", f"Output {shown['voltage_v']:.3f} V.{cause}"
+        return "asked", "STOP IS ASKED FOR", "The ramp begins as soon as the run looks, twenty times a second."
