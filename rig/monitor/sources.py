@@ -90,4 +90,7 @@ def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
 def of_an_earlier_run(path: Path) -> dict[str, Any]:
     """Return facts and points of a recording, to be drawn under those of the run that is shown."""
     view = recorded(path)
-    return {"facts": view.facts, "lines": [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"]}
+    return {
+        "facts": view.facts,
+        "lines": [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"],
+    }

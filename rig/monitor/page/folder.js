@@ -30,8 +30,8 @@ export class Folder {
   row(entry) {
     const item = document.createElement("details");
     const head = document.createElement("summary");
-    const when = new Date(entry.modified);
-    const texts = [entry.name, entry.kind, entry.summary, size(entry.size), Number.isNaN(when.valueOf()) ? "" : when.toLocaleString()];
+    const when = new Date(1000 * entry.modified);
+    const texts = [entry.name, entry.kind, entry.summary, size(entry.size), when.toLocaleString()];
     head.append(
       ...texts.map((text) => {
         const part = document.createElement("span");
@@ -40,7 +40,7 @@ export class Folder {
       }),
     );
     item.append(head);
-    item.addEventListener("toggle", () => item.open && item.childElementCount === 1 && this.fill(item, entry), { once: false });
+    item.addEventListener("toggle", () => item.open && item.childElementCount === 1 && this.fill(item, entry));
     return item;
   }
 

@@ -17,12 +17,16 @@ FOREIGN = PAGE / "uplot"
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
 def test_a_script_is_whole(script):
     command = ["node", "--check", "--input-type=module"]
-    done = subprocess.run(command, input=script.read_text(encoding="utf-8"), capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, input=script.read_text(encoding="utf-8"), capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
 def test_foreign_files_are_those_of_their_source():
-    told = dict(reversed(line.split()) for line in re.findall(r"^[0-9a-f]{64}  .*$", (FOREIGN / "SOURCE").read_text(), re.M))
+    told = dict(
+        reversed(line.split()) for line in re.findall(r"^[0-9a-f]{64}  .*$", (FOREIGN / "SOURCE").read_text(), re.M)
+    )
     files = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in FOREIGN.iterdir()}
     assert told == {name: digest for name, digest in files.items() if name != "SOURCE"}
 

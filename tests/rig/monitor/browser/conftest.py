@@ -127,8 +127,8 @@ def serve(browser):
     """Serve the page of a view in a thread."""
     running = []
 
-    def begin(look):
-        server = PageServer(look)
+    def begin(look, **more):
+        server = PageServer(look, **more)
         thread = threading.Thread(target=server.run)
         thread.start()
         running.append((server, thread))

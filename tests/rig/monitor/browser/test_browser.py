@@ -150,10 +150,13 @@ def test_on_a_phone_nothing_is_wider_than_the_page_and_stop_is_in_sight(page, to
     with page.of_size(360, 740):
         page.until(lambda: page.run("return innerWidth") == 360)
         assert page.run("return document.documentElement.scrollWidth") <= 360
-        box = page.run("const box = document.getElementById('stop').getBoundingClientRect(); return [box.left, box.top, box.right, box.bottom]")
-        assert 0 <= box[0] < box[2] <= 360
-        assert 0 <= box[1] < box[3] <= 740
-        assert box[3] - box[1] >= 72
+        left, top, right, bottom = page.run(
+            """const box = document.getElementById("stop").getBoundingClientRect();
+            return [box.left, box.top, box.right, box.bottom]"""
+        )
+        assert 0 <= left < right <= 360
+        assert 0 <= top < bottom <= 740
+        assert bottom - top >= 72
 
 
 def test_the_theme_changes_and_is_kept(page):
@@ -165,27 +168,49 @@ def test_the_theme_changes_and_is_kept(page):
     page.until(lambda: page.run(theme) == "light", "the light theme")
 
 
+WEEK = """
+const done = arguments[0];
+(async () => {
+    const load = (name) => import(`/page/${name}.js`);
+    const [{ Traces }, { Points }, { Events }] = await Promise.all(["traces", "points", "events"].map(load));
+    const make = (tag) => document.createElement(tag);
+    const [span, table, list] = [make("select"), make("table"), make("ol")];
+    table.createTHead();
+    table.createTBody();
+    make("div").append(table);
+    const traces = new Traces(make("div"), span);
+    const points = new Points(make("div"), table, make("p"));
+    const events = new Events(list);
+    const facts = { kind: "dwell", points: 1, level_unit: "V", sample_rate_hz: 5000, channels: [], columns: [] };
+    for (const part of [traces, points, events]) part.reset({ facts });
+    const all = (value) => Array(1000).fill(value);
+    const pair = [all(0), all(1)];
+    const curves = { frequency_hz: pair, phase_error_deg: pair, force: pair, drive: pair, voltage_v: pair };
+    const point = { is: "point", level: 1, accepted: true, quality: "good", end_sample: 0 };
+    for (let turn = 0; turn < 200; turn++) {
+        const numbers = all(0).map((_, index) => 1000 * turn + index);
+        const bins = { end_s: numbers.map((n) => 0.1 * n), part: all(1), lock: all(2), guard: all(1), ...curves };
+        const lines = numbers.map((number) => ({ ...point, number }));
+        for (const part of [traces, points, events]) part.take({ bins, lines });
+        if (turn % 50 === 0) for (const part of [points, events]) part.draw();
+    }
+    for (const part of [points, events]) part.draw();
+    done([traces.time.length, traces.bands[4][1].length, points.points.size, table.rows.length, list.children.length]);
+})().catch((error) => done(String(error)));
+"""
+
+
 def test_a_week_of_a_run_takes_bounded_memory(page):
-    kept = page.driver.execute_async_script(
-        """const done = arguments[0];
-        (async () => {
-            const [{ Traces }, { Points }, { Events }] = await Promise.all(["traces", "points", "events"].map((name) => import(`/page/${name}.js`)));
-            const [strips, span, plots, table, hint, list] = ["div", "select", "div", "table", "p", "ol"].map((tag) => document.createElement(tag));
-            table.createTHead(); table.createTBody(); document.createElement("div").append(table);
-            const [traces, points, events] = [new Traces(strips, span), new Points(plots, table, hint), new Events(list)];
-            const facts = { kind: "dwell", points: 1, level_unit: "V", sample_rate_hz: 5000, channels: [], columns: [] };
-            for (const part of [traces, points, events]) part.reset({ facts });
-            const ones = (value) => Array(1000).fill(value);
-            const pair = [ones(0), ones(1)];
-            for (let turn = 0; turn < 200; turn++) {
-                const end_s = ones(0).map((_, index) => 0.1 * (1000 * turn + index));
-                const bins = { end_s, part: ones(1), lock: ones(2), guard: ones(1), frequency_hz: pair, phase_error_deg: pair, force: pair, drive: pair, voltage_v: pair };
-                const lines = ones(0).map((_, index) => ({ is: "point", number: 1000 * turn + index, level: 1, accepted: true, quality: "good", end_sample: 0 }));
-                for (const part of [traces, points, events]) part.take({ bins, lines });
-                if (turn % 50 === 0) { points.draw(); events.draw(); }
-            }
-            points.draw(); events.draw();
-            done([traces.time.length, traces.bands[4][1].length, points.points.size, points.rows.size, table.rows.length, list.children.length]);
-        })().catch((error) => done(String(error)));"""
-    )
-    assert kept == [3000, 3000, 5000, 200, 201, 300]
+    bins, of_the_last_band, points, rows_with_the_head, events = page.driver.execute_async_script(WEEK)
+    assert (bins, of_the_last_band, points, rows_with_the_head, events) == (3000, 3000, 5000, 201, 300)
+
+
+def test_recordings_of_a_folder_are_listed_with_figure_and_table(browser, serve, told, tmp_path):
+    (tmp_path / "spoilt.h5").write_bytes(b"no recording")
+    browser.open(serve(always(told), folder=tmp_path))
+    browser.until(lambda: browser.driver.find_elements("css selector", "#entries details"), "the file")
+    browser.shows("entries", "spoilt.h5")
+    browser.expected = ("figure.png", "table.txt")  # a file that cannot be read has neither
+    browser.driver.find_element("css selector", "#entries summary").click()
+    browser.shows("entries", "there is no figure of it")
+    browser.shows("entries", "cannot be")

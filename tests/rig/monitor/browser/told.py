@@ -56,15 +56,12 @@ class Told:
 
     def measure(self, number, **more):
         """Add a point."""
-        amplitude = 1e-4 * (1 + number)
-        self.tell(
-            **{
-                "is": "point", "number": number, "level": 0.1 * (1 + number), "level_unit": "V", "quality": "good",
-                "accepted": True, "reason": "", "warnings": [], "end_sample": 5000 * (1 + number), "frequency_hz": 24.4 + 0.05 * number,
-                "amplitude_m": amplitude, "force_n": 0.02 * (1 + number), "damping_ratio": 0.004 + 1e-5 * number,
-                "damping_ratio_std": 4e-6, "phase_error_deg": 0.01, "force_purity": 0.98, "modal_frequency_std_hz": 0.01, **more,
-            }
-        )  # fmt: skip
+        more = {"quality": "good", "accepted": True, "reason": "", "warnings": [], **more}
+        more |= {"level": 0.1 * (1 + number), "level_unit": "V", "end_sample": 5000 * (1 + number)}
+        more |= {"amplitude_m": 1e-4 * (1 + number), "force_n": 0.02 * (1 + number)}
+        more |= {"frequency_hz": 24.4 + 0.05 * number, "modal_frequency_std_hz": 0.01}
+        more |= {"damping_ratio": 0.004 + 1e-5 * number, "damping_ratio_std": 4e-6}
+        self.tell(**{"is": "point", "number": number, "phase_error_deg": 0.01, "force_purity": 0.98, **more})
 
     def trace(self, count):
         """Add bins of a tenth of a second."""
