@@ -4,7 +4,7 @@ import { percent, quantity } from "./format.js";
 import { grade } from "./status.js";
 
 export class Bars {
-  every = 150;
+  every = 250;
 
   constructor(list) {
     this.list = list;

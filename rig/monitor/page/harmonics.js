@@ -10,7 +10,7 @@ const LOOKS = ["force", "response"];
 const WIDTH = 0.36; // of the distance between two orders
 
 export class Harmonics {
-  every = 200;
+  every = 250;
 
   constructor(parent, hint) {
     this.hint = hint;

@@ -31,7 +31,7 @@ const ERRORS = {
 const PRESENT = { amplitude_m: "displacement_mm", frequency_hz: "frequency_hz", force_n: "force_n" };
 
 export class Points {
-  every = 100;
+  every = 250;
 
   constructor(parent, table, hint) {
     this.hint = hint;

@@ -12,7 +12,7 @@ const LOOKS = [
 const HELD = 0.97; // how slowly a scale shrinks: a curve that grows is shown at once
 
 export class Scope {
-  every = 66;
+  every = 100;
 
   constructor(parent, hint) {
     this.hint = hint;

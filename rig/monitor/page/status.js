@@ -29,7 +29,7 @@ function say(element, text) {
 }
 
 export class Status {
-  every = 66;
+  every = 100;
 
   constructor(feed) {
     this.feed = feed;

@@ -16,7 +16,7 @@ const STRIPS = [
 ];
 
 export class Traces {
-  every = 100;
+  every = 200;
 
   constructor(parent, span) {
     this.span = span;
