@@ -27,7 +27,7 @@ const feed = new Feed(token, (message) => {
     part.take(message);
     part.dirty = true;
   }
-  if (message.is === "whole") document.body.dataset.run = message.facts ? "yes" : "none";
+  if (message.is === "whole") document.body.dataset.run = message.facts || message.frame ? "yes" : "none";
   wait();
 });
 

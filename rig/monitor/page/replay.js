@@ -32,9 +32,9 @@ export class Replay {
 
   draw() {
     this.section.hidden = !this.replay;
+    document.body.dataset.replay = this.replay ? "yes" : "no"; // where a run begins instead, STOP comes back
     if (!this.replay) return;
     const { time_s: time, duration_s: whole, playing, speed } = this.replay;
-    document.body.dataset.replay = "yes";
     this.play.textContent = playing ? "pause" : "play";
     if (!this.held) {
       this.seek.max = whole;

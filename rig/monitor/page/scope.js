@@ -24,6 +24,7 @@ export class Scope {
       return { scale: `y${index}`, stroke: () => ink[look.ink], dash: look.dash, width: 1.8, points: { show: false } };
     });
     this.plot = plot(place(parent, "canvas", "Output, force and response over the last periods"), {
+      padding: [8, 24, 0, 6],
       scales,
       axes: [axis({ size: 20, space: 70, values: (made, all) => (this.scope?.t_ms?.length ? ticks(made, all).map((text) => `${text} ms`) : []) }), axis({ scale: "y0", size: 12, values: () => [], ticks: { show: false } })],
       series: [{}, ...series],

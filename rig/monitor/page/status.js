@@ -18,7 +18,6 @@ const SHAPES = {
   stopped: "stopped",
   finished: "finished",
 };
-const OVER = ["tripped", "stopped", "finished"];
 const HARDWARE = "USE THE HARDWARE STOP";
 
 const at = (id) => document.getElementById(id);
@@ -83,7 +82,7 @@ export class Status {
     const silent = (performance.now() - this.feed.heard) / 1000;
     if (!message) return this.feed.refused ? "gone" : "waiting";
     if (silent > GONE_S || (this.feed.refused && silent > STALE_S)) return "gone";
-    if (!message.facts && !this.facts) return "none";
+    if (!this.facts && !message.frame) return "none";
     if (silent > STALE_S) return "stale";
     if (!message.connected) return this.ended ? "over" : "died";
     return this.age() > STALE_S ? "stale" : "live";
@@ -107,7 +106,7 @@ export class Status {
     say(at("state"), state);
     at("shape").setAttribute("href", `#shape-${away ? "away" : (SHAPES[known] ?? "starting")}`);
     say(at("detail"), away ? `last known: ${known}` : this.detail(connection, frame));
-    say(at("cause"), away ? HARDWARE : OVER.includes(known) || known === "ramping down" ? (frame.cause ?? "") : "");
+    say(at("cause"), away ? HARDWARE : (frame?.cause ?? ""));
     say(at("connection"), this.words(connection));
   }
 
@@ -115,7 +114,7 @@ export class Status {
     if (connection === "stale") return `STALE: nothing new for ${number(this.age(), 1)} s`;
     if (!frame || connection === "none") return "";
     const [good, wanted] = frame.settled ?? [];
-    const off = frame.output_off ? "OUTPUT AT 0 V" : frame.guard;
+    const off = this.message.replay ? "replay, nothing moves" : frame.output_off ? "OUTPUT AT 0 V" : frame.guard;
     if (frame.state === "settling" && wanted) return `${good} of ${wanted} periods · ${off}`;
     return off ?? "";
   }
@@ -148,7 +147,7 @@ export class Status {
     say(at("force"), quantity(frame.force_n, "N"));
     say(at("voltage"), `output ${quantity(frame.voltage_v, "V")}`);
     say(at("displacement"), quantity(frame.displacement_mm, "mm"));
-    say(at("acceleration"), `acceleration ${quantity(frame.acceleration_m_s2, "m/s²")}`);
+    say(at("acceleration"), `acceleration ${quantity(frame.acceleration_m_s2, "m/s²", 3)}`);
     this.drawNearest(frame.shares ?? []);
     this.drawLoop(frame);
   }

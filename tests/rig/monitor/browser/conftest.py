@@ -4,6 +4,7 @@ import os
 import shutil
 import threading
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 import pytest
 
@@ -26,22 +27,28 @@ def without_a_browser(why):
 
 @pytest.fixture(scope="session")
 def chromium():
-    found = [next(filter(None, map(shutil.which, names)), None) for names in PROGRAMS]
-    if None in found:
+    programs = [next(filter(None, map(shutil.which, names)), None) for names in PROGRAMS]
+    if None in programs:
         without_a_browser("no Chromium with chromedriver is found")
-    try:
-        from selenium import webdriver
-    except ImportError:
+    if find_spec("selenium") is None:
         without_a_browser("selenium is not installed")
+    driver = started(*programs)
+    yield Browser(driver)
+    driver.quit()
+
+
+def started(chromium="chromium", chromedriver="chromedriver"):
+    """Start a browser."""
+    from selenium import webdriver
+
     options = webdriver.ChromeOptions()
-    options.binary_location = found[0]
+    options.binary_location = shutil.which(chromium)
     for argument in ARGUMENTS:
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(found[1]))
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which(chromedriver)))
     driver.set_page_load_timeout(PATIENCE_S)
-    yield Browser(driver)
-    driver.quit()
+    return driver
 
 
 class Browser:
