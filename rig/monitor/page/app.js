@@ -16,7 +16,7 @@ import { Traces } from "./traces.js";
 const at = (id) => document.getElementById(id);
 const token = at("token").value;
 
-new Stop(at("stop-form"), at("stopping")); // first: whatever fails below, STOP has its key
+const stop = new Stop(at("stop-form"), at("stopping")); // first: whatever fails below, STOP has its key
 
 let parts = [];
 let waiting = false;
@@ -55,6 +55,7 @@ function draw(now) {
 themes(at("theme"), () => parts.forEach((part) => part.recolour?.()));
 
 parts = [
+  stop,
   new Status(feed),
   new Replay(at("replay"), token),
   new Traces(at("strips"), at("span")),

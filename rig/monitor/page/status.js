@@ -120,12 +120,11 @@ export class Status {
   }
 
   words(connection) {
-    const age = number(Math.min(this.age(), 1e5), 2);
     return {
       waiting: "waiting for the first data",
       none: "no run is under way",
       live: this.message?.replay ? "replay of a recording" : this.feed.polled ? "live, without a socket" : "live",
-      stale: `stale: last data ${age} s ago`,
+      stale: "stale: nothing new for a second",
       over: "the run is over",
       died: "the run's process ended without a word",
       gone: "no answer from the monitor",

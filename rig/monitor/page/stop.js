@@ -22,6 +22,21 @@ export class Stop {
     });
   }
 
+  /** Forget what came of a stop of another run. */
+  reset({ facts }) {
+    const run = facts ? `${facts.process} ${facts.started}` : "";
+    if (run === this.run) return;
+    if (this.run !== undefined) {
+      this.asked = this.failed = false;
+      delete this.form.dataset.asked;
+    }
+    this.run = run;
+  }
+
+  take() {}
+
+  draw() {}
+
   say(state, heading, text = "") {
     this.form.dataset.asked = state;
     const [large, small] = this.words.children;
@@ -64,8 +79,10 @@ export class Stop {
   }
 
   async follow() {
+    const { run } = this;
     while (!DONE.includes(this.form.dataset.asked)) {
       await new Promise((done) => setTimeout(done, LOOK_MS));
+      if (this.run !== run) return;
       try {
         this.show(await this.ask("/stopping"));
       } catch {

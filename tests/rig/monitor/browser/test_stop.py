@@ -4,6 +4,7 @@ import pytest
 
 from rig.monitor.sources import always
 from tests.rig.monitor.browser.test_browser import DEAD_SOCKET, REFUSED
+from tests.rig.monitor.browser.told import Told
 
 ESCAPE = "\ue00c"
 
@@ -35,6 +36,21 @@ def test_other_keys_and_escape_held_down_ask_for_nothing_more(page, told):
     key(page)
     page.shows("stopping", "RAMPING DOWN")
     assert len(told.causes) == 1
+
+
+def test_what_came_of_a_stop_is_not_said_of_the_next_run(browser, serve, told):
+    shown = [told]
+    browser.open(serve(lambda before: shown[0]))
+    browser.is_connected("live")
+    click(browser)
+    told.end()
+    browser.shows("stopping", "OUTPUT AT 0 V")
+    shown[0] = Told(process=2)
+    browser.shows("state", "settling")
+    assert browser.text("stopping") == ""
+    click(browser)
+    browser.shows("stopping", "RAMPING DOWN")
+    assert len(shown[0].causes) == 1
 
 
 @pytest.mark.parametrize("how", [click, key])

@@ -23,10 +23,13 @@ FORCE = 0
 class Told:
     """A view of a run that settles at its third level, until a test says something else."""
 
-    def __init__(self):
+    def __init__(self, process=1):
         plan = load_plan(PLAN)
         about = {"operator": "Ada", "specimen_serial": "no. 7", "armed": {"how": "virtual"}}
-        self.facts = watched_facts(plan, bench_of(plan, PLAN), Path("/nowhere/told.h5"), about)
+        self.facts = watched_facts(
+            plan, bench_of(plan, PLAN), Path("/nowhere/told.h5"), about, started="2026-01-01T00:00:00+00:00"
+        )
+        self.facts["process"] = process
         self.connected = True
         self.causes = []
         self.age_s = 0.0
