@@ -20,6 +20,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from rig.live.layout import bin_dtype
 from rig.live.reader import View
 from rig.monitor.shown import as_json, shown_bins, shown_frame, shown_line
 from rig.text.printable import error_text
@@ -100,8 +103,8 @@ class Feed:
                     await asyncio.wait_for(self._wanted.wait(), UNWATCHED_S if self.view else WAITING_S)
 
     def close(self) -> None:
-        """End the thread."""
-        self._thread.shutdown(wait=False, cancel_futures=True)
+        """End the thread, so that nothing is read any more."""
+        self._thread.shutdown(cancel_futures=True)
 
     async def fresh(self) -> Moment:
         """Return what there is now."""
@@ -197,7 +200,9 @@ class Feed:
         """Return the message that brings a client from ``since`` to a moment."""
         bins = "null"
         if moment.view is not None and moment.facts is not None:
-            first, found = moment.view.bins(since.bins)
+            first, found = since.bins, np.zeros(0, bin_dtype(len(moment.facts["channels"])))
+            if moment.view is self.view:  # which may have been closed otherwise
+                first, found = moment.view.bins(since.bins)
             bins = _bins_text(first, found[: max(moment.place.bins - first, 0)], moment.facts)
         if since.view >= 0:
             return _next(moment, since, bins)

@@ -75,7 +75,6 @@ def application(site: Site) -> ASGIApp:
             task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await task
-            site.feed.close()
 
     routes = [
         Route("/", pages.index),

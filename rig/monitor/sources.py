@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from rig.errors import RecordingError
 from rig.live.place import runs
-from rig.live.reader import LiveRun, View
+from rig.live.reader import LiveRun, View, run_into
 from rig.monitor.shown import shown_line
 
 __all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
@@ -27,12 +27,13 @@ def always(view: View) -> Callable[[View | None], View]:
 class Latest:
     """Chooses the youngest run whose facts say that it is ``wanted``. One that has ended is shown until another begins.
 
-    ``instead`` is shown until a run begins.
+    ``instead`` is shown until a run begins; it stays open. ``close`` it when nobody reads any more.
     """
 
     def __init__(self, wanted: Wanted = lambda facts: True, instead: View | None = None) -> None:
         self._wanted, self._instead = wanted, instead
         self._looked_s = float("-inf")
+        self._run: LiveRun | None = None
 
     def __call__(self, shown: View | None) -> View | None:
         """Return the view to show, given the one that is shown."""
@@ -41,7 +42,16 @@ class Latest:
         if under_way or time.monotonic() - self._looked_s < LOOK_S:
             return shown
         self._looked_s = time.monotonic()
-        return self._found(shown) or shown
+        found = self._found(shown)
+        if found is not None:
+            self.close()
+            self._run = found
+        return found or shown
+
+    def close(self) -> None:
+        """Close the run that is shown."""
+        if self._run is not None:
+            self._run.close()
 
     def _found(self, shown: View | None) -> LiveRun | None:
         for folder in runs():
@@ -72,7 +82,10 @@ def chosen(what: Path | None) -> Latest:
     def into(facts: Mapping[str, Any]) -> bool:
         return Path(facts["recording"]) == path
 
-    return Latest(into, recorded(path) if path.exists() and Latest(into)(None) is None else None)
+    under_way = run_into(path)
+    if under_way is not None:
+        under_way.close()
+    return Latest(into, recorded(path) if path.exists() and under_way is None else None)
 
 
 def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
