@@ -13,9 +13,12 @@ LOOK_S = 0.02
 
 
 def stop(
-    file: Annotated[Path | None, typer.Argument(help="Recording of the run to stop; every run of yours if left out.")] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="Recording of the run to stop; every run of yours if left out.")
+    ] = None,
     timeout: Annotated[
-        float | None, typer.Option(metavar="S", help="Longest time to wait for 0 V; the run's ramp and 10 s if left out.", min=0.0)
+        float | None,
+        typer.Option(metavar="S", help="Longest time to wait for 0 V; the run's ramp and 10 s if left out.", min=0.0),
     ] = None,
 ) -> None:
     """Ramp runs down and wait until their output is at 0 V; status 1 if that is not known of all. No emergency stop."""

@@ -64,9 +64,9 @@ class RecordedPart:
                 out[name] = -1
         return out
 
-    def rows_until(self, sample: int) -> int:
-        """Return how many rows hold this sample and those before."""
-        return min(self._samples.rows_before(sample + 1), self.part.n_rows)
+    def rows_until(self, samples: int) -> int:
+        """Return how many rows the first ``samples`` samples have."""
+        return min(self._samples.rows_before(samples), self.part.n_rows)
 
     def unbroken_from(self, row: int) -> int:
         """Return the first row from which on all samples are stored up to ``row``."""
@@ -75,7 +75,7 @@ class RecordedPart:
     def bins(self, first: int, stop: int) -> np.ndarray:
         """Return bins of the traces, made as those of a run under way. A bin without a row holds no number."""
         out = np.zeros(stop - first, self._bin_dtype)
-        edges = [self.rows_until(n * self.bin_samples - 1) for n in range(first, stop + 1)]
+        edges = [self.rows_until(n * self.bin_samples) for n in range(first, stop + 1)]
         begin = max(edges[0] - 1, 0)
         rows = self.rows(begin, edges[-1])
         rate = self._bench.sample_rate_hz
@@ -156,7 +156,7 @@ class RecordedPart:
         return None
 
     def _fits(self, table: np.ndarray) -> bool:
-        """Return whether the rows of the first points lie in segments of these points."""
+        """Return whether the rows of the first points lie in segments of these points, or of those measured with them."""
         known = [point for point in self.part.points if "end_sample" in point][:5]
         return all(self._lies_in(table, point) for point in known)
 
@@ -165,5 +165,7 @@ class RecordedPart:
         at = int(self.part.rows("segment", last, last + 1)[0])
         if not 0 <= at < table.size:
             return False
-        place = int(table[at]["point"])
-        return 0 <= place < len(self._of.numbers) and self._of.numbers[place] == int(point["number"])
+        number = int(point["number"])
+        if number not in self._of.numbers:
+            return False
+        return int(table[at]["point"]) in self._of.plan.together(self._of.numbers.index(number))

@@ -1,5 +1,6 @@
 """A recording as it was while it was made: what was to be seen of the run, at any time of it."""
 
+import math
 import threading
 import time
 from bisect import bisect_right
@@ -132,19 +133,35 @@ class Replay:
             self._at_s, self._since_s = self._now_s(), None if self._since_s is None else time.monotonic()
             self.speed = speed
 
+    def control(self, action: str, value: float) -> None:
+        """Do what is asked on a page: ``pause``, ``play``, ``seek`` to a time in s, ``speed``; ValueError for anything else."""
+        if not math.isfinite(value):
+            raise ValueError(f"{action} {value}: a number is wanted")
+        if action == "speed":
+            try:
+                self.set_speed(value)
+            except RecordingError as error:
+                raise ValueError(str(error)) from error
+        elif action == "seek":
+            self.seek(value)
+        elif action in ("pause", "play"):
+            (self.pause if action == "pause" else self.play)()
+        else:
+            raise ValueError(f"{action!r}: pause, play, seek or speed is wanted")
+
     def request_stop(self, cause: str) -> None:
         """Refuse by `RecordingError`: nothing moves."""
         raise RecordingError("a recording is replayed: there is nothing to stop")
 
     def frame(self) -> Frame | None:
         """Return the state at the present time, from the rows up to it; None before the first row."""
-        part, sample = self._place()
-        rows = 0 if part is None else part.rows_until(sample)
+        part, samples = self._place()
+        rows = 0 if part is None else part.rows_until(samples)
         if part is None or rows == 0:
             return None
         first = max(part.unbroken_from(rows - 1), rows - window_rows(part.rows(0, 0).dtype))
         window = part.rows(first, rows)
-        state = self._state(part, sample, window)
+        state = self._state(part, samples, window)
         if window.size == 1:  # one row of several is stored here: no waveform, and nothing to say of its largest values
             window = window[:0]
         state["window"] = window.size
@@ -152,10 +169,10 @@ class Replay:
 
     def bins(self, first: int) -> tuple[int, np.ndarray]:
         """Return the bins up to the present time from number ``first`` on, of which the last `BINS` are kept."""
-        part, sample = self._place()
+        part, samples = self._place()
         if part is None:
             return 0, np.zeros(0, _bins_of(self.facts))
-        count = int(self._first_bins[part.number - 1]) + min(part.n_bins, (sample + 1) // part.bin_samples)
+        count = int(self._first_bins[part.number - 1]) + min(part.n_bins, samples // part.bin_samples)
         first = max(first, count - BINS, 0)
         out = [np.zeros(0, _bins_of(self.facts))]
         for one in self._parts:
@@ -169,13 +186,7 @@ class Replay:
 
     def lines(self, first: int) -> list[dict[str, Any]]:
         """Return what was told up to the present time, from number ``first`` on."""
-        part, sample = self._place()
-        if part is None:
-            return []
-        at = int(self._begins[part.number - 1]) + sample + 1
-        if self.time_s >= self.duration_s:
-            at = int(self._begins[-1])
-        return self._told[first : bisect_right(self._times, at)]
+        return self._told[first : bisect_right(self._times, self._samples_over())]
 
     def close(self) -> None:
         """Close the file."""
@@ -192,13 +203,17 @@ class Replay:
         gone_s = 0.0 if self._since_s is None else self.speed * (time.monotonic() - self._since_s)
         return min(self._at_s + gone_s, self.duration_s)
 
+    def _samples_over(self) -> int:
+        """Return how many samples of the recording are over."""
+        return min(round(self.time_s * self._rate), int(self._begins[-1]))
+
     def _place(self) -> tuple[RecordedPart | None, int]:
-        """Return the part that is shown and the last sample of it that is over."""
-        if not self._begins[-1]:
+        """Return the part that is shown, None before the first sample, and how many samples of it are over."""
+        over = self._samples_over()
+        if over == 0:
             return None, 0
-        sample = min(int(self.time_s * self._rate), int(self._begins[-1]) - 1)
-        at = int(np.searchsorted(self._begins, sample, side="right")) - 1
-        return self._parts[at], sample - int(self._begins[at])
+        at = int(np.searchsorted(self._begins, over, side="left")) - 1
+        return self._parts[at], over - int(self._begins[at])
 
     def _stretch(self, part: RecordedPart, number: int) -> np.ndarray:
         key = part.number, number
@@ -208,9 +223,9 @@ class Replay:
         return self._stretches[key]
 
     def _lines_of(self, part: RecordedPart) -> list[tuple[int, dict[str, Any]]]:
-        """Return what was told of a part, with the number of the sample in the recording at which it is to be told."""
+        """Return what was told of a part, each with the number of samples of the recording after which it is told."""
         begin, told = int(self._begins[part.number - 1]), part.part
-        lines: list[tuple[int, dict[str, Any]]] = [(begin, {**told.information, "is": "part"})]
+        lines: list[tuple[int, dict[str, Any]]] = [(begin + 1, {**told.information, "is": "part"})]
         events = [(begin + int(event.get("sample", 0)), {**event, "is": "event"}) for event in told.events]
         points = [
             (begin + sample, {**point, "is": "point"})
@@ -219,15 +234,15 @@ class Replay:
         lines += sorted([*events, *points], key=lambda line: line[0])
         if told.end is not None:
             lines.append((begin + part.n_samples, {**told.end, "is": "end"}))
-        return [(max(begin, min(sample, begin + part.n_samples)), line) for sample, line in lines]
+        return [(max(begin + 1, min(sample, begin + part.n_samples)), line) for sample, line in lines]
 
-    def _state(self, part: RecordedPart, sample: int, window: np.ndarray) -> np.void:
+    def _state(self, part: RecordedPart, samples: int, window: np.ndarray) -> np.void:
         last = window[-1]
         state: np.void = np.zeros(1, FRAME)[0]
         for name in ("value", "target", "late_us", "force_n", "drive_m_s2", "displacement_m", "phase_error_rad"):
             state[name] = np.nan
         guard, end = GuardMode(int(last["guard"])), part.part.end
-        state["sample"], state["part"], state["channel"], state["good_periods"] = sample, part.number, -1, -1
+        state["sample"], state["part"], state["channel"], state["good_periods"] = samples, part.number, -1, -1
         state["lock"], state["guard"] = last["lock"], guard
         if end is not None and guard in (GuardMode.RAMPING, GuardMode.OFF):
             state["reason"] = EndReason.__members__.get(str(end.get("reason", "")).upper(), EndReason.NONE)
@@ -252,7 +267,7 @@ class Replay:
         told = {int(line["number"]) for line in self.lines(0) if line["is"] == "point"}
         state["finished"], state["total"] = len(told), self.facts["points"]
         state["left_s"] = self.duration_s - self.time_s
-        if end is not None and sample + 1 >= part.n_samples:
+        if end is not None and samples >= part.n_samples:
             state["overruns"] = (end.get("loop") or {}).get("overruns", 0)
         return state
 

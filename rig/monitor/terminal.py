@@ -176,7 +176,7 @@ def _shares(shown: Mapping[str, Any], most: int, width: int) -> list[RenderableT
     shares = sorted(shown["shares"], key=lambda one: -one["share"] if math.isfinite(one["share"]) else 1.0)
     table = Table.grid(padding=(0, 1))
     for justify in ("left", "left", "right", "left", "right"):
-        table.add_column(justify=justify, no_wrap=True)  # type: ignore[arg-type]
+        table.add_column(justify=justify, no_wrap=True)
     bar = BAR if width < WIDE else max(8, width // 2 - 30)
     bar = min(bar, max(8, width - 60))
     for one in shares[:most]:
@@ -185,7 +185,9 @@ def _shares(shown: Mapping[str, Any], most: int, width: int) -> list[RenderableT
         style = WORDS.get(word, "")
         value = f"{figure(one['value'], '.3g')} of {one['of']:.3g} {one['unit']}"
         name = f"{one['name']} {one['what']}"
-        table.add_row(name, Text(_bar(part, bar), style=style), f"{figure(100.0 * part, '.0f')} %", Text(word, style), value)
+        table.add_row(
+            name, Text(_bar(part, bar), style=style), f"{figure(100.0 * part, '.0f')} %", Text(word, style), value
+        )
     return [table]
 
 

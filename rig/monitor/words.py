@@ -78,7 +78,12 @@ def _columns(facts: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 def point_headings(facts: Mapping[str, Any]) -> list[str]:
     """Return the headings of `point_cells`, with units."""
     columns = _columns(facts)
-    return ["point", f"level {facts['level_unit']}", *(f"{c['heading']} {c['unit']}".strip() for c in columns), "quality"]
+    return [
+        "point",
+        f"level {facts['level_unit']}",
+        *(f"{c['heading']} {c['unit']}".strip() for c in columns),
+        "quality",
+    ]
 
 
 def point_cells(point: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
@@ -95,7 +100,9 @@ def point_text(point: Mapping[str, Any], facts: Mapping[str, Any]) -> str:
     """Return a point in one line."""
     number_, level, *values, quality = point_cells(point, facts)
     shown = [
-        f"{value} {column['unit']}".strip() if column["plain"] else f"{column['heading']} {value} {column['unit']}".strip()
+        f"{value} {column['unit']}".strip()
+        if column["plain"]
+        else f"{column['heading']} {value} {column['unit']}".strip()
         for column, value in zip(_columns(facts), values, strict=True)
         if value != "-"
     ]
