@@ -106,9 +106,14 @@ def _with_parameters(
 
 @contextmanager
 def shown(options: "RunOptions", columns: Any) -> "Iterator[RunOptions]":
-    """Add a display of the run's points to the options; ``columns`` are those of its kind of campaign."""
+    """Add a display of the run's points to the options; ``columns`` are those of its kind of campaign.
+
+    On a terminal, say first how to watch and stop the run from another.
+    """
     from rig.show.progress import RunProgress
 
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("in another terminal, `rig watch` shows this run and `rig stop` ramps it down", file=sys.stderr)
     progress = RunProgress(columns)
     try:
         yield replace(options, progress=progress)

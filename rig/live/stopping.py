@@ -40,15 +40,20 @@ def request_stop(folder: Path, cause: str) -> None:
 
 @contextmanager
 def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
-    """Look for a request while the rig is driven, in a thread of its own; ``stop`` gets its cause, once."""
-    over = threading.Event()
+    """Look for a request while the rig is driven, in a thread of its own; ``stop`` gets its cause, once.
+
+    One that was left before is heeded before anything else is done.
+    """
+    path, over = folder / STOP, threading.Event()
+    if path.exists():
+        stop(_cause(path))
+        over.set()
 
     def look() -> None:
         while not over.wait(LOOK_S):
-            if (folder / STOP).exists():
-                with suppress(OSError):
-                    over.wait(LOOK_S)  # for its text
-                stop(_cause(folder / STOP))
+            if path.exists():
+                over.wait(LOOK_S)  # for its text
+                stop(_cause(path))
                 return
 
     watch = threading.Thread(target=look, name="requests to stop", daemon=True)

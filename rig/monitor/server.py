@@ -273,4 +273,4 @@ def _refusal(scope: Scope, status: int, text: str) -> Response:
 
 
 def _files() -> list[Path]:
-    return [path for path in PAGE.iterdir() if path.suffix in TYPES and path.is_file()]
+    return [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]

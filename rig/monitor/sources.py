@@ -11,6 +11,7 @@ from typing import Any, cast
 from rig.errors import RecordingError
 from rig.live.place import runs
 from rig.live.reader import LiveRun, View, run_into
+from rig.monitor.shown import shown_line
 
 __all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
 
@@ -103,4 +104,7 @@ def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
 def of_an_earlier_run(path: Path) -> dict[str, Any]:
     """Return facts and points of a recording, to be drawn under those of the run that is shown."""
     view = recorded(path)
-    return {"facts": view.facts, "lines": [line for line in view.lines(0) if line["is"] == "point"]}
+    return {
+        "facts": view.facts,
+        "lines": [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"],
+    }
