@@ -20,8 +20,11 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from rig.live.layout import bin_dtype
 from rig.live.reader import View
-from rig.monitor.shown import as_json, shown_bins, shown_frame
+from rig.monitor.shown import as_json, shown_bins, shown_frame, shown_line
 from rig.text.printable import error_text
 
 __all__ = ["Feed", "Look", "Moment", "Place"]
@@ -31,8 +34,6 @@ STILL_S = 0.25
 """Longest time between two messages where nothing changes: they show that the server lives."""
 UNWATCHED_S, WAITING_S = 1.0, 0.2
 """Time between two looks while nobody watches: at a run, and for a run to begin."""
-BULKY = ("harmonics", "harmonics_std")
-"""Keys of a point that are left out: numbers for every channel and harmonic."""
 
 Look = Callable[[View | None], View | None]
 """Given the view that is shown, returns the one to show."""
@@ -102,8 +103,8 @@ class Feed:
                     await asyncio.wait_for(self._wanted.wait(), UNWATCHED_S if self.view else WAITING_S)
 
     def close(self) -> None:
-        """End the thread."""
-        self._thread.shutdown(wait=False, cancel_futures=True)
+        """End the thread, so that nothing is read any more."""
+        self._thread.shutdown(cancel_futures=True)
 
     async def fresh(self) -> Moment:
         """Return what there is now."""
@@ -160,7 +161,7 @@ class Feed:
         connected = view.connected  # asked first: what was told last is read afterwards
         new = view.lines(len(self._raw))
         self._raw += new
-        self._lines += [_text(_slim(line)) for line in new]
+        self._lines += [_text(shown_line(line, view.facts)) for line in new]
         frame = view.frame()
         key = connected, len(self._raw), frame and (int(frame.state["written_ns"]), int(frame.state["sample"]))
         changed = key != self._key
@@ -199,7 +200,9 @@ class Feed:
         """Return the message that brings a client from ``since`` to a moment."""
         bins = "null"
         if moment.view is not None and moment.facts is not None:
-            first, found = moment.view.bins(since.bins)
+            first, found = since.bins, np.zeros(0, bin_dtype(len(moment.facts["channels"])))
+            if moment.view is self.view:  # which may have been closed otherwise
+                first, found = moment.view.bins(since.bins)
             bins = _bins_text(first, found[: max(moment.place.bins - first, 0)], moment.facts)
         if since.view >= 0:
             return _next(moment, since, bins)
@@ -211,10 +214,6 @@ class Feed:
 def _next(moment: Moment, since: Place, bins: str) -> str:
     lines = ",".join(moment.lines[since.lines : moment.place.lines])
     return f'{{"is":"next","lines":[{lines}],"bins":{bins},{moment.state}}}'
-
-
-def _slim(line: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in line.items() if key not in BULKY}
 
 
 def _text(value: Any) -> str:

@@ -22,7 +22,8 @@ def plain_page(
     return HTMLResponse(
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f'{refresh}<title>{escape(heading)}</title><link rel="stylesheet" href="/page/plain.css"></head>'
+        f'{refresh}<title>{escape(heading)}</title><link rel="icon" href="/page/icon.svg">'
+        '<link rel="stylesheet" href="/page/plain.css"></head>'
         f'<body class="{escape(kind)}"><main><h1 role="status">{escape(heading)}</h1>{paragraphs}'
         '<p><a href="/">Back to the page</a></p></main></body></html>',
         status,

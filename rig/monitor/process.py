@@ -162,8 +162,12 @@ class PageServer:
         return f"{self.scheme}://{self.address.host}:{self.port}/?token={self.keys.entry}"
 
     def run(self) -> None:
-        """Serve until a signal comes or `end` is called."""
-        asyncio.run(self._serve())
+        """Serve until a signal comes or `end` is called; then close what was chosen to be shown."""
+        try:
+            asyncio.run(self._serve())
+        finally:
+            self.feed.close()
+            getattr(self.look, "close", lambda: None)()
 
     def end(self) -> None:
         """Let the server end; may be called by any thread."""

@@ -75,7 +75,6 @@ def application(site: Site) -> ASGIApp:
             task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
                 await task
-            site.feed.close()
 
     routes = [
         Route("/", pages.index),
@@ -274,4 +273,4 @@ def _refusal(scope: Scope, status: int, text: str) -> Response:
 
 
 def _files() -> list[Path]:
-    return [path for path in PAGE.iterdir() if path.suffix in TYPES and path.is_file()]
+    return [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]

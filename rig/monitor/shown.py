@@ -11,11 +11,12 @@ from rig.live.reader import Frame
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind
 
-__all__ = ["as_json", "fundamentals_of", "shown_bins", "shown_frame", "state_of"]
+__all__ = ["as_json", "fundamentals_of", "shown_bins", "shown_frame", "shown_line", "state_of"]
 
 SCOPE_PERIODS = 3
 SCOPE_POINTS = 400
 HARMONICS = 10
+BULKY = {"harmonics", "harmonics_std"}  # numbers for every channel and harmonic
 RECORDS = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 GUARDS = {
     GuardMode.DISARMED: "not armed",
@@ -132,6 +133,19 @@ def shown_bins(bins: np.ndarray, facts: Mapping[str, Any]) -> dict[str, Any]:
         at = _index(facts, role)
         out[role] = [bins["inputs"][:, at, 0], bins["inputs"][:, at, 1]]
     return out
+
+
+def shown_line(line: Mapping[str, Any], facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a line without what is too much to be shown; a point instead with standard errors of its fundamentals.
+
+    ``force_std_n`` and ``amplitude_std_m`` are those of the force's and of the drive point's displacement amplitude.
+    """
+    shown = {key: value for key, value in line.items() if key not in BULKY}
+    errors, frequency = line.get("harmonics_std"), line.get("frequency_hz")
+    if errors and frequency:
+        shown["force_std_n"] = errors[_index(facts, "force")][1]
+        shown["amplitude_std_m"] = errors[_index(facts, "drive")][1] / (2.0 * math.pi * frequency) ** 2
+    return shown
 
 
 def as_json(value: Any, digits: int = 6) -> Any:

@@ -10,7 +10,8 @@ from typing import Any, cast
 
 from rig.errors import RecordingError
 from rig.live.place import runs
-from rig.live.reader import LiveRun, View
+from rig.live.reader import LiveRun, View, run_into
+from rig.monitor.shown import shown_line
 
 __all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
 
@@ -26,12 +27,13 @@ def always(view: View) -> Callable[[View | None], View]:
 class Latest:
     """Chooses the youngest run whose facts say that it is ``wanted``. One that has ended is shown until another begins.
 
-    ``instead`` is shown until a run begins.
+    ``instead`` is shown until a run begins. ``close`` it when nobody reads any more: it closes what it has shown.
     """
 
     def __init__(self, wanted: Wanted = lambda facts: True, instead: View | None = None) -> None:
         self._wanted, self._instead = wanted, instead
         self._looked_s = float("-inf")
+        self._shown: Any = instead
 
     def __call__(self, shown: View | None) -> View | None:
         """Return the view to show, given the one that is shown."""
@@ -40,7 +42,17 @@ class Latest:
         if under_way or time.monotonic() - self._looked_s < LOOK_S:
             return shown
         self._looked_s = time.monotonic()
-        return self._found(shown) or shown
+        found = self._found(shown)
+        if found is not None:
+            self.close()
+            self._shown = found
+        return found or shown
+
+    def close(self) -> None:
+        """Close what is shown."""
+        if self._shown is not None:
+            self._shown.close()
+            self._shown = None
 
     def _found(self, shown: View | None) -> LiveRun | None:
         for folder in runs():
@@ -71,7 +83,10 @@ def chosen(what: Path | None) -> Latest:
     def into(facts: Mapping[str, Any]) -> bool:
         return Path(facts["recording"]) == path
 
-    return Latest(into, recorded(path) if path.exists() and Latest(into)(None) is None else None)
+    under_way = run_into(path)
+    if under_way is not None:
+        under_way.close()
+    return Latest(into, recorded(path) if path.exists() and under_way is None else None)
 
 
 def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
@@ -89,4 +104,7 @@ def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
 def of_an_earlier_run(path: Path) -> dict[str, Any]:
     """Return facts and points of a recording, to be drawn under those of the run that is shown."""
     view = recorded(path)
-    return {"facts": view.facts, "lines": [line for line in view.lines(0) if line["is"] == "point"]}
+    return {
+        "facts": view.facts,
+        "lines": [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"],
+    }

@@ -7,9 +7,8 @@ import sys
 
 import pytest
 
-from rig.live.reader import run_into
 from rig.monitor import stopping
-from rig.monitor.sources import Latest
+from rig.monitor.sources import Latest, chosen
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode
 from tests.rig.monitor.scripted import Scripted
@@ -46,43 +45,45 @@ def test_the_form_brings_a_run_to_0_v(tmp_path):
     output = tmp_path / "run.h5"
     command = ["run", "magnet-beam/backbone", "--realtime", "-o", str(output)]
     code = "from rig.cli import main; main()"
-    with subprocess.Popen([sys.executable, "-c", code, *command], stderr=subprocess.PIPE, text=True) as campaign:
-        wait_until(lambda: (run := run_into(output)) is not None and run.frame() is not None, "the run under way")
-        with served(Latest()) as server:
-            inside = Visitor(server.url).enter()
-            wait_until(lambda: (inside.state()["frame"] or {}).get("voltage_v", 0.0) > 0.05, "some output")
-            answer = inside.stop()
-            said = [heading(answer)]
-            while onward(answer):
-                answer = inside.get("/stopping")
-                said.append(heading(answer))
-            assert said[-1] == "OUTPUT AT 0 V"
-            assert "stopped on the page" in answer.text
-            assert set(said) <= {"STOP IS ASKED FOR", "RAMPING DOWN", "OUTPUT AT 0 V"}
-            _, err = campaign.communicate()
-            wait_until(lambda: not inside.state()["connected"], "the run's end")
-            assert heading(inside.get("/stopping")) == "OUTPUT AT 0 V"
+    with (
+        subprocess.Popen([sys.executable, "-c", code, *command], stdout=subprocess.PIPE, text=True) as campaign,
+        served(chosen(output)) as server,
+    ):
+        inside = Visitor(server.url).enter()
+        wait_until(lambda: (inside.state()["frame"] or {}).get("voltage_v", 0.0) > 0.05, "some output")
+        answer = inside.stop()
+        said = [heading(answer)]
+        while onward(answer):
+            answer = inside.get("/stopping")
+            said.append(heading(answer))
+        assert said[-1] == "OUTPUT AT 0 V"
+        assert set(said) <= {"STOP IS ASKED FOR", "RAMPING DOWN", "OUTPUT AT 0 V"}
+        printed, _ = campaign.communicate()
+        wait_until(lambda: not inside.state()["connected"], "the run's end")
+        last = inside.get("/stopping")
+        assert heading(last) == "OUTPUT AT 0 V"
+        assert "stopped on the page" in last.text
     assert campaign.returncode == 1
-    assert "stopped on the page" in err
+    assert "stopped on the page" in printed
     with Recording(output) as recording:
         end = recording.parts[-1].end
         assert end is not None
         assert end["text"] == "stopped on the page"
-        assert end["reason"] == "interrupted"
-        rows = recording.parts[-1].rows(0, recording.n_rows)
-        assert rows["output_v"][-1] == 0.0
-        assert max(abs(rows["output_v"])) > 0.01
+        assert end["reason"] == "stop_requested"
+        output_v = abs(recording.parts[-1].rows("output_v"))
+        assert output_v[-1] == 0.0
+        assert output_v.max() > 0.05
 
 
 def test_from_asked_over_ramping_to_0_v(run, inside):
     assert heading(inside.get("/stopping")) == "NO STOP WAS ASKED FOR"
     assert heading(inside.stop()) == "STOP IS ASKED FOR"
     assert run.stops == ["stopped on the page"]
-    run.step(GuardMode.RAMPING, EndReason.INTERRUPTED, voltage_v=0.321)
+    run.step(GuardMode.RAMPING, EndReason.STOP_REQUESTED, voltage_v=0.321)
     ramping = inside.get("/stopping")
     assert (heading(ramping), onward(ramping)) == ("RAMPING DOWN", "/stopping")
     assert "0.321 V" in ramping.text
-    run.step(GuardMode.OFF, EndReason.INTERRUPTED)
+    run.step(GuardMode.OFF, EndReason.STOP_REQUESTED)
     off = inside.get("/stopping")
     assert (heading(off), onward(off)) == ("OUTPUT AT 0 V", None)
     assert "This is no emergency stop" in off.text
@@ -92,7 +93,7 @@ def test_a_script_gets_the_same_as_data(run, inside):
     answer = inside.stop(Accept="application/json")
     assert answer.headers["content-type"] == "application/json"
     assert answer.text.startswith('{"state":"asked","text":"STOP IS ASKED FOR.')
-    run.step(GuardMode.OFF, EndReason.INTERRUPTED)
+    run.step(GuardMode.OFF, EndReason.STOP_REQUESTED)
     assert '"state":"off"' in inside.get("/stopping", Accept="application/json").text
     assert '"state":"failed"' in inside.stop(Accept="application/json", Origin="null").text
 
@@ -138,7 +139,7 @@ def test_a_run_that_does_not_answer_says_to_use_the_hardware_stop(run, inside, m
 
 def test_a_ramp_that_never_ends_says_to_use_the_hardware_stop(run, inside, monkeypatch):
     inside.stop()
-    run.step(GuardMode.RAMPING, EndReason.INTERRUPTED, voltage_v=1.0)
+    run.step(GuardMode.RAMPING, EndReason.STOP_REQUESTED, voltage_v=1.0)
     monkeypatch.setattr(stopping, "REST_S", -1.0)
     answer = inside.get("/stopping")
     assert heading(answer) == "USE THE HARDWARE STOP"
@@ -152,6 +153,12 @@ def test_without_a_run_there_is_nothing_to_stop():
         assert onward(answer) is None
 
 
+def test_a_recording_cannot_be_stopped_and_frightens_nobody(run, inside):
+    run.refuses = True
+    run.replay_state = lambda: {"time_s": 0.0, "duration_s": 1.0, "playing": True, "speed": 1.0}
+    assert heading(inside.stop()) == "THIS IS A RECORDING"
+
+
 def test_the_stop_page_has_no_script_and_loads_only_its_style(inside):
     answer = inside.stop()
     assert "<script" not in answer.text
@@ -161,7 +168,7 @@ def test_the_stop_page_has_no_script_and_loads_only_its_style(inside):
 
 
 def test_what_a_run_says_of_itself_is_text_on_the_page(run, inside):
-    run.step(GuardMode.OFF, EndReason.INTERRUPTED)
+    run.step(GuardMode.OFF, EndReason.STOP_REQUESTED)
     run.tell({"is": "end", "text": '<script>alert("x")</script>'})
     assert "<script" not in inside.get("/stopping").text
     run.facts["bench"] = "</title><script>x</script>"

@@ -108,6 +108,7 @@ class Visitor:
         headers = {"Cookie": cookie} | changes.pop("headers", {})
         if self.scheme == "https":
             changes["ssl"] = self.context
+        changes.setdefault("max_size", None)
         address = f"{self.origin.replace('http', 'ws', 1)}/feed?token={token}"
         return connect(address, origin=origin, additional_headers=headers, proxy=None, open_timeout=LONG_S, **changes)
 
