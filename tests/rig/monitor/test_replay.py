@@ -83,7 +83,9 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
             assert now["time_s"] == before["time_s"]
             assert now["frequency_hz"] == pytest.approx(before["frequency_hz"], rel=5e-3)
             assert now["target"] == pytest.approx(before["target"])
-            assert now["voltage_v"] == pytest.approx(before["voltage_v"], abs=0.01)  # a row has what is on the converter
+            assert now["voltage_v"] == pytest.approx(
+                before["voltage_v"], abs=0.01
+            )  # a row has what is on the converter
             assert now["level"] == pytest.approx(before["level"], abs=0.01)
             if before["state"] == "recording":
                 assert now["force_n"] == pytest.approx(before["force_n"], rel=0.1)
