@@ -146,7 +146,6 @@ class PageServer:
             server_header=False,
             ws_max_size=LARGEST_MESSAGE,
             ws_per_message_deflate=False,
-            limit_concurrency=MOST_CONNECTIONS,
             h11_max_incomplete_event_size=LARGEST_HEADERS,
             timeout_graceful_shutdown=GRACE_S,
         )
