@@ -181,7 +181,7 @@ const done = arguments[0];
     const load = (name) => import(`/page/${name}.js`);
     const [{ Traces }, { Points }, { Events }] = await Promise.all(["traces", "points", "events"].map(load));
     const make = (tag) => document.createElement(tag);
-    const [span, table, list] = [make("select"), make("table"), make("ol")];
+    const [span, table, list] = [make("button"), make("table"), make("ol")];
     table.createTHead();
     table.createTBody();
     make("div").append(table);
