@@ -99,8 +99,8 @@ export class Points {
     this.shownPresent = present;
     this.changed = false;
     const refused = [...this.points.values()].filter((point) => !point.accepted).length;
-    const over = this.earlier.length ? `; grey: ${this.earlier.length} of an earlier run` : "";
-    const bad = refused ? `, ${refused} not accepted` : "";
+    const over = this.earlier.length ? " ◇ earlier" : "";
+    const bad = refused ? `, ${refused} refused` : "";
     const text = `${this.points.size} of ${this.facts.points}${bad}: ● good ○ warned ✕ refused + now${over}`;
     if (this.hint.textContent !== text) this.hint.textContent = text;
   }
