@@ -30,7 +30,7 @@ def page_beside(wanted: bool) -> Iterator[None]:
     try:
         page = subprocess.Popen(
             [sys.executable, "-P", "-m", "rig.monitor", str(os.getpid())],
-            stdin=subprocess.PIPE,  # ends with this process, whichever way that ends
+            stdin=subprocess.PIPE,  # ends with the command, whichever way that ends
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env=child_environment(),
@@ -46,6 +46,8 @@ def page_beside(wanted: bool) -> Iterator[None]:
         yield
     finally:
         saying.join(START_S)
+        assert page.stdin is not None
+        page.stdin.close()
         page.returncode = 0  # it may stay: nobody waits for it
 
 

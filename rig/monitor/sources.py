@@ -27,13 +27,13 @@ def always(view: View) -> Callable[[View | None], View]:
 class Latest:
     """Chooses the youngest run whose facts say that it is ``wanted``. One that has ended is shown until another begins.
 
-    ``instead`` is shown until a run begins; it stays open. ``close`` it when nobody reads any more.
+    ``instead`` is shown until a run begins. ``close`` it when nobody reads any more: it closes what it has shown.
     """
 
     def __init__(self, wanted: Wanted = lambda facts: True, instead: View | None = None) -> None:
         self._wanted, self._instead = wanted, instead
         self._looked_s = float("-inf")
-        self._run: LiveRun | None = None
+        self._shown: Any = instead
 
     def __call__(self, shown: View | None) -> View | None:
         """Return the view to show, given the one that is shown."""
@@ -45,13 +45,14 @@ class Latest:
         found = self._found(shown)
         if found is not None:
             self.close()
-            self._run = found
+            self._shown = found
         return found or shown
 
     def close(self) -> None:
-        """Close the run that is shown."""
-        if self._run is not None:
-            self._run.close()
+        """Close what is shown."""
+        if self._shown is not None:
+            self._shown.close()
+            self._shown = None
 
     def _found(self, shown: View | None) -> LiveRun | None:
         for folder in runs():

@@ -44,6 +44,8 @@ class Stopping:
         cause = f" {shown['cause']}." if shown.get("cause") else ""
         if moment.view is None or moment.facts is None:
             return "none", "NO RUN IS UNDER WAY", "There is nothing to stop here."
+        if hasattr(moment.view, "replay_state"):
+            return "none", "THIS IS A RECORDING", "Nothing is driven from here: there is nothing to stop."
         if not moment.connected:
             if shown.get("output_off") or (moment.ended and "guard" not in shown):  # the last: nothing was driven
                 return "off", "OUTPUT AT 0 V", f"The run is over.{cause}"

@@ -51,12 +51,22 @@ ALLOWED = {
     "analyse modes --bench magnet-beam": {"numpy", "pydantic", "simulators"} | NUMBA | {"scipy.linalg"},
     "doctor": {"numpy", "pydantic", "serial", "rig.loop", "multiprocessing"},
     "run plan.toml -o new.h5": FILES | NUMBA | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
-    "run plan.toml -o monitored.h5 --monitor": FILES | NUMBA | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
+    "run plan.toml -o monitored.h5 --monitor": FILES
+    | NUMBA
+    | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
     "check --bench magnet-beam -o check.h5": FILES | NUMBA | OPTIMIZE | {"simulators", "rig.loop", "multiprocessing"},
 }
 """What a command may load beyond Python and what is `LIGHT`: libraries, subpackages of scipy, and the heavy ones of `PARTS`."""
 
-PARTS = ("simulators", "rig.loop", "rig.rehearsal.rehearsal", "identification.pnlss", "multiprocessing", "asyncio", "rig.monitor")
+PARTS = (
+    "simulators",
+    "rig.loop",
+    "rig.rehearsal.rehearsal",
+    "identification.pnlss",
+    "multiprocessing",
+    "asyncio",
+    "rig.monitor",
+)
 """Packages of the distribution and of Python that take long and of which few commands have use."""
 
 LOADED = f"""

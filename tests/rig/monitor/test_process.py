@@ -22,6 +22,19 @@ from tests.rig.monitor.scripted import Scripted, facts, point
 from tests.rig.monitor.visitor import Visitor, served
 from tests.waiting import LONG_S, wait_until
 
+PLAN = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4]
+record_periods = 20
+
+[controller]
+low_pass_rad_s = 6.283185307179586
+k1 = 2.0
+k2 = 6.283185307179586
+centre_frequency_hz = 24.0
+frequency_window_hz = [21.933, 26.807]
+"""
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals, and files only their user reads")
 
 
@@ -111,9 +124,7 @@ def test_a_server_that_is_killed_leaves_the_run_alone_and_another_takes_over(tmp
 
 def test_a_run_with_a_page_beside_it(tmp_path):
     """The run says where the page is; the page stays after the run and shows its end."""
-    plan = "kind = 'backbone'\nbench = 'magnet-beam'\nlevels_v = [0.4]\nrecord_periods = 20\n[controller]\nk1 = 2.0\nk2 = 6.28\n"
-    more = "low_pass_rad_s = 6.28\ncentre_frequency_hz = 24.0\nfrequency_window_hz = [21.9, 26.8]\n"
-    (tmp_path / "plan.toml").write_text(plan + more)
+    (tmp_path / "plan.toml").write_text(PLAN)
     with started("run", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "run.h5"), "--realtime", "--monitor") as run:
         assert run.stderr is not None
         line = run.stderr.readline()

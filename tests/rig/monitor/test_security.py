@@ -3,7 +3,7 @@
 import http.client
 import re
 import socket
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -281,10 +281,8 @@ def test_a_form_that_never_comes_whole_is_given_up(server, inside, run, monkeypa
 
 def test_headers_are_bounded(server):
     visitor = Visitor(server.url)
-    try:
+    with suppress(http.client.HTTPException, OSError):  # it may hang up before all is said
         assert visitor.get("/", X_Long="x" * 200_000).status in (400, 431)
-    except (http.client.HTTPException, OSError):
-        pass
     assert visitor.get("/page/plain.css").status == 200
 
 
@@ -293,8 +291,7 @@ def test_a_long_message_ends_its_socket_and_no_other(inside):
         heard(loud)
         loud.send("x" * 2000)
         with pytest.raises(ConnectionClosed) as closed:
-            while True:
-                heard(loud)
+            list(iter(lambda: heard(loud), None))  # what was still on its way
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 1009
         quiet.send("hello")  # whatever it says
@@ -303,17 +300,15 @@ def test_a_long_message_ends_its_socket_and_no_other(inside):
 
 
 def test_a_hundred_sockets_are_too_many_and_stop_still_stops(server, inside, run):
-    refused = 0
+    told = []
     with ExitStack() as sockets:
         for _ in range(100):
             one = sockets.enter_context(inside.feed())
             try:
-                assert heard(one)["is"] == "whole"
+                told.append(heard(one)["is"])
             except ConnectionClosed as closed:
-                assert closed.rcvd is not None
-                assert closed.rcvd.code == 1013
-                refused += 1
-        assert refused == 100 - MOST_SOCKETS
+                told.append(closed.rcvd and closed.rcvd.code)
+        assert told == ["whole"] * MOST_SOCKETS + [1013] * (100 - MOST_SOCKETS)
         assert inside.stop().status == 200
         assert run.stops == ["stopped on the page"]
     wait_until(lambda: server.feed.clients == 0, "all sockets closed")

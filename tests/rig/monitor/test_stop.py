@@ -45,22 +45,24 @@ def test_the_form_brings_a_run_to_0_v(tmp_path):
     output = tmp_path / "run.h5"
     command = ["run", "magnet-beam/backbone", "--realtime", "-o", str(output)]
     code = "from rig.cli import main; main()"
-    with subprocess.Popen([sys.executable, "-c", code, *command], stdout=subprocess.PIPE, text=True) as campaign:
-        with served(chosen(output)) as server:
-            inside = Visitor(server.url).enter()
-            wait_until(lambda: (inside.state()["frame"] or {}).get("voltage_v", 0.0) > 0.05, "some output")
-            answer = inside.stop()
-            said = [heading(answer)]
-            while onward(answer):
-                answer = inside.get("/stopping")
-                said.append(heading(answer))
-            assert said[-1] == "OUTPUT AT 0 V"
-            assert set(said) <= {"STOP IS ASKED FOR", "RAMPING DOWN", "OUTPUT AT 0 V"}
-            printed, _ = campaign.communicate()
-            wait_until(lambda: not inside.state()["connected"], "the run's end")
-            last = inside.get("/stopping")
-            assert heading(last) == "OUTPUT AT 0 V"
-            assert "stopped on the page" in last.text
+    with (
+        subprocess.Popen([sys.executable, "-c", code, *command], stdout=subprocess.PIPE, text=True) as campaign,
+        served(chosen(output)) as server,
+    ):
+        inside = Visitor(server.url).enter()
+        wait_until(lambda: (inside.state()["frame"] or {}).get("voltage_v", 0.0) > 0.05, "some output")
+        answer = inside.stop()
+        said = [heading(answer)]
+        while onward(answer):
+            answer = inside.get("/stopping")
+            said.append(heading(answer))
+        assert said[-1] == "OUTPUT AT 0 V"
+        assert set(said) <= {"STOP IS ASKED FOR", "RAMPING DOWN", "OUTPUT AT 0 V"}
+        printed, _ = campaign.communicate()
+        wait_until(lambda: not inside.state()["connected"], "the run's end")
+        last = inside.get("/stopping")
+        assert heading(last) == "OUTPUT AT 0 V"
+        assert "stopped on the page" in last.text
     assert campaign.returncode == 1
     assert "stopped on the page" in printed
     with Recording(output) as recording:
@@ -149,6 +151,12 @@ def test_without_a_run_there_is_nothing_to_stop():
         answer = Visitor(server.url).enter().stop()
         assert heading(answer) == "NO RUN IS UNDER WAY"
         assert onward(answer) is None
+
+
+def test_a_recording_cannot_be_stopped_and_frightens_nobody(run, inside):
+    run.refuses = True
+    run.replay_state = lambda: {"time_s": 0.0, "duration_s": 1.0, "playing": True, "speed": 1.0}
+    assert heading(inside.stop()) == "THIS IS A RECORDING"
 
 
 def test_the_stop_page_has_no_script_and_loads_only_its_style(inside):
