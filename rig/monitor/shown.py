@@ -199,7 +199,7 @@ def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
 
 
 def fundamentals_of(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
-    """Return mean and harmonics of every channel over the last periods, complex[n_channels, H + 1]; [0, H + 1] if there are none.
+    """Return mean and harmonics of every channel over the last periods: complex[n_channels, H + 1], or [0, H + 1] for none.
 
     By least squares on the recorded phase of the oscillator.
     """

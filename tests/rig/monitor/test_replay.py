@@ -83,7 +83,9 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
             assert now["time_s"] == before["time_s"]
             assert now["frequency_hz"] == pytest.approx(before["frequency_hz"], rel=5e-3)
             assert now["target"] == pytest.approx(before["target"])
-            assert now["voltage_v"] == pytest.approx(before["voltage_v"], abs=0.01)  # a row has what is on the converter
+            assert now["voltage_v"] == pytest.approx(
+                before["voltage_v"], abs=0.01
+            )  # a row has what is on the converter
             assert now["level"] == pytest.approx(before["level"], abs=0.01)
             if before["state"] == "recording":
                 assert now["force_n"] == pytest.approx(before["force_n"], rel=0.1)
@@ -358,5 +360,5 @@ def test_no_more_bins_than_of_a_run_under_way_are_kept(watched, monkeypatch):
 
 def test_other_files_are_refused_in_a_line(tmp_path):
     (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(RecordingError, match="text.h5"):
+    with pytest.raises(RecordingError, match=r"text\.h5"):
         Replay(tmp_path / "text.h5")
