@@ -18,8 +18,7 @@ from rig.text.printable import printable
 __all__ = ["STALE_S", "draw"]
 
 STALE_S = 0.7  # with the time between two drawings, stale data is grey within one second
-BAR = 20
-WIDE = 120
+WIDE, LEFT = 120, 62
 STYLES = {
     "not armed": "white on grey30",
     "starting": "white on grey30",
@@ -57,25 +56,34 @@ def draw(
         head.append(_replayed(replay, width))
     if "guard" not in shown:
         return Group(*head, Text("nothing has been published yet", style="grey50"))
-    rest = height - (7 if height >= 36 else 5) - (replay is not None)
-    numbers = _numbers(shown, facts)
-    if width >= WIDE:
-        left = [*_section("", numbers), *_section("share of limits and ranges", _shares(shown, rest - 8, width // 2))]
-        events = _events(lines, facts, min(10, max(2, rest // 4)), width // 2 - 2)
-        points = _points(lines, facts, rest - len(events) - 4, width // 2 - 2)
-        right = [*_section("points", points), *_section("events", events)]
-        table = Table.grid(expand=True, padding=(0, 2, 0, 0))
-        table.add_column(ratio=1)
-        table.add_column(ratio=1)
-        table.add_row(Group(*left), Group(*right))
+    wide = width >= WIDE
+    numbers = _numbers(shown, facts, across=1 if wide else 2)
+    rest = height - _rows(head, width)
+    if wide:
+        right = width - LEFT - 2
+        shares = _shares(shown, rest - _rows(numbers, LEFT) - 1, bar=8)
+        events = _events(lines, facts, max(1, rest // 4), right)
+        points = _points(lines, facts, rest - len(events) - 2, right)
+        table = Table.grid(padding=(0, 2, 0, 0))
+        table.add_column(width=LEFT)
+        table.add_column(width=right)
+        table.add_row(
+            Group(*numbers, *_section("share of limits and ranges", shares)),
+            Group(*_section("points", points), *_section("events", events)),
+        )
         body: list[RenderableType] = [table]
     else:
-        rest -= 4
+        rest -= _rows(numbers, width)
         events = _events(lines, facts, max(1, rest // 8), width)
-        shares = _shares(shown, max(3, (rest - 1) // 2), width)
-        points = _points(lines, facts, rest - len(shares) - len(events) - 1, width)
+        shares = _shares(shown, max(3, (rest - len(events)) // 2), bar=min(20, max(4, width - 60)))
+        points = _points(lines, facts, rest - len(events) - _rows(shares, width), width)
         body = [*numbers, *shares, *points, *events]
     return Group(*head, Greyed(Group(*body)) if stale else Group(*body))
+
+
+def _rows(what: Sequence[RenderableType], width: int) -> int:
+    """Return how many rows of the terminal something takes."""
+    return len(Console(width=width).render_lines(Group(*what))) if what else 0
 
 
 class Greyed:
@@ -128,9 +136,11 @@ def _replayed(replay: Mapping[str, Any], width: int) -> Text:
     return Text(text, style="bold", no_wrap=True, overflow="ellipsis")
 
 
-def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[RenderableType]:
-    """Return four lines of numbers with their units, and one on the loop where that is known."""
+def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any], *, across: int) -> list[RenderableType]:
+    """Return numbers with their units, so many in a line, and a line on the loop where that is known."""
     unit = facts["level_unit"]
+    target = float(shown["target"])
+    to = f", to {target:.4g} {unit}" if math.isfinite(target) and shown["guard"] == "armed" else ""
     settled = shown["settled"] if shown["state"] == "settling" else None
     cells = [
         ("frequency", figure(shown["frequency_hz"], ".4f"), "Hz"),
@@ -138,19 +148,19 @@ def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[Rendera
         ("force", figure(shown["force_n"], ".4f"), "N"),
         ("displacement", figure(shown["displacement_mm"], ".4f"), "mm"),
         ("voltage", figure(shown["voltage_v"], ".4f"), "V"),
-        ("level", figure(shown["level"], ".4g"), f"{unit}, to {figure(shown['target'], '.4g')} {unit}"),
+        ("level", figure(shown["level"], ".4g"), unit + to),
         ("time", figure(shown["time_s"], ".1f"), f"s of part {shown['part']}"),
         ("settled", "-" if settled is None else str(settled[0]), "" if settled is None else _progress(settled)),
     ]
     table = Table.grid(expand=True)
-    table.add_column(ratio=1, no_wrap=True)
-    table.add_column(ratio=1, no_wrap=True)
+    for _ in range(across):
+        table.add_column(ratio=1, no_wrap=True)
     texts = [
-        Text.assemble((f"{name:<13}", "grey62"), (f"{value:>10} ", "bold"), what, overflow="ellipsis")
+        Text.assemble((f"{name:<12} ", "grey62"), (f"{value:>8} ", "bold"), what, overflow="ellipsis")
         for name, value, what in cells
     ]
-    for one, other in zip(texts[::2], texts[1::2], strict=True):
-        table.add_row(one, other)
+    for first in range(0, len(texts), across):
+        table.add_row(*texts[first : first + across])
     told: list[RenderableType] = [table]
     late = shown["late_us"]
     if any(math.isfinite(value) for value in late) or shown["overruns"] or shown["lost"]:
@@ -163,7 +173,7 @@ def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> list[Rendera
 
 def _progress(settled: Sequence[int]) -> str:
     good, needed = settled
-    return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 8)}"
+    return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 4)}"
 
 
 def _bar(part: float, length: int) -> str:
@@ -171,14 +181,14 @@ def _bar(part: float, length: int) -> str:
     return "█" * filled + "░" * (length - filled)
 
 
-def _shares(shown: Mapping[str, Any], most: int, width: int) -> list[RenderableType]:
+def _shares(shown: Mapping[str, Any], most: int, *, bar: int) -> list[RenderableType]:
     """Return a line for each limit and range, those that are used most first, as many as fit."""
     shares = sorted(shown["shares"], key=lambda one: -one["share"] if math.isfinite(one["share"]) else 1.0)
+    if most < 1:
+        return []
     table = Table.grid(padding=(0, 1))
     for justify in ("left", "left", "right", "left", "right"):
         table.add_column(justify=justify, no_wrap=True)
-    bar = BAR if width < WIDE else max(8, width // 2 - 30)
-    bar = min(bar, max(8, width - 60))
     for one in shares[:most]:
         part = float(one["share"])
         word = share_word(part)

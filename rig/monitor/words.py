@@ -1,7 +1,7 @@
 """Words for what is shown: times, numbers, points, events and shares, as terminal and plain lines print them."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from rig.text.console import number

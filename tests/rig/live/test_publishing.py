@@ -234,7 +234,7 @@ def test_an_error_in_publishing_is_told_once_and_raised_never():
 
 def test_a_folder_of_somebody_else_is_refused(monkeypatch, place):
     base_folder()
-    monkeypatch.setattr(os, "getuid", lambda: os.stat(place).st_uid + 1)
+    monkeypatch.setattr(os, "getuid", lambda: place.stat().st_uid + 1)
     with pytest.raises(RecordingError, match="belongs to somebody else; set VIBROLOCK_LIVE"):
         base_folder()
     assert runs() == []

@@ -360,5 +360,5 @@ def test_no_more_bins_than_of_a_run_under_way_are_kept(watched, monkeypatch):
 
 def test_other_files_are_refused_in_a_line(tmp_path):
     (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(RecordingError, match="text.h5"):
+    with pytest.raises(RecordingError, match=r"text\.h5"):
         Replay(tmp_path / "text.h5")
