@@ -5,6 +5,7 @@ further parts of it as well.
 """
 
 import os
+import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -26,16 +27,17 @@ def request_stop(folder: Path, cause: str) -> None:
     Raises:
         RecordingError: the request cannot be left, because the run has ended or the memory is full.
     """
-    path = folder / STOP
+    path, written = folder / STOP, folder / f".{STOP}-{secrets.token_hex(8)}"
     try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileExistsError:
-        return
+        descriptor = os.open(written, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with suppress(OSError):  # an empty file is a request as well
+            os.write(descriptor, cause.encode()[:LONGEST])
+        os.close(descriptor)
+        with suppress(FileExistsError):
+            os.link(written, path)  # it appears with its text
+        written.unlink()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written ({error.strerror}); use the hardware stop") from error
-    with suppress(OSError):  # an empty file is a request as well
-        os.write(descriptor, cause.encode()[:LONGEST])
-    os.close(descriptor)
 
 
 @contextmanager
@@ -52,7 +54,6 @@ def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
     def look() -> None:
         while not over.wait(LOOK_S):
             if path.exists():
-                over.wait(LOOK_S)  # for its text
                 stop(_cause(path))
                 return
 

@@ -181,6 +181,18 @@ def test_a_first_request_is_kept_and_one_that_was_left_before_is_heeded_at_once(
         run.close()
 
 
+def test_a_request_needs_no_text_for_the_memory_may_be_full(monkeypatch):
+    with Publisher(FACTS, N) as live, LiveRun(live.folder) as run:
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "write", full)
+            run.request_stop("no room for this")
+        heard = []
+        with live.heeding(heard.append):
+            pass
+        assert heard == ["stopped by request"]
+        assert sorted(path.name for path in live.folder.glob("*stop*")) == ["stop"]
+
+
 def test_a_request_that_cannot_be_left_is_an_error():
     with Publisher(FACTS, N) as live:
         run = LiveRun(live.folder)
