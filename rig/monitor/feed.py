@@ -141,13 +141,14 @@ class Feed:
 
     def _read(self) -> Moment:
         """Return the present moment."""
-        view = self._look(self.view)
-        generation = getattr(view, "generation", 0)  # a replay that jumps begins anew
-        if view is not self.view or generation != self._generation:
-            self.view, self._generation = view, generation
-            self._number += 1
-            self._lines, self._raw, self._bins, self._key = [], [], 0, None
+        view = self.view
         try:
+            view = self._look(view)
+            generation = getattr(view, "generation", 0)  # a replay that jumps begins anew
+            if view is not self.view or generation != self._generation:
+                self.view, self._generation = view, generation
+                self._number += 1
+                self._lines, self._raw, self._bins, self._key = [], [], 0, None
             return self._read_view(view)
         except Exception as error:  # of a damaged file, or of a run of which nothing is left
             shown = {"state": "unreadable", "cause": error_text(error)}

@@ -116,7 +116,6 @@ class PageServer:
 
     look: Look
     address: Address = field(default_factory=Address)
-    title: str = ""
     earlier: Mapping[str, Any] | None = None
     folder: Path | None = None
     alone: Callable[[], bool] = lambda: False
@@ -134,7 +133,7 @@ class PageServer:
         self.hosts = frozenset(f"{name}:{self.port}" for name in names)
         self.feed = Feed(self.look, self.earlier)
         folder = None if self.folder is None else Folder(self.folder)
-        site = Site(self.feed, self.keys, self.title, self.scheme, self.hosts, folder)
+        site = Site(self.feed, self.keys, self.scheme, self.hosts, folder)
         config = uvicorn.Config(
             application(site),
             http=WebConnection,
@@ -147,7 +146,6 @@ class PageServer:
             server_header=False,
             ws_max_size=LARGEST_MESSAGE,
             ws_per_message_deflate=False,
-            limit_concurrency=MOST_CONNECTIONS,
             h11_max_incomplete_event_size=LARGEST_HEADERS,
             timeout_graceful_shutdown=GRACE_S,
         )
@@ -195,7 +193,6 @@ class Serving:
     """How a page is served."""
 
     address: Address = field(default_factory=Address)
-    title: str = ""
     over: Path | None = None
     """Recording whose points are drawn under those of the run."""
     open_browser: bool = False
@@ -213,7 +210,7 @@ def serve(show: View | Look, serving: Serving | None = None, *, folder: Path | N
     serving = serving or Serving()
     look = show if callable(show) else always(show)
     earlier = None if serving.over is None else of_an_earlier_run(serving.over)
-    server = PageServer(look, serving.address, serving.title, earlier, folder)
+    server = PageServer(look, serving.address, earlier, folder)
     with suppress(KeyboardInterrupt), ended_in_order(), _way_in(server, serving.open_browser):
         server.run()
 

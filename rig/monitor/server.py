@@ -55,7 +55,6 @@ class Site:
 
     feed: Feed
     keys: Keys
-    title: str
     scheme: str
     hosts: frozenset[str]
     folder: Folder | None = None
@@ -116,7 +115,7 @@ class _Pages:
             return plain_page("Opening the page", onward="/", after_s=0)
         moment = await self._feed.fresh()
         facts = moment.facts or {}
-        title = " · ".join(part for part in (facts.get("bench", ""), facts.get("kind", ""), self._site.title) if part)
+        title = " · ".join(part for part in (facts.get("bench"), facts.get("kind")) if part) or "vibrolock"
         text = self._index.safe_substitute(
             action_token=self._keys.action,
             title=escape(title),

@@ -24,6 +24,7 @@ GUARDS = {
     GuardMode.RAMPING: "ramping down",
     GuardMode.OFF: "output at 0 V",
 }
+UNKNOWN = "output unknown"
 
 
 def state_of(frame: Frame | None) -> str:
@@ -56,11 +57,9 @@ def state_of(frame: Frame | None) -> str:
 
 def cause_of(frame: Frame, facts: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> str:
     """Return why the output comes or came down; empty while it is driven. The run's own words once it has said them."""
-    for line in reversed(lines):
-        if line["is"] == "part":
-            break
-        if line["is"] == "end":
-            return str(line.get("text", ""))
+    end = _end_of(lines)
+    if end is not None:
+        return str(end.get("text", ""))
     reason, channel = EndReason(int(frame.state["reason"])), int(frame.state["channel"])
     if reason is EndReason.NONE:
         return ""
@@ -73,24 +72,38 @@ def cause_of(frame: Frame, facts: Mapping[str, Any], lines: Sequence[Mapping[str
     return TEXT[reason] + where
 
 
+def _end_of(lines: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Return what was told of the end of the present part, if it has ended."""
+    for line in reversed(lines):
+        if line["is"] in ("part", "end"):
+            return line if line["is"] == "end" else None
+    return None
+
+
+def _state_at_the_end(end: Mapping[str, Any]) -> str:
+    return "tripped" if end.get("tripped") else "stopped"
+
+
 def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the present state as plain data; angles in deg, displacements in mm, times as their names say.
 
     ``shares``: for every channel how much of its range and of its limit the last rows used, and the same of output voltage and
     displacement, each 0 to 1 or above. ``scope``: the last periods of output, force and drive. ``harmonics``: their amplitudes
-    from the first on, and the part of the fundamental.
+    from the first on, and the part of the fundamental. A part that has ended without a last frame, because its driver failed,
+    has tripped or stopped, and its output is unknown.
     """
     if frame is None:
         return {"state": state_of(None)}
     state, window = frame.state, frame.window
-    guard = GuardMode(int(state["guard"]))
+    guard, end = GuardMode(int(state["guard"])), _end_of(lines)
+    off = guard in (GuardMode.OFF, GuardMode.DISARMED)
     omega = 2.0 * math.pi * float(state["frequency_hz"])
     bands = fundamentals_of(window, facts)
     return {
-        "state": state_of(frame),
+        "state": _state_at_the_end(end) if end is not None and not off else state_of(frame),
         "cause": cause_of(frame, facts, lines),
-        "guard": GUARDS[guard],
-        "output_off": guard in (GuardMode.OFF, GuardMode.DISARMED),
+        "guard": UNKNOWN if end is not None and not off else GUARDS[guard],
+        "output_off": off,
         "lock": LockState(int(state["lock"])).name.lower(),
         "age_s": frame.age_s,
         "part": int(state["part"]),

@@ -3,15 +3,16 @@
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import RecordingError
 from rig.live.place import runs
 from rig.live.reader import LiveRun, View, run_into
 from rig.monitor.shown import shown_line
+
+if TYPE_CHECKING:
+    from rig.monitor.replay import Replay
 
 __all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
 
@@ -89,22 +90,19 @@ def chosen(what: Path | None) -> Latest:
     return Latest(into, recorded(path) if path.exists() and under_way is None else None)
 
 
-def recorded(path: Path, speed: float = 1.0, *, at_end: bool = True) -> View:
-    """Return a recording as a view.
+def recorded(path: Path) -> "Replay":
+    """Return a recording as it stood at its end.
 
     Raises:
-        RecordingError: it cannot be read, or is none.
+        RecordingError, ConfigurationError: it cannot be read, or is none.
     """
-    if find_spec("rig.monitor.replay") is None:
-        raise RecordingError(f"{path}: finished recordings cannot be shown yet")
-    replay: Any = import_module("rig.monitor.replay")
-    return cast(View, replay.Replay(path, speed=speed, at_end=at_end))
+    from rig.monitor.replay import Replay
+
+    return Replay(path, at_end=True)
 
 
 def of_an_earlier_run(path: Path) -> dict[str, Any]:
     """Return facts and points of a recording, to be drawn under those of the run that is shown."""
-    view = recorded(path)
-    return {
-        "facts": view.facts,
-        "lines": [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"],
-    }
+    with recorded(path) as view:
+        points = [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"]
+        return {"facts": view.facts, "lines": points}

@@ -106,7 +106,7 @@ export class Status {
     say(at("state"), state);
     at("shape").setAttribute("href", `#shape-${away ? "away" : (SHAPES[known] ?? "starting")}`);
     say(at("detail"), away ? `last known: ${known}` : this.detail(connection, frame));
-    say(at("cause"), away ? HARDWARE : (frame?.cause ?? ""));
+    say(at("cause"), away ? HARDWARE : this.cause(frame));
     say(at("connection"), this.words(connection));
   }
 
@@ -117,6 +117,12 @@ export class Status {
     const off = this.message.replay ? "replay, nothing moves" : frame.output_off ? "OUTPUT AT 0 V" : frame.guard;
     if (frame.state === "settling" && wanted) return `${good} of ${wanted} periods · ${off}`;
     return off ?? "";
+  }
+
+  /** Why the output came down. Where a run ended before it told that it is at 0 V, somebody has to see to that. */
+  cause(frame) {
+    const cause = frame?.cause ?? "";
+    return this.ended && frame?.output_off === false ? `${HARDWARE}. ${cause}` : cause;
   }
 
   words(connection) {

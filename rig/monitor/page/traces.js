@@ -5,6 +5,12 @@ import { faint, ink } from "./palette.js";
 import { around, axis, place, plot, ticks } from "./plot.js";
 
 const KEPT = 3000; // bins: five minutes of a test by the clock
+// Chosen by a button: a list that opens would be closed by Esc, which is the key of STOP.
+const SPANS = [
+  { seconds: 30, name: "30 s" },
+  { seconds: 120, name: "2 min" },
+  { seconds: 300, name: "5 min" },
+];
 const LOCKED = 2;
 const ARMED = 1;
 const STRIPS = [
@@ -19,11 +25,15 @@ export class Traces {
   every = 200;
 
   constructor(parent, span) {
-    this.span = span;
+    this.span = SPANS[1];
     this.hover = null;
     this.clear();
     this.strips = STRIPS.map((strip, index) => this.make(parent, strip, index === STRIPS.length - 1));
-    span.addEventListener("change", () => this.draw());
+    span.addEventListener("click", () => {
+      this.span = SPANS[(SPANS.indexOf(this.span) + 1) % SPANS.length];
+      span.textContent = `last ${this.span.name}`;
+      this.draw();
+    });
   }
 
   clear() {
@@ -93,7 +103,7 @@ export class Traces {
   }
 
   range() {
-    const span = Number(this.span.value);
+    const span = this.span.seconds;
     return [Math.max(this.last - span, this.time[0] ?? 0), Math.max(this.last, (this.time[0] ?? 0) + Math.min(span, 10))];
   }
 

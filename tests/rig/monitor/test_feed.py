@@ -10,6 +10,7 @@ import pytest
 
 from rig.live.place import runs
 from rig.live.publisher import Publisher
+from rig.monitor.feed import Place
 from rig.monitor.sources import Latest
 from rig.tick.safety.layout import GuardMode
 from tests.rig.monitor.scripted import Scripted, facts, point
@@ -116,44 +117,27 @@ def test_a_view_that_cannot_be_read_is_told_of_and_the_page_goes_on(run, inside,
         assert until(socket, lambda message: message["connected"])[-1]["frame"]["state"] != "unreadable"
 
 
-def test_the_run_is_read_once_for_all_who_watch(run, server, inside):
-    with ExitStack() as sockets:
-        all_of_them = [sockets.enter_context(inside.feed()) for _ in range(20)]
-        for one in all_of_them:
-            heard(one)
-        for one in all_of_them:  # all are as far by now
-            run.step()
-            heard(one)
-        before, first = run.readings, [heard(one)["frame"] for one in all_of_them]
-        for _ in range(10):
-            for one in all_of_them:
-                heard(one)
-        assert run.readings - before < 11 * 20 / 2
-        assert len(first) == 20
-
-
 def test_a_message_is_made_once_for_all_who_are_as_far(run, server, inside, monkeypatch):
-    """Twenty clients, told the same words: the texts are one and the same object."""
-    sent = []
-    following = server.feed.following
+    """Twenty clients. Of one reading of the run, those who are as far get one and the same text."""
+    made = {}
+    message = server.feed.message
 
-    async def noted(place):
-        text, place = await following(place)
-        sent.append(text)
-        return text, place
+    async def noted(moment, since=Place()):  # noqa: B008 (immutable)
+        text = await message(moment, since)
+        made.setdefault((moment, since), []).append(text)  # holds the moment, so that no other takes its place
+        return text
 
-    monkeypatch.setattr(server.feed, "following", noted)
+    monkeypatch.setattr(server.feed, "message", noted)
     with ExitStack() as sockets:
         all_of_them = [sockets.enter_context(inside.feed()) for _ in range(20)]
-        for one in all_of_them:
-            until(one, lambda message: message["is"] == "whole")
-        run.tell(point(7))
-        run.step()
-        for one in all_of_them:
-            until(one, lambda message: message["lines"])
-    with_the_point = [text for text in sent if '"number":7' in text]
-    assert len(with_the_point) >= 20
-    assert len({id(text) for text in with_the_point}) <= 3
+        for number in range(5):
+            run.tell(point(number))
+            run.step()
+            for one in all_of_them:
+                until(one, lambda message, number=number: numbers([message])[-1:] == [number])
+    assert all(len({id(text) for text in texts}) == 1 for texts in made.values())
+    assert sum(len(texts) for texts in made.values()) >= 20 * 5
+    assert max(len(texts) for texts in made.values()) > 1
 
 
 def test_who_does_not_read_is_not_waited_for_and_loses_no_point(run, server, inside):

@@ -159,11 +159,11 @@ def test_a_recording_cannot_be_stopped_and_frightens_nobody(run, inside):
     assert heading(inside.stop()) == "THIS IS A RECORDING"
 
 
-def test_the_stop_page_has_no_script_and_loads_only_its_style(inside):
+def test_the_stop_page_has_no_script_and_loads_only_style_and_icon(inside):
     answer = inside.stop()
     assert "<script" not in answer.text
     assert "onclick" not in answer.text
-    assert re.findall(r'(?:src|href)="([^"]*)"', answer.text) == ["/page/plain.css", "/"]
+    assert re.findall(r'(?:src|href)="([^"]*)"', answer.text) == ["/page/icon.svg", "/page/plain.css", "/"]
     assert inside.get("/page/plain.css").headers["content-type"].startswith("text/css")
 
 

@@ -85,7 +85,7 @@ class Visitor:
         self.cookie = first.headers["set-cookie"].partition(";")[0]
         page = self.get("/")
         assert page.status == 200, page.text
-        found = re.search(r'name="token" value="([^"]+)"', page.text)
+        found = re.search(r'value="([\w-]{43})"', page.text)
         assert found is not None
         self.token = found[1]
         return self

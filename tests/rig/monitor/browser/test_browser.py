@@ -115,6 +115,13 @@ def test_what_a_run_said_last_is_not_old_after_its_end(page, told):
     assert page.text("cause") == "the plan was carried out"
 
 
+def test_a_run_that_ended_before_its_output_was_at_0_v_says_so(page, told):
+    told.tell(**{"is": "end", "text": "the driver failed", "tripped": True})
+    page.shows("state", "tripped")
+    assert page.text("detail") == "output unknown"
+    assert page.text("cause") == "USE THE HARDWARE STOP. the driver failed"
+
+
 def test_a_run_that_died_is_not_connected(page, told):
     told.connected = False
     page.is_connected("died")
@@ -174,7 +181,7 @@ const done = arguments[0];
     const load = (name) => import(`/page/${name}.js`);
     const [{ Traces }, { Points }, { Events }] = await Promise.all(["traces", "points", "events"].map(load));
     const make = (tag) => document.createElement(tag);
-    const [span, table, list] = [make("select"), make("table"), make("ol")];
+    const [span, table, list] = [make("button"), make("table"), make("ol")];
     table.createTHead();
     table.createTBody();
     make("div").append(table);
