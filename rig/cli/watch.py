@@ -1,5 +1,6 @@
 """``rig watch``: a run in a terminal, while it goes on."""
 
+import os
 import sys
 import time
 from pathlib import Path
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["watch_"]
 
 LOOK_S = 0.2
+NICE = 5
 
 
 def watch_(
@@ -25,6 +27,8 @@ def watch_(
     from rig.monitor.watching import watch
 
     base_folder()  # says what is wrong with it
+    if hasattr(os, "nice"):
+        os.nice(NICE)  # what drives the rig goes first
     try:
         with _found(file) as run:
             told = watch(run)

@@ -111,6 +111,14 @@ def test_everything_that_matters_is_on_it_and_it_fits(size):
     assert "2.0 s lock: locked" in text
 
 
+@pytest.mark.parametrize("size", [(40, 10), (20, 5), (120, 8)])
+def test_in_a_terminal_that_is_too_small_the_state_comes_first(size):
+    lines = [*points(9), {"is": "event", "sample": 9902, "what": "lock", "state": "locked"}]
+    text, _ = page(a_frame(), lines, size)
+    top = "".join(text.splitlines()[: size[1]])
+    assert "S E T T L I N G" in top
+
+
 def test_a_limit_that_is_near_or_passed_has_a_word():
     text, _ = page(a_frame(force_n=29.0), [], (80, 24))
     assert re.search(r"force limit +█+░+ +85 % close +29 of 34 N", text)
