@@ -6,6 +6,7 @@ import logging
 import os
 import socket
 import ssl
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -152,7 +153,8 @@ class PageServer:
         config.load()
         config.ssl = secured[0] if secured else None
         self._server = uvicorn.Server(config)
-        logging.getLogger("uvicorn").setLevel(logging.CRITICAL)
+        for name in ("uvicorn", "asyncio"):  # what clients do wrong is no news for a terminal, which might be held
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
     @property
     def url(self) -> str:
@@ -226,7 +228,10 @@ def _way_in(server: PageServer, open_browser: bool) -> Iterator[None]:
     def used() -> None:
         if file is not None:
             file.unlink(missing_ok=True)
-        _say(f"for another browser: {server.url}")
+        line = f"for another browser: {server.url}"
+        threading.Thread(
+            target=_say, args=(line,), daemon=True
+        ).start()  # a terminal that is held must not hold the page
 
     server.keys.on_entry = used
     try:
