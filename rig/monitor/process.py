@@ -21,7 +21,6 @@ from rig.live.reader import View
 from rig.monitor.certificate import from_files, self_signed
 from rig.monitor.connections import MOST_CONNECTIONS, FeedConnection, WebConnection
 from rig.monitor.feed import Feed, Look
-from rig.monitor.folder import Folder
 from rig.monitor.opening import open_in_browser
 from rig.monitor.security import Keys
 from rig.monitor.server import Site, application
@@ -133,7 +132,11 @@ class PageServer:
         names = (self.address.host, *LOOPBACK) if self.address.loopback else (self.address.host,)
         self.hosts = frozenset(f"{name}:{self.port}" for name in names)
         self.feed = Feed(self.look, self.earlier)
-        folder = None if self.folder is None else Folder(self.folder)
+        folder = None
+        if self.folder is not None:
+            from rig.monitor.folder import Folder  # the page of a single run starts without it
+
+            folder = Folder(self.folder)
         site = Site(self.feed, self.keys, self.scheme, self.hosts, folder)
         config = uvicorn.Config(
             application(site),

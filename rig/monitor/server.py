@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
@@ -23,11 +23,13 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rig.monitor.connections import MOST_SOCKETS
 from rig.monitor.feed import Feed, Moment, Place
-from rig.monitor.folder import Folder
 from rig.monitor.plain_pages import HARDWARE, plain_page
 from rig.monitor.security import Guard, Keys
 from rig.monitor.stopping import Stopping
 from rig.system.child import ChildFailed
+
+if TYPE_CHECKING:
+    from rig.monitor.folder import Folder
 
 __all__ = ["Site", "application"]
 
@@ -58,7 +60,7 @@ class Site:
     keys: Keys
     scheme: str
     hosts: frozenset[str]
-    folder: Folder | None = None
+    folder: "Folder | None" = None
     stopping: Stopping = field(default_factory=Stopping)
 
 
@@ -220,7 +222,7 @@ class _Pages:
         """The table of a file."""
         return Response(await self._of_file(request, "table"), media_type="text/plain; charset=utf-8")
 
-    def _folder(self, request: Request) -> Folder:
+    def _folder(self, request: Request) -> "Folder":
         self._must_be_known(request)
         if self._site.folder is None:
             raise HTTPException(404)
