@@ -18,6 +18,19 @@ settings.register_profile(
 settings.load_profile("repeatable")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def runs_of_the_tests_alone(tmp_path_factory):
+    """Runs publish themselves where no other run of the user does, in this process and in those that it starts."""
+    before = os.environ.get("VIBROLOCK_LIVE")
+    folder = tmp_path_factory.mktemp("live")
+    folder.chmod(0o700)
+    os.environ["VIBROLOCK_LIVE"] = str(folder)
+    yield folder
+    os.environ.pop("VIBROLOCK_LIVE")
+    if before is not None:
+        os.environ["VIBROLOCK_LIVE"] = before
+
+
 @pytest.fixture(autouse=True)
 def signals_as_they_were():
     """A command that was run in this process ignores signals once it is done, as it does in its own."""

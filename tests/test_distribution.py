@@ -21,7 +21,7 @@ def test_the_package_is_this_distribution_and_no_other(name):
     assert set(packages_distributions().get(name, ["vibrolock"])) == {"vibrolock"}
 
 
-def test_a_wheel_holds_benches_plans_specimens_and_type_markers(tmp_path):
+def test_a_wheel_holds_benches_plans_specimens_the_page_and_type_markers(tmp_path):
     subprocess.run(
         [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(tmp_path), str(ROOT)], check=True
     )
@@ -32,6 +32,7 @@ def test_a_wheel_holds_benches_plans_specimens_and_type_markers(tmp_path):
         "rig/campaigns/shipped/magnet-beam/backbone.toml",
         "rig/campaigns/shipped/magnet-beam-symmetric/backbone.toml",
         "simulators/specimens/magnet-beam.toml",
+        "rig/monitor/page/index.html",
         *(f"{package}/py.typed" for package in PACKAGES),
     ):
         assert wanted in names

@@ -19,13 +19,17 @@ from rig.cli.flags import with_flags
 from rig.cli.group import Group
 from rig.cli.identify import identify
 from rig.cli.list import list_
+from rig.cli.monitor import monitor
 from rig.cli.options import say_what_is_imported
 from rig.cli.predict import predict
 from rig.cli.rehearse import rehearse_
+from rig.cli.replay import replay_
 from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
 from rig.cli.show import plot_, show
+from rig.cli.stop import stop
 from rig.cli.tune import tune_
+from rig.cli.watch import watch_
 
 __all__ = ["app", "main"]
 
@@ -62,9 +66,13 @@ app.command("rehearse")(rehearse_)
 app.command("reproduce")(reproduce_)
 app.command()(run)
 app.command()(resume)
+app.command()(monitor)
 app.command()(show)
 app.command("plot")(plot_)
 app.command()(doctor)
+app.command("watch")(watch_)
+app.command("replay")(replay_)
+app.command()(stop)
 
 
 def main() -> None:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.options import Overwrite
+from rig.cli.page_beside import page_beside
 
 if TYPE_CHECKING:
     from rig.arming.arming import Arm, ArmingRequest
     from rig.arming.run_options import RunOptions
 
-__all__ = ["ask", "of_a_further_part", "of_a_recording", "shown", "with_run_options"]
+__all__ = ["ask", "of_a_further_part", "of_a_recording", "shown", "with_options", "with_run_options"]
 
 Seed = Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)]
 SeedOfTheRest = Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)]
@@ -23,6 +24,7 @@ Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig b
 ArmNow = Annotated[bool, typer.Option("--arm", help="Arm a bench that moves, without being asked.")]
 Operator = Annotated[str | None, typer.Option(help="Who runs the test, for the record; the user if left out.")]
 SpecimenSerial = Annotated[str, typer.Option(help="Serial number of the specimen, for the record.")]
+Monitor = Annotated[bool, typer.Option("--monitor", help="Show the run on a page in the browser, with a stop button.")]
 Notes = Annotated[list[str] | None, typer.Option("--note", help="A remark for the record; may be given several times.")]
 
 
@@ -56,7 +58,7 @@ def of_a_further_part(
     return RunOptions(seed=seed, realtime=realtime, arm=_arm_from(arm), about=about)
 
 
-def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[..., None]], Callable[..., None]]:
+def with_options(build: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Replace the parameter ``options`` of a command by those of ``build``; the command receives the result of ``build``."""
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -64,25 +66,54 @@ def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[.
         parameters: list[inspect.Parameter] = []
         for parameter in inspect.signature(command).parameters.values():
             parameters += shared.values() if parameter.name == "options" else [parameter]
-        parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
 
         def call(**given: Any) -> None:
             options = build(**{name: given.pop(name) for name in shared})
             command(**given, options=options)
 
-        call.__name__, call.__doc__ = command.__name__, command.__doc__
-        call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        return call
+        return _with_parameters(call, command, parameters)
 
     return decorate
 
 
+def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """As `with_options`, with ``--monitor`` for a page beside the run."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        def call(monitor: Monitor = False, **given: Any) -> None:
+            with page_beside(monitor):
+                command(**given)
+
+        added = inspect.signature(call).parameters["monitor"]
+        parameters: list[inspect.Parameter] = []
+        for parameter in inspect.signature(command).parameters.values():
+            parameters += [added, parameter] if parameter.name == "options" else [parameter]
+        return with_options(build)(_with_parameters(call, command, parameters))
+
+    return decorate
+
+
+def _with_parameters(
+    call: Callable[..., None], command: Callable[..., None], parameters: list[inspect.Parameter]
+) -> Callable[..., None]:
+    """Give ``call`` the name and text of a command, and the parameters that typer shall read."""
+    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
+    call.__name__, call.__doc__ = command.__name__, command.__doc__
+    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return call
+
+
 @contextmanager
 def shown(options: "RunOptions", columns: Any) -> "Iterator[RunOptions]":
-    """Add a display of the run's points to the options; ``columns`` are those of its kind of campaign."""
+    """Add a display of the run's points to the options; ``columns`` are those of its kind of campaign.
+
+    On a terminal, say first how to watch and stop the run from another.
+    """
     from rig.show.progress import RunProgress
 
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("in another terminal, `rig watch` shows this run and `rig stop` ramps it down", file=sys.stderr)
     progress = RunProgress(columns)
     try:
         yield replace(options, progress=progress)

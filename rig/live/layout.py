@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["BINS", "BIN_S", "FRAME", "WINDOW_BYTES", "bin_dtype", "window_rows"]
+__all__ = ["BINS", "BIN_S", "FRAME", "HEAD", "WINDOW_BYTES", "bin_dtype", "window_rows"]
 
 FRAME = np.dtype(
     [
@@ -51,6 +51,8 @@ fundamentals, the last two at the drive point. ``good_periods`` of ``settled_per
 ``late_us``: p50, p99, p99.9 and largest response time of the loop, NaN without a clock. ``window``: number of rows that
 follow the record."""
 
+HEAD = 8
+"""Bytes before a frame (its checksum; 0: there is no frame) and before the bins (their number)."""
 WINDOW_BYTES = 1 << 18
 MOST_ROWS = 4096
 BINS = 3000

@@ -58,8 +58,7 @@ def new_folder() -> tuple[Path, int]:
     """
     base = base_folder()
     for left in base.iterdir():
-        hidden = left.name.startswith(".")  # a folder that is being made is locked before it gets its name
-        if not is_locked(left / LOCK) and (not hidden or time.time() - left.stat().st_mtime > ABANDONED_S):
+        if not _is_being_made(left) and not is_locked(left / LOCK):
             shutil.rmtree(left, ignore_errors=True)
     path = base / f"{os.getpid()}-{secrets.token_hex(8)}"
     made = path.with_name(f".{path.name}")
@@ -70,6 +69,14 @@ def new_folder() -> tuple[Path, int]:
         return made.rename(path), descriptor
     except OSError as error:
         raise RecordingError(f"{path}: cannot be made ({error.strerror})") from error
+
+
+def _is_being_made(folder: Path) -> bool:
+    """Return whether a folder has no name yet. Its lock is left alone: to look at it might be to hold it."""
+    try:
+        return folder.name.startswith(".") and time.time() - folder.stat().st_mtime < ABANDONED_S
+    except OSError:
+        return True  # gone, or just named
 
 
 def runs() -> list[Path]:

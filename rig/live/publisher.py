@@ -17,19 +17,20 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from rig.live.layout import BIN_S, BINS, FRAME, bin_dtype, window_rows
-from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, new_folder
+from rig.live.binning import put_bin
+from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
+from rig.live.place import FACTS, FRAME_FILE, LINES, STOP, TRACES, new_folder
 from rig.live.stopping import heeding
 from rig.live.time_left import time_left_s
 from rig.loop.loop import RunningLoop
 from rig.recording.jsontext import encode
+from rig.text.printable import error_text
 from rig.tick.layout import recorded_row
 
 __all__ = ["Live", "Publisher", "Unpublished", "published"]
 
 FRAMES_PER_S = 30.0
 LATENESS_S = 1.0
-HEAD = 8  # bytes before a frame (its checksum) and before the bins (their number)
 
 
 class Live(Protocol):
@@ -40,6 +41,9 @@ class Live(Protocol):
 
     def line(self, what: str, told: Mapping[str, Any]) -> None:
         """Take a point, an event, a remark or how the part began or ended: ``what`` is to be told of it."""
+
+    def another_part(self) -> bool:
+        """Say that one more part is going to be started; return whether it may be: not once a stop was requested."""
 
     def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Let requests to stop reach ``stop`` while the rig is driven."""
@@ -54,6 +58,10 @@ class Unpublished:
     def line(self, what: str, told: Mapping[str, Any]) -> None:
         """Do nothing."""
 
+    def another_part(self) -> bool:
+        """Return True: nobody could request a stop."""
+        return True
+
     def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Do nothing."""
         return nullcontext()
@@ -62,11 +70,17 @@ class Unpublished:
 class Publisher:
     """Publishes a run in a folder of its own, which is removed at the end.
 
+    An error while the run goes on is told by a ``remark``, once; nothing more is published then.
+
     Raises:
-        OSError, RecordingError: the folder or its memory cannot be had.
+        OSError, RecordingError: on construction: the folder or its memory cannot be had.
     """
 
-    def __init__(self, facts: Mapping[str, Any], n_channels: int) -> None:
+    def __init__(
+        self, facts: Mapping[str, Any], n_channels: int, remark: Callable[[str], None] = lambda text: None
+    ) -> None:
+        self._remark = remark
+        self._failed = False
         self.folder, self._lock = new_folder()
         try:
             rows = recorded_row(n_channels)
@@ -77,6 +91,7 @@ class Publisher:
             self._bins = np.zeros(1, bin_dtype(n_channels))
             self._rows: list[np.ndarray] = []  # of the bin that is not over
             self._n_bins = 0
+            self._torn = False  # the last line, because the memory was full
             self._written = self._lateness = -np.inf
             (self.folder / FACTS).write_bytes(encode(facts, what="facts of the run"))
             self._lines = os.open(self.folder / LINES, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
@@ -89,8 +104,10 @@ class Publisher:
 
     def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         """Add rows to the traces, and publish a frame if one is due."""
-        if not rows.size:
-            return
+        if rows.size:
+            self._carefully(self._take, rows, loop, finished, total)
+
+    def _take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         self._keep(rows)
         self._add_to_traces(rows, loop)
         now = time.monotonic()
@@ -102,12 +119,27 @@ class Publisher:
 
     def line(self, what: str, told: Mapping[str, Any]) -> None:
         """Append a line. Where the memory is full, it is left out."""
+        self._carefully(self._line, what, told)
+
+    def _line(self, what: str, told: Mapping[str, Any]) -> None:
         if what == "part":
             self._frame["part"] += 1
             self._rows.clear()
             self._recent.clear()
+        text = encode({**told, "is": what}, what=what) + b"\n"
         with suppress(OSError):
-            os.write(self._lines, encode({**told, "is": what}, what=what) + b"\n")
+            self._torn = os.write(self._lines, b"\n" + text if self._torn else text) < len(text)
+
+    def another_part(self) -> bool:
+        """Take back the frame, which says that the output is at 0 V; then look whether a stop was requested.
+
+        In this order: whoever requests a stop and then still reads that frame has been heeded.
+        """
+        checksum, self._frames[:HEAD] = self._frames[:HEAD], bytes(HEAD)
+        if (self.folder / STOP).exists():
+            self._frames[:HEAD] = checksum
+            return False
+        return True
 
     def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Look for requests to stop, in a thread of its own."""
@@ -127,6 +159,17 @@ class Publisher:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _carefully(self, step: Callable[..., None], *arguments: Any) -> None:
+        """Run a step of publishing; whatever goes wrong with it, the test is more important than its picture."""
+        if self._failed:
+            return
+        try:
+            step(*arguments)
+        except Exception as error:
+            self._failed = True
+            text = f"the run can no longer be watched ({error_text(error)}); requests to stop are still heeded"
+            self._remark(text)
+
     def _keep(self, rows: np.ndarray) -> None:
         """Keep the chunks that hold the last rows."""
         self._recent.append(rows)
@@ -140,18 +183,9 @@ class Publisher:
             return
         taken = self._rows[0] if len(self._rows) == 1 else np.concatenate(self._rows)
         self._rows.clear()
-        one = self._bins[0]
-        one["end_s"], one["part"] = loop.tick.sample / rate, self._frame["part"][0]
-        one["lock"], one["guard"] = taken["lock"][-1], taken["guard"][-1]
-        for name, values in (
-            ("frequency_hz", taken["frequency_hz"]),
-            ("phase_error_rad", taken["phase_error_rad"]),
-            ("voltage_v", np.abs(taken["command_v"])),
-        ):
-            one[name] = np.fmin.reduce(values), np.fmax.reduce(values)
-        one["level"] = loop.tick.arrays.progress["level"][0]
-        inputs = np.ascontiguousarray(taken["inputs"].T)  # each channel in one piece: five times as quick
-        one["inputs"][:, 0], one["inputs"][:, 1] = np.fmin.reduce(inputs, axis=1), np.fmax.reduce(inputs, axis=1)
+        level = float(loop.tick.arrays.progress["level"][0])
+        part = int(self._frame["part"][0])
+        put_bin(self._bins[0], taken, end_s=loop.tick.sample / rate, part=part, level=level)
         at = HEAD + (self._n_bins % BINS) * self._bins.itemsize
         self._traces[at : at + self._bins.itemsize] = self._bins.tobytes()
         self._n_bins += 1
@@ -160,7 +194,9 @@ class Publisher:
     def _publish(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         frame, t = self._frame[0], loop.tick.arrays
         progress, guard, vibration = t.progress[0], t.guard[0], t.control["vibration"][0]
-        frame["sample"], frame["lock"], frame["guard"] = loop.tick.sample, rows["lock"][-1], guard["mode"]
+        frame["sample"], frame["lock"] = loop.tick.sample, rows["lock"][-1]
+        # Where the driver has failed, nobody knows more of the output than what was put out last.
+        frame["guard"] = guard["mode"] if loop.failure is None else rows["guard"][-1]
         for name in ("reason", "channel", "value"):
             frame[name] = guard[name]
         at = int(progress["segment"])
@@ -212,8 +248,8 @@ def published(facts: Mapping[str, Any], n_channels: int, remark: Callable[[str],
     ``facts``: what does not change while it goes on.
     """
     try:
-        publisher = Publisher(facts, n_channels)
-    except Exception as error:  # whatever it is, the test is more important than its picture
+        publisher = Publisher(facts, n_channels, remark)
+    except Exception as error:  # the same holds here
         remark(f"the run cannot be watched or stopped from another terminal: {error}")
         yield Unpublished()
         return

@@ -7,14 +7,13 @@ import time
 import zlib
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.live.layout import BINS, FRAME, bin_dtype
+from rig.live.layout import BINS, FRAME, HEAD, bin_dtype
 from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, lives, runs
-from rig.live.publisher import HEAD
 from rig.live.stopping import request_stop
 from rig.tick.layout import recorded_row
 
@@ -75,6 +74,7 @@ class LiveRun:
         except (OSError, ValueError, KeyError) as error:
             raise RecordingError(f"{folder}: is no run under way ({error})") from error
         if len(self._traces) != HEAD + BINS * self._bin.itemsize:
+            self.close()
             raise RecordingError(f"{folder}: was published by another version of this program")
         self._lines: list[dict[str, Any]] = []
         self._rest = b""
@@ -85,14 +85,16 @@ class LiveRun:
         return lives(self.folder)
 
     def frame(self) -> Frame | None:
-        """Return the state that was published last; None before the first."""
+        """Return the state that was published last; None before the first of a run, and between two of its parts."""
         for _ in range(TRIES):
             checksum = int.from_bytes(self._frames[:HEAD], "little")
+            if not checksum:
+                return None
             state = np.frombuffer(self._frames[HEAD : HEAD + FRAME.itemsize], FRAME)[0]
             size = FRAME.itemsize + int(state["window"]) * self._rows.itemsize
             if 0 < size <= len(self._frames) - HEAD:
                 content = self._frames[HEAD : HEAD + size]
-                if checksum and zlib.crc32(content) == checksum:
+                if zlib.crc32(content) == checksum:
                     state = np.frombuffer(content[: FRAME.itemsize], FRAME)[0]
                     window = np.frombuffer(content[FRAME.itemsize :], self._rows)
                     return Frame(state, window, 1e-9 * (time.monotonic_ns() - int(state["written_ns"])))
@@ -124,6 +126,12 @@ class LiveRun:
         self._traces.close()
         self._file.close()
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def _n_bins(self) -> int:
         return int.from_bytes(self._traces[:HEAD], "little")
 
@@ -141,7 +149,7 @@ def run_into(recording: Path | None = None) -> LiveRun | None:
     for folder in runs():
         with suppress(RecordingError):
             run = LiveRun(folder)
-            if recording is None or Path(run.facts["recording"]) == recording.absolute():
+            if recording is None or Path(run.facts["recording"]).resolve() == recording.resolve():
                 return run
             run.close()
     return None

@@ -5,6 +5,7 @@ further parts of it as well.
 """
 
 import os
+import secrets
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -26,29 +27,34 @@ def request_stop(folder: Path, cause: str) -> None:
     Raises:
         RecordingError: the request cannot be left, because the run has ended or the memory is full.
     """
-    path = folder / STOP
+    path, written = folder / STOP, folder / f".{STOP}-{secrets.token_hex(8)}"
     try:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    except FileExistsError:
-        return
+        descriptor = os.open(written, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with suppress(OSError):  # an empty file is a request as well
+            os.write(descriptor, cause.encode()[:LONGEST])
+        os.close(descriptor)
+        with suppress(FileExistsError):
+            os.link(written, path)  # it appears with its text
+        written.unlink()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be written ({error.strerror}); use the hardware stop") from error
-    with suppress(OSError):  # an empty file is a request as well
-        os.write(descriptor, cause.encode()[:LONGEST])
-    os.close(descriptor)
 
 
 @contextmanager
 def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
-    """Look for a request while the rig is driven, in a thread of its own; ``stop`` gets its cause, once."""
-    over = threading.Event()
+    """Look for a request while the rig is driven, in a thread of its own; ``stop`` gets its cause, once.
+
+    One that was left before is heeded before anything else is done.
+    """
+    path, over = folder / STOP, threading.Event()
+    if path.exists():
+        stop(_cause(path))
+        over.set()
 
     def look() -> None:
         while not over.wait(LOOK_S):
-            if (folder / STOP).exists():
-                with suppress(OSError):
-                    over.wait(LOOK_S)  # for its text
-                stop(_cause(folder / STOP))
+            if path.exists():
+                stop(_cause(path))
                 return
 
     watch = threading.Thread(target=look, name="requests to stop", daemon=True)

@@ -11,11 +11,12 @@ from rig.live.reader import Frame
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind
 
-__all__ = ["as_json", "shown_bins", "shown_frame", "state_of"]
+__all__ = ["as_json", "fundamentals_of", "shown_bins", "shown_frame", "shown_line", "state_of"]
 
 SCOPE_PERIODS = 3
 SCOPE_POINTS = 400
 HARMONICS = 10
+BULKY = {"harmonics", "harmonics_std"}  # numbers for every channel and harmonic
 RECORDS = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 GUARDS = {
     GuardMode.DISARMED: "not armed",
@@ -23,6 +24,7 @@ GUARDS = {
     GuardMode.RAMPING: "ramping down",
     GuardMode.OFF: "output at 0 V",
 }
+UNKNOWN = "output unknown"
 
 
 def state_of(frame: Frame | None) -> str:
@@ -37,7 +39,7 @@ def state_of(frame: Frame | None) -> str:
     guard, reason = GuardMode(int(state["guard"])), EndReason(int(state["reason"]))
     if guard is GuardMode.DISARMED:
         return "not armed"
-    if guard is GuardMode.OFF or (guard is GuardMode.RAMPING and reason.is_trip):
+    if guard is GuardMode.OFF or reason.is_trip:
         if reason.is_trip:
             return "tripped"
         return "finished" if reason is EndReason.COMPLETED else "stopped"
@@ -55,11 +57,9 @@ def state_of(frame: Frame | None) -> str:
 
 def cause_of(frame: Frame, facts: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> str:
     """Return why the output comes or came down; empty while it is driven. The run's own words once it has said them."""
-    for line in reversed(lines):
-        if line["is"] == "part":
-            break
-        if line["is"] == "end":
-            return str(line.get("text", ""))
+    end = _end_of(lines)
+    if end is not None:
+        return str(end.get("text", ""))
     reason, channel = EndReason(int(frame.state["reason"])), int(frame.state["channel"])
     if reason is EndReason.NONE:
         return ""
@@ -72,24 +72,38 @@ def cause_of(frame: Frame, facts: Mapping[str, Any], lines: Sequence[Mapping[str
     return TEXT[reason] + where
 
 
+def _end_of(lines: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Return what was told of the end of the present part, if it has ended."""
+    for line in reversed(lines):
+        if line["is"] in ("part", "end"):
+            return line if line["is"] == "end" else None
+    return None
+
+
+def _state_at_the_end(end: Mapping[str, Any]) -> str:
+    return "tripped" if end.get("tripped") else "stopped"
+
+
 def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the present state as plain data; angles in deg, displacements in mm, times as their names say.
 
     ``shares``: for every channel how much of its range and of its limit the last rows used, and the same of output voltage and
     displacement, each 0 to 1 or above. ``scope``: the last periods of output, force and drive. ``harmonics``: their amplitudes
-    from the first on, and the part of the fundamental.
+    from the first on, and the part of the fundamental. A part that has ended without a last frame, because its driver failed,
+    has tripped or stopped, and its output is unknown.
     """
     if frame is None:
         return {"state": state_of(None)}
     state, window = frame.state, frame.window
-    guard = GuardMode(int(state["guard"]))
+    guard, end = GuardMode(int(state["guard"])), _end_of(lines)
+    off = guard in (GuardMode.OFF, GuardMode.DISARMED)
     omega = 2.0 * math.pi * float(state["frequency_hz"])
-    bands = _fundamentals(window, facts)
+    bands = fundamentals_of(window, facts)
     return {
-        "state": state_of(frame),
+        "state": _state_at_the_end(end) if end is not None and not off else state_of(frame),
         "cause": cause_of(frame, facts, lines),
-        "guard": GUARDS[guard],
-        "output_off": guard in (GuardMode.OFF, GuardMode.DISARMED),
+        "guard": UNKNOWN if end is not None and not off else GUARDS[guard],
+        "output_off": off,
         "lock": LockState(int(state["lock"])).name.lower(),
         "age_s": frame.age_s,
         "part": int(state["part"]),
@@ -105,7 +119,7 @@ def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[M
         "force_n": float(state["force_n"]),
         "acceleration_m_s2": float(state["drive_m_s2"]),
         "displacement_mm": 1e3 * float(state["displacement_m"]),
-        "settled": [int(state["good_periods"]), int(state["settled_periods"])],
+        "settled": _settled(state),
         "left_s": float(state["left_s"]),
         "late_us": [float(value) for value in state["late_us"]],
         "overruns": int(state["overruns"]),
@@ -114,6 +128,12 @@ def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[M
         "scope": _scope(window, facts),
         "harmonics": _harmonics(bands, facts),
     }
+
+
+def _settled(state: np.void) -> list[int] | None:
+    """Return how many periods of how many were within the tolerance; None where that was not recorded."""
+    good = int(state["good_periods"])
+    return None if good < 0 else [good, int(state["settled_periods"])]
 
 
 def shown_bins(bins: np.ndarray, facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -126,6 +146,19 @@ def shown_bins(bins: np.ndarray, facts: Mapping[str, Any]) -> dict[str, Any]:
         at = _index(facts, role)
         out[role] = [bins["inputs"][:, at, 0], bins["inputs"][:, at, 1]]
     return out
+
+
+def shown_line(line: Mapping[str, Any], facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a line without what is too much to be shown; a point instead with standard errors of its fundamentals.
+
+    ``force_std_n`` and ``amplitude_std_m`` are those of the force's and of the drive point's displacement amplitude.
+    """
+    shown = {key: value for key, value in line.items() if key not in BULKY}
+    errors, frequency = line.get("harmonics_std"), line.get("frequency_hz")
+    if errors and frequency:
+        shown["force_std_n"] = errors[_index(facts, "force")][1]
+        shown["amplitude_std_m"] = errors[_index(facts, "drive")][1] / (2.0 * math.pi * frequency) ** 2
+    return shown
 
 
 def as_json(value: Any, digits: int = 6) -> Any:
@@ -165,8 +198,11 @@ def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
     return window[begins[max(begins.size - 1 - periods, 0)] : begins[-1]]
 
 
-def _fundamentals(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
-    """complex[n_channels, H + 1]: mean and harmonics of every channel over the last periods by least squares, if any."""
+def fundamentals_of(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
+    """Return mean and harmonics of every channel over the last periods: complex[n_channels, H + 1], or [0, H + 1] for none.
+
+    By least squares on the recorded phase of the oscillator.
+    """
     rows = _last_periods(window, SCOPE_PERIODS)
     inputs = rows["inputs"].astype(float)
     good = np.isfinite(inputs).all(axis=1)

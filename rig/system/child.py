@@ -12,7 +12,7 @@ import sys
 import threading
 from pathlib import Path
 
-__all__ = ["MEMORY_BYTES", "ChildFailed", "ask_child", "confine"]
+__all__ = ["MEMORY_BYTES", "ChildFailed", "ask_child", "child_environment", "confine"]
 
 MEMORY_BYTES = 4 * 2**30
 """Address space of a child."""
@@ -31,11 +31,7 @@ def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
             stdin=theirs,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            env={
-                **os.environ,
-                "PYTHONPATH": os.pathsep.join(_import_path()),
-                "OPENBLAS_NUM_THREADS": "1",  # each thread reserves address space
-            },
+            env=child_environment(),
         )
     except OSError as error:
         os.close(ours)
@@ -53,6 +49,12 @@ def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
     if child.returncode:
         raise ChildFailed(f"crashed ({_how(child.returncode)})")
     return answer
+
+
+def child_environment() -> dict[str, str]:
+    """Return the environment in which a child imports what this process does, with one thread for linear algebra."""
+    path = os.pathsep.join(_import_path())
+    return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}  # each thread reserves address space
 
 
 def _import_path() -> list[str]:

@@ -32,6 +32,15 @@ class StoredSamples:
         begin = -(-sample // stride) * stride
         return np.asarray(begin[at] + stride[at] * (rows - first[at]), float)
 
+    def rows_before(self, sample: int) -> int:
+        """Return how many rows hold samples before this one, as if the part never ended."""
+        at = len(self._changes) - 1
+        while at > 0 and self._changes[at].sample >= sample:
+            at -= 1
+        row, first, stride = self._changes[at]
+        found = row + max(0, -(-sample // stride) - -(-first // stride))
+        return min(found, self._changes[at + 1].row) if at + 1 < len(self._changes) else found
+
     def unbroken_from(self, row: int) -> int:
         """Return the first row from which on all samples are stored up to ``row``; ``row`` itself if that is not so there."""
         last = [change for change in self._changes if change.row <= row]

@@ -184,6 +184,9 @@ def _with_further_attempts(
     """
     plan, bench, output, progress = execution.plan, execution.bench, recording.path, options.progress
     while again := execution.worth_another:
+        if not live.another_part():
+            progress.remark("nothing is measured again: a stop was requested")
+            break
         with recording:
             before = execution.before_another(recording.points)
             seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before

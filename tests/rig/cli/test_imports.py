@@ -33,7 +33,7 @@ MATPLOTLIB = {
     *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
     *("pyparsing", "six"),
 }
-NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser"}  # the last two where they are installed
+NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser"}  # the last two are loaded by numba where they are installed
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
 FILES = {"numpy", "pydantic", "h5py"}
 
@@ -51,11 +51,23 @@ ALLOWED = {
     "analyse modes --bench magnet-beam": {"numpy", "pydantic", "simulators"} | NUMBA | {"scipy.linalg"},
     "doctor": {"numpy", "pydantic", "serial", "rig.loop", "multiprocessing"},
     "run plan.toml -o new.h5": FILES | NUMBA | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
+    "run plan.toml -o monitored.h5 --monitor": FILES
+    | NUMBA
+    | {"scipy.linalg", "simulators", "rig.loop", "multiprocessing"},
+    "replay run.h5 --terminal --speed 1000": FILES | {"rig.monitor"},
     "check --bench magnet-beam -o check.h5": FILES | NUMBA | OPTIMIZE | {"simulators", "rig.loop", "multiprocessing"},
 }
 """What a command may load beyond Python and what is `LIGHT`: libraries, subpackages of scipy, and the heavy ones of `PARTS`."""
 
-PARTS = ("simulators", "rig.loop", "rig.rehearsal.rehearsal", "identification.pnlss", "multiprocessing", "asyncio")
+PARTS = (
+    "simulators",
+    "rig.loop",
+    "rig.rehearsal.rehearsal",
+    "identification.pnlss",
+    "multiprocessing",
+    "asyncio",
+    "rig.monitor",
+)
 """Packages of the distribution and of Python that take long and of which few commands have use."""
 
 LOADED = f"""
@@ -84,12 +96,12 @@ def folder(tmp_path_factory):
     return folder
 
 
-def _loaded(folder, code, *arguments):
+def _loaded(folder, code, *arguments, status=0):
     path = os.pathsep.join(sys.path)
     environment = {**os.environ, "PYTHONPATH": path, "COVERAGE_PROCESS_START": "", "XDG_STATE_HOME": str(folder)}
     command = [sys.executable, "-c", LOADED + code, *arguments]
     out = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    assert out.returncode == 0, out.stderr
+    assert out.returncode == status, out.stderr
     return set(json.loads((folder / "loaded.json").read_text()))
 
 
@@ -97,6 +109,12 @@ def _loaded(folder, code, *arguments):
 def test_a_command_loads_what_it_uses_and_nothing_else(folder, line):
     loaded = _loaded(folder, "from rig.cli import main; main()", *line.split())
     assert loaded - LIGHT - ALLOWED[line] == set()
+
+
+def test_stopping_loads_next_to_nothing(folder, monkeypatch):
+    monkeypatch.setenv("VIBROLOCK_LIVE", str(folder / "nothing"))
+    loaded = _loaded(folder, "from rig.cli import main; main()", "stop", status=1)
+    assert loaded - LIGHT - {"numpy", "pydantic", "rig.monitor"} == set()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,54 @@
+"""``rig stop``: bring runs that are under way to 0 V, from any terminal of the same user."""
+
+import os
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["stop"]
+
+LOOK_S = 0.02
+
+
+def stop(
+    file: Annotated[
+        Path | None, typer.Argument(help="Recording of the run to stop; every run of yours if left out.")
+    ] = None,
+    timeout: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Longest time to wait for 0 V; the run's ramp and 10 s if left out.", min=0.0),
+    ] = None,
+) -> None:
+    """Ramp runs down and wait until their output is at 0 V; status 1 if that is not known of all. No emergency stop."""
+    from rig.errors import RecordingError
+    from rig.live.place import base_folder, runs
+    from rig.live.reader import run_into
+    from rig.monitor.coming_down import ComingDown
+    from rig.text.printable import printable
+
+    base_folder()  # says what is wrong with it
+    if file is None:
+        folders = runs()
+    else:
+        found = run_into(file)
+        folders = [] if found is None else [found.folder]
+        if found is not None:
+            found.close()
+    if not folders:
+        raise RecordingError("no run is under way" if file is None else f"{file}: no run into this file is under way")
+    cause = f"stopped by `rig stop` (process {os.getpid()})"
+    left = [ComingDown(folder, cause, timeout) for folder in folders]
+    failed = False
+    while left:
+        for one in list(left):
+            outcome = one.outcome()
+            if outcome is not None:
+                print(printable(f"{one.name}: {outcome.text}"), flush=True)
+                failed = failed or not outcome.at_0_v
+                one.close()
+                left.remove(one)
+        time.sleep(LOOK_S)
+    if failed:
+        raise typer.Exit(1)

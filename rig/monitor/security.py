@@ -1,0 +1,111 @@
+"""Who may see a run on the page, and who may stop it: tokens, hosts, origins, and what every answer forbids the browser.
+
+Whoever knows the address, with its token, gets in, once; from then on a cookie shows who is meant. The cookie alone stops
+nothing: forms and sockets need a second token, which only the page knows, and an ``Origin`` that is the page's own. The
+``Host`` of every request must be the server's own address: a name of somebody else's that was made to point here is refused.
+"""
+
+import secrets
+from collections.abc import Callable
+from http.cookies import CookieError, SimpleCookie
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+__all__ = ["HEADERS", "Guard", "Keys", "same"]
+
+HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+        "form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "same-origin",  # with no-referrer a browser sends "Origin: null" with a plain form
+    "Cache-Control": "no-store",
+}
+"""Headers of every answer."""
+
+TOKEN_BYTES = 32
+
+
+def same(given: str, expected: str) -> bool:
+    """Return whether two secrets are the same, in a time that does not depend on where they differ."""
+    return secrets.compare_digest(given.encode("utf-8", "replace"), expected.encode())
+
+
+class Keys:
+    """The secrets of one server: a token for the address that is used up, a cookie, a token for forms and sockets."""
+
+    def __init__(self) -> None:
+        self.cookie_name = f"vibrolock-{secrets.token_hex(4)}"  # cookies know no ports: each server has its own name
+        self.cookie = secrets.token_urlsafe(TOKEN_BYTES)
+        self.action = secrets.token_urlsafe(TOKEN_BYTES)
+        self.entry = secrets.token_urlsafe(TOKEN_BYTES)
+        self.on_entry: Callable[[], None] = lambda: None
+
+    def admit(self, token: str) -> bool:
+        """Return whether this is the token of the address; if so, it is replaced by another, and ``on_entry`` is called."""
+        if not same(token, self.entry):
+            return False
+        self.entry = secrets.token_urlsafe(TOKEN_BYTES)
+        self.on_entry()
+        return True
+
+    def known(self, headers: Headers) -> bool:
+        """Return whether a request has the cookie."""
+        cookies: SimpleCookie = SimpleCookie()
+        try:
+            cookies.load("; ".join(headers.getlist("cookie")))
+        except CookieError:
+            return False
+        found = cookies.get(self.cookie_name)
+        return found is not None and same(found.value, self.cookie)
+
+    def acts(self, token: str | None) -> bool:
+        """Return whether this is the token for forms and sockets."""
+        return token is not None and same(token, self.action)
+
+
+Refuse = Callable[[Scope, int, str], ASGIApp]
+
+
+class Guard:
+    """Lets through what is addressed to this server, and comes from its own page where it does something."""
+
+    def __init__(self, app: ASGIApp, scheme: str, hosts: frozenset[str], refuse: Refuse) -> None:
+        self._app, self._hosts, self._refuse = app, hosts, refuse
+        self._origins = {f"{scheme}://{host}" for host in hosts}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Check a request or socket and pass it on, with `HEADERS` on the answer."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        wrong = self._what_is_wrong(scope)
+        if scope["type"] == "websocket":
+            if wrong:
+                await receive()
+                await send({"type": "websocket.close", "code": 1008})  # before it is accepted: answered with status 403
+            else:
+                await self._app(scope, receive, send)
+            return
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update(HEADERS)
+            await send(message)
+
+        app = self._refuse(scope, *wrong) if wrong else self._app
+        await app(scope, receive, with_headers)
+
+    def _what_is_wrong(self, scope: Scope) -> tuple[int, str] | None:
+        headers = Headers(scope=scope)
+        if [host.lower() for host in headers.getlist("host")] not in [[host] for host in self._hosts]:
+            return 421, "This server is not at that address."
+        acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
+        if acts and headers.getlist("origin") not in [[origin] for origin in self._origins]:
+            return 403, "The request does not come from this server's page."
+        return None

@@ -1,0 +1,292 @@
+"""The page's server: one page, its files, the feed, the stop, and figures of a folder. It can do nothing else.
+
+Paths of requests are looked up in tables; none is ever a path in the file system.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Scope
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from rig.monitor.connections import MOST_SOCKETS
+from rig.monitor.feed import Feed, Moment, Place
+from rig.monitor.plain_pages import HARDWARE, plain_page
+from rig.monitor.security import Guard, Keys
+from rig.monitor.stopping import Stopping
+from rig.system.child import ChildFailed
+
+if TYPE_CHECKING:
+    from rig.monitor.folder import Folder
+
+__all__ = ["Site", "application"]
+
+PAGE = Path(__file__).parent / "page"
+TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".txt": "text/plain; charset=utf-8",
+}
+LARGEST_FORM = 1024
+FORM_S = 5.0
+READ_S = 3.0
+NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
+ELSEWHERE = "Or type in a terminal of the same user: rig stop"
+HOW_TO_ENTER = (
+    "Open the address that rig monitor or rig run --monitor has printed. Each address works once, in one browser; "
+    "rig monitor prints another."
+)
+
+
+@dataclass(frozen=True)
+class Site:
+    """What is served."""
+
+    feed: Feed
+    keys: Keys
+    scheme: str
+    hosts: frozenset[str]
+    folder: "Folder | None" = None
+    stopping: Stopping = field(default_factory=Stopping)
+
+
+def application(site: Site) -> ASGIApp:
+    """Return the application."""
+    pages = _Pages(site)
+
+    @contextlib.asynccontextmanager
+    async def reading(app: Starlette) -> AsyncIterator[None]:
+        task = asyncio.create_task(site.feed.run())
+        try:
+            yield
+        finally:
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+
+    routes = [
+        Route("/", pages.index),
+        Route("/page/{name}", pages.file),
+        Route("/state", pages.state),
+        WebSocketRoute("/feed", pages.follow),
+        Route("/stop", pages.stop, methods=["POST"]),
+        Route("/stopping", pages.stopping),
+        Route("/replay", pages.replay, methods=["POST"]),
+        Route("/folder", pages.folder),
+        Route("/folder/{n:int}/figure.png", pages.figure),
+        Route("/folder/{n:int}/table.txt", pages.table),
+    ]
+    handlers: Mapping[Any, Any] = {HTTPException: pages.refused, Exception: pages.refused}
+    return Guard(
+        Starlette(routes=routes, lifespan=reading, exception_handlers=handlers), site.scheme, site.hosts, _refusal
+    )
+
+
+class _Pages:
+    def __init__(self, site: Site) -> None:
+        self._site, self._feed, self._keys = site, site.feed, site.keys
+        self._files = {path.name: (path.read_bytes(), TYPES[path.suffix]) for path in _files()}
+        self._index = Template((PAGE / "index.html").read_text(encoding="utf-8"))
+
+    async def index(self, request: Request) -> Response:
+        """The page, or the door to it: an address with its token sets the cookie, once."""
+        token = request.query_params.get("token")
+        if token is not None and self._keys.admit(token):
+            # Not a redirect: after one from elsewhere, such as from the file of --open, a strict cookie would be withheld.
+            response = plain_page("Opening the page", onward="/", after_s=0)
+            secure = self._site.scheme == "https"
+            response.set_cookie(
+                self._keys.cookie_name, self._keys.cookie, path="/", secure=secure, httponly=True, samesite="strict"
+            )
+            return response
+        self._must_be_known(request)
+        if token is not None:  # of a browser that is in already
+            return plain_page("Opening the page", onward="/", after_s=0)
+        moment = await self._feed.fresh()
+        facts = moment.facts or {}
+        title = " · ".join(part for part in (facts.get("bench"), facts.get("kind")) if part) or "vibrolock"
+        text = self._index.safe_substitute(
+            action_token=self._keys.action,
+            title=escape(title),
+            replay="yes" if hasattr(moment.view, "replay_state") else "no",
+            folder="no" if self._site.folder is None else "yes",
+        )
+        return Response(text, media_type="text/html; charset=utf-8")
+
+    async def file(self, request: Request) -> Response:
+        """A file of the page."""
+        found = self._files.get(request.path_params["name"])
+        if found is None:
+            raise HTTPException(404)
+        return Response(found[0], media_type=found[1])
+
+    async def state(self, request: Request) -> Response:
+        """Everything at once, for a page whose socket is dead."""
+        self._must_be_known(request)
+        if not self._keys.acts(request.headers.get("x-token")):
+            raise HTTPException(403)
+        text = await self._feed.message(await self._feed.fresh())
+        return Response(text, media_type="application/json")
+
+    async def follow(self, socket: WebSocket) -> None:
+        """Send what is new, to as many as may watch."""
+        if not (self._keys.known(socket.headers) and self._keys.acts(socket.query_params.get("token"))):
+            await socket.close(1008)  # before it is accepted: answered with status 403
+            return
+        await socket.accept()
+        if self._feed.clients >= MOST_SOCKETS:
+            await socket.close(1013, "too many pages are open")
+            return
+        self._feed.clients += 1
+        sending = asyncio.create_task(self._send(socket))
+        try:
+            while (await socket.receive())["type"] != "websocket.disconnect":
+                pass  # whatever it says
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            self._feed.clients -= 1
+            sending.cancel()
+            with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, OSError, RuntimeError):
+                await sending
+
+    async def _send(self, socket: WebSocket) -> None:
+        place = Place()
+        while True:
+            text, place = await self._feed.following(place)
+            await socket.send_text(text)
+
+    async def stop(self, request: Request) -> Response:
+        """Ask the run to ramp down, and say what comes of it."""
+        await self._form(request)
+        view = self._feed.view
+        self._site.stopping.ask(view)
+        moment = await self._now()
+        if moment is not None and moment.view is not view:  # another run has begun meanwhile
+            self._site.stopping.ask(moment.view)
+        return self._where_the_ramp_is(request, moment)
+
+    async def stopping(self, request: Request) -> Response:
+        """Where the ramp is."""
+        self._must_be_known(request)
+        return self._where_the_ramp_is(request, await self._now())
+
+    async def _now(self) -> Moment | None:
+        """Return what there is now; None if it cannot be read in time."""
+        with contextlib.suppress(TimeoutError):
+            return await asyncio.wait_for(self._feed.fresh(), READ_S)
+        return None
+
+    def _where_the_ramp_is(self, request: Request, moment: Moment | None) -> Response:
+        word, heading, text = self._site.stopping.state(moment)
+        if "application/json" in request.headers.get("accept", ""):
+            return JSONResponse({"state": word, "text": f"{heading}. {text}"})
+        onward = "" if word in ("none", "off", "driven") else "/stopping"
+        return plain_page(heading, text, "This is no emergency stop.", kind=word, onward=onward)
+
+    async def replay(self, request: Request) -> Response:
+        """Pause, play, seek, or set the speed of a replay."""
+        control = getattr(self._feed.view, "control", None)
+        form = await self._form(request)
+        if control is None:
+            raise HTTPException(404)
+        try:
+            control(form.get("action", ""), float(form.get("value", "0")))
+        except ValueError as error:
+            raise HTTPException(400) from error
+        return JSONResponse({"replay": "ok"})
+
+    async def folder(self, request: Request) -> Response:
+        """What lies in the folder."""
+        return JSONResponse({"entries": await self._folder(request).entries()})
+
+    async def figure(self, request: Request) -> Response:
+        """The figure of a file."""
+        return Response(await self._of_file(request, "figure"), media_type="image/png")
+
+    async def table(self, request: Request) -> Response:
+        """The table of a file."""
+        return Response(await self._of_file(request, "table"), media_type="text/plain; charset=utf-8")
+
+    def _folder(self, request: Request) -> "Folder":
+        self._must_be_known(request)
+        if self._site.folder is None:
+            raise HTTPException(404)
+        return self._site.folder
+
+    async def _of_file(self, request: Request, what: str) -> bytes:
+        try:
+            return await self._folder(request).made(what, request.path_params["n"])
+        except KeyError:
+            raise HTTPException(404) from None
+        except ChildFailed as error:
+            raise HTTPException(422, f"It cannot be shown: {error}.") from error
+
+    async def _form(self, request: Request) -> dict[str, str]:
+        """Return the fields of a form that comes from the page."""
+        self._must_be_known(request)
+        if request.headers.get("content-type", "").partition(";")[0].strip() != "application/x-www-form-urlencoded":
+            raise HTTPException(415)
+        body = b""
+        try:
+            async with asyncio.timeout(FORM_S):
+                async for part in request.stream():
+                    body += part
+                    if len(body) > LARGEST_FORM:
+                        raise HTTPException(413)
+        except (TimeoutError, ClientDisconnect):
+            raise HTTPException(408) from None
+        try:
+            fields = parse_qs(body.decode("ascii"), max_num_fields=8)
+        except ValueError:
+            raise HTTPException(400) from None
+        if not self._keys.acts(fields.get("token", [""])[0]):
+            raise HTTPException(403)
+        return {name: values[0] for name, values in fields.items()}
+
+    def _must_be_known(self, request: Request) -> None:
+        if not self._keys.known(request.headers):
+            raise HTTPException(403)
+
+    async def refused(self, request: Request, error: Exception) -> Response:
+        """Say in plain words what is wrong."""
+        status = error.status_code if isinstance(error, HTTPException) else 500
+        texts = {
+            403: "This browser is not known here.",
+            404: "There is no such page.",
+            500: "The page's server has failed.",
+        }
+        told = (
+            error.detail if isinstance(error, HTTPException) and status == 422 else "The request cannot be understood."
+        )
+        return _refusal(request.scope, status, texts.get(status, told))
+
+
+def _refusal(scope: Scope, status: int, text: str) -> Response:
+    """Return the answer to a request that is refused; if it was to stop, say that it did not."""
+    stops = scope["path"] == "/stop"
+    accepts = dict(scope["headers"]).get(b"accept", b"")
+    heading = NOT_STOPPED if stops else "Not here"
+    if b"application/json" in accepts:
+        return JSONResponse({"state": "failed" if stops else "refused", "text": f"{heading}. {text}"}, status)
+    return plain_page(
+        heading, text, ELSEWHERE if stops else HOW_TO_ENTER, status=status, kind="failed" if stops else ""
+    )
+
+
+def _files() -> list[Path]:
+    return [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]

@@ -1,0 +1,70 @@
+"""What is said after STOP, until the output is at 0 V."""
+
+import time
+
+from rig.live.reader import View
+from rig.monitor.feed import Moment
+from rig.monitor.plain_pages import HARDWARE
+from rig.text.printable import error_text
+
+__all__ = ["Stopping"]
+
+SILENT_S = 2.0
+REST_S = 10.0
+"""Time beyond the ramp for what a run may be doing before it looks."""
+BY_PAGE = "stopped on the page"
+
+
+class Stopping:
+    """Leaves the request to stop and follows what comes of it."""
+
+    def __init__(self) -> None:
+        self._asked: View | None = None
+        self._asked_s = 0.0
+        self._refused = ""
+
+    def ask(self, view: View | None) -> None:
+        """Ask the run that is shown to ramp down."""
+        if view is None:
+            return
+        if view is not self._asked:
+            self._asked, self._asked_s = view, time.monotonic()
+        self._refused = ""
+        try:
+            view.request_stop(BY_PAGE)
+        except Exception as error:  # whatever it is, it must be said
+            self._refused = error_text(error)
+
+    def state(self, moment: Moment | None) -> tuple[str, str, str]:
+        """Return a word, a heading and a sentence on where the ramp is.
+
+        The word is ``none`` (no run), ``driven`` (nobody has asked here), ``asked``, ``ramping``, ``off`` or ``failed``.
+        ``moment`` is None if the run cannot be read.
+        """
+        if moment is None:
+            return "failed", HARDWARE, "A stop may be asked for, but what the run does cannot be read."
+        shown = moment.shown or {}
+        cause = f" {shown['cause']}." if shown.get("cause") else ""
+        if moment.view is None or moment.facts is None:
+            return "none", "NO RUN IS UNDER WAY", "There is nothing to stop here."
+        if hasattr(moment.view, "replay_state"):
+            return "none", "THIS IS A RECORDING", "Nothing is driven from here: there is nothing to stop."
+        if not moment.connected:
+            if shown.get("output_off") or (moment.ended and "guard" not in shown):  # the last: nothing was driven
+                return "off", "OUTPUT AT 0 V", f"The run is over.{cause}"
+            how = cause or " Its process has ended without a word."
+            return "failed", HARDWARE, f"The run is over, and what the output does is not known here.{how}"
+        if shown.get("output_off") and cause:
+            return "off", "OUTPUT AT 0 V", cause.strip()
+        if self._asked is not moment.view:
+            return "driven", "NO STOP WAS ASKED FOR", f"The run is under way: {shown.get('state', 'starting')}."
+        if self._refused:
+            return "failed", HARDWARE, f"The request could not be left: {self._refused}."
+        if shown.get("age_s", 0.0) > SILENT_S:
+            return "failed", HARDWARE, f"A stop is asked for, but the run has said nothing for {shown['age_s']:.0f} s."
+        waited_s = time.monotonic() - self._asked_s
+        if waited_s > moment.facts["limits"]["ramp_down_s"] + REST_S:
+            return "failed", HARDWARE, f"The output is not at 0 V after {waited_s:.0f} s.{cause}"
+        if shown.get("guard") == "ramping down":
+            return "ramping", "RAMPING DOWN", f"Output {shown['voltage_v']:.3f} V.{cause}"
+        return "asked", "STOP IS ASKED FOR", "The ramp begins as soon as the run looks, twenty times a second."

@@ -1,0 +1,162 @@
+"""A run watched in a terminal until it is over; as plain lines where there is no terminal."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from rig.live.reader import View
+from rig.monitor.shown import shown_frame
+from rig.monitor.words import event_text, point_text, state_text
+from rig.text.printable import printable
+
+__all__ = ["PlainLines", "how_it_ended", "keys_of_the_terminal", "watch"]
+
+LOOK_S = 0.1
+DRAWINGS_PER_S = 5.0
+DEAD = "its process has ended without a word: what the output does is not known, USE THE HARDWARE STOP"
+Keys = Callable[[], str]
+
+
+def watch(view: View, keys: Keys = lambda: "") -> bool:
+    """Show a view until its run is over; return whether it was told how it ended.
+
+    ``keys`` returns the key that was pressed since, if any: they steer a replay (`_steer`), and ``q`` ends it.
+    """
+    if sys.stdout is not None and sys.stdout.isatty():
+        return _drawn(view, keys)
+    return _printed(view)
+
+
+def how_it_ended(lines: "list[dict[str, Any]]") -> str | None:
+    """Return how the run ended, if that was told and no part was begun since."""
+    return printable(str(lines[-1].get("text", ""))) if lines and lines[-1]["is"] == "end" else None
+
+
+class PlainLines:
+    """Prints what is new of a view: its points, events, remarks, ends, and a line for every state that it comes to."""
+
+    def __init__(self, view: View, say: Callable[[str], None]) -> None:
+        self._view, self._say = view, say
+        self._lines: list[dict[str, Any]] = []
+        self._state = ""
+
+    @property
+    def ended(self) -> str | None:
+        """How the run ended, if that was told."""
+        return how_it_ended(self._lines)
+
+    def look(self) -> None:
+        """Print what is new."""
+        facts = self._view.facts
+        new = self._view.lines(len(self._lines))
+        self._lines += new
+        for line in new:
+            if text := point_text(line, facts) if line["is"] == "point" else event_text(line, facts):
+                self._say(text)
+        shown = shown_frame(self._view.frame(), facts, self._lines)
+        if shown["state"] != self._state:
+            self._state = str(shown["state"])
+            self._say(state_text(shown, facts))
+
+
+def _printed(view: View) -> bool:
+    lines = PlainLines(view, _print)
+    while True:
+        connected = _goes_on(view)  # asked first: what was told last is read afterwards
+        lines.look()
+        if not connected:
+            break
+        time.sleep(LOOK_S)
+    if lines.ended is None:
+        _print(DEAD)
+    return lines.ended is not None
+
+
+def _drawn(view: View, keys: Keys) -> bool:
+    from rich.console import Console
+    from rich.live import Live
+
+    from rig.monitor.terminal import draw
+
+    console = Console()
+    lines: list[dict[str, Any]] = []
+    generation = 0
+    with Live(console=console, screen=True, auto_refresh=False) as screen:
+        while True:
+            connected = view.connected
+            if (now := getattr(view, "generation", 0)) != generation:  # a replay has jumped: its lines begin anew
+                generation, lines = now, []
+            lines += view.lines(len(lines))
+            shown = shown_frame(view.frame(), view.facts, lines)
+            size = (console.size.width, console.size.height)
+            page = draw(shown, view.facts, lines, size=size, connected=connected, replay=_replay(view))
+            screen.update(page, refresh=True)
+            key = keys()
+            if not connected or key == "q":
+                break
+            _steer(view, key)
+            time.sleep(1.0 / DRAWINGS_PER_S)
+    ended = how_it_ended(lines)
+    if _replay(view) is None:
+        _print(f"{view.facts['recording']}: {DEAD if ended is None else ended}")
+    return ended is not None or _replay(view) is not None
+
+
+def _replay(view: View) -> Mapping[str, Any] | None:
+    state: Mapping[str, Any] | None = getattr(view, "replay_state", lambda: None)()
+    return state
+
+
+def _goes_on(view: View) -> bool:
+    """Return whether there is more to come: a replay is over at the end of its recording."""
+    replay = _replay(view)
+    return view.connected if replay is None else replay["time_s"] < replay["duration_s"]
+
+
+def _steer(view: Any, key: str) -> None:
+    """Pause or go on with the space bar; jump by a twentieth of a recording with the arrows."""
+    replay = _replay(view)
+    if replay is None or not key:
+        return
+    jump_s = replay["duration_s"] / 20.0
+    if key == " ":
+        (view.pause if replay["playing"] else view.play)()
+    elif key in ("left", "right"):
+        view.seek(replay["time_s"] + (jump_s if key == "right" else -jump_s))
+
+
+@contextmanager
+def keys_of_the_terminal() -> Iterator[Keys]:
+    """Yield a function that returns the key pressed since it was last called: a letter, ``left``, ``right``, or nothing."""
+    try:
+        import select
+        import termios
+        import tty
+    except ImportError:  # Windows
+        yield lambda: ""
+        return
+    if sys.stdin is None or not sys.stdin.isatty():
+        yield lambda: ""
+        return
+    descriptor = sys.stdin.fileno()
+    before = termios.tcgetattr(descriptor)
+
+    def pressed() -> str:
+        import os
+
+        if not select.select([descriptor], [], [], 0.0)[0]:
+            return ""
+        typed = os.read(descriptor, 16).decode(errors="replace")
+        return {"\x1b[D": "left", "\x1b[C": "right"}.get(typed[:3], typed[:1])
+
+    try:
+        tty.setcbreak(descriptor)
+        yield pressed
+    finally:
+        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+
+def _print(line: str) -> None:
+    print(line, flush=True)

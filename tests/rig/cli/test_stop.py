@@ -1,0 +1,217 @@
+"""``rig stop`` and ``rig watch`` from another process than the run's; the line that tells of them."""
+
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from rig.live.place import runs
+from rig.live.reader import LiveRun
+from rig.tick.safety.layout import GuardMode
+from tests.docs.pages import ROOT
+from tests.waiting import wait_until
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="locks of files of dead processes")
+
+PLAN = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4, 0.8]
+record_periods = 400
+
+[controller]
+low_pass_rad_s = 6.283185307179586
+k1 = 2.0
+k2 = 6.283185307179586
+centre_frequency_hz = 24.0
+frequency_window_hz = [21.933, 26.807]
+"""
+RIG = [sys.executable, "-c", "from rig.cli import main; main()"]
+
+
+@pytest.fixture(autouse=True)
+def place(monkeypatch, tmp_path):
+    monkeypatch.setenv("VIBROLOCK_LIVE", str(tmp_path / "live"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plan.toml").write_text(PLAN)
+    return tmp_path
+
+
+def said(*arguments):
+    """Run a command; return status, standard output and error."""
+    done = subprocess.run([*RIG, *arguments], capture_output=True, text=True, timeout=300)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture
+def running():
+    """Start runs that take half a minute by the clock; wait until each is driven."""
+    children = []
+
+    def start(name):
+        command = [*RIG, "run", "plan.toml", "--realtime", "-o", name]
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        children.append(child)
+        wait_until(lambda: driven(name), f"{name} is driven")
+        return child
+
+    yield start
+    for child in children:
+        child.kill()
+        child.communicate()
+
+
+def driven(name):
+    for folder in runs():
+        with suppress(Exception), LiveRun(folder) as run:
+            frame = run.frame()
+            if run.facts["recording"].endswith(name) and frame is not None:
+                return frame.state["guard"] == GuardMode.ARMED and frame.state["voltage_v"] > 0.1
+    return False
+
+
+def test_a_run_is_stopped_from_another_process_and_the_status_says_that_it_is_at_0_v(running):
+    child = running("run.h5")
+    began = time.monotonic()
+    status, out, err = said("stop")
+    took_s = time.monotonic() - began
+    assert (status, err) == (0, "")
+    assert re.fullmatch(r"\S+/run\.h5 \(process \d+\): output at 0 V\n", out)
+    assert f"(process {child.pid})" in out
+    text, _ = child.communicate(timeout=120)
+    assert child.returncode == 1  # the plan was not completed
+    assert re.search(r"stopped by `rig stop` \(process \d+\): 0 of 2 points accepted", text)
+    assert took_s < 30.0
+
+
+def test_of_two_runs_the_named_one_is_stopped_and_then_all(running):
+    one, other = running("one.h5"), running("other.h5")
+    status, out, _ = said("stop", "one.h5")
+    assert (status, out.count("\n")) == (0, 1)
+    one.communicate(timeout=120)
+    assert other.poll() is None
+    assert driven("other.h5")
+    another = running("another.h5")
+    status, out, _ = said("stop")
+    assert status == 0
+    assert sorted(re.findall(r"(\w+)\.h5", out)) == ["another", "other"]
+    for child in (other, another):
+        child.communicate(timeout=120)
+        assert child.returncode == 1
+
+
+def test_without_a_run_one_line_says_so():
+    assert said("stop") == (1, "", "rig: no run is under way\n")
+    assert said("stop", "run.h5") == (1, "", "rig: run.h5: no run into this file is under way\n")
+    (status, out, err) = said("stop", "--timeout", "-1")
+    assert (status, out) == (2, "")
+    assert "timeout" in err
+
+
+def test_a_run_that_does_not_answer_or_is_killed_wants_the_hardware_stop(running):
+    child = running("run.h5")
+    loop = [int(pid) for pid in children_of(child.pid)]
+    os.kill(child.pid, signal.SIGSTOP)
+    status, out, _ = said("stop", "--timeout", "0.5")
+    assert status == 1
+    assert "not at 0 V within 0." in out
+    assert out.endswith("USE THE HARDWARE STOP\n")
+    stopping = subprocess.Popen([*RIG, "stop"], stdout=subprocess.PIPE, text=True)
+    wait_until(lambda: "/frame\n" in Path(f"/proc/{stopping.pid}/maps").read_text(), "rig stop follows the run")
+    child.kill()
+    out, _ = stopping.communicate(timeout=120)
+    assert stopping.returncode == 1
+    assert "its process has ended without a word: USE THE HARDWARE STOP" in out
+    wait_until(lambda: not any(alive(pid) for pid in loop), "the loop's process follows the run's")
+
+
+def children_of(pid):
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_watching_in_plain_lines_begins_before_the_run_and_ends_with_it(running):
+    watching = subprocess.Popen(
+        [*RIG, "watch", "run.h5"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1
+    )
+    assert watching.stderr.readline() == "no run into run.h5 is under way; waiting\n"
+    running("run.h5")
+    assert said("stop", "run.h5")[0] == 0
+    out, err = watching.communicate(timeout=120)
+    assert (watching.returncode, err) == (0, "")
+    lines = out.splitlines()
+    assert any(re.match(r"[\d.]+ s  (searching|settling)  point 1 of 2  level 0\.\d+ V  ", line) for line in lines)
+    assert any(line.endswith("guard: ramping") for line in lines)
+    assert re.search(r"end: stopped by `rig stop` \(process \d+\)", out)
+
+
+def test_ctrl_c_ends_the_watching_and_leaves_the_run(running):
+    child = running("run.h5")
+    watching = subprocess.Popen([*RIG, "watch"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    watching.stdout.readline()
+    watching.send_signal(signal.SIGINT)
+    _, err = watching.communicate(timeout=120)
+    assert (watching.returncode, err) == (0, "watched no longer; a run goes on\n")
+    assert child.poll() is None
+    assert driven("run.h5")
+
+
+def test_watching_a_run_that_is_killed_ends_with_status_1(running):
+    child = running("run.h5")
+    watching = subprocess.Popen([*RIG, "watch"], stdout=subprocess.PIPE, text=True)
+    watching.stdout.readline()
+    child.kill()
+    out, _ = watching.communicate(timeout=120)
+    assert watching.returncode == 1
+    assert out.splitlines()[-1].endswith("USE THE HARDWARE STOP")
+
+
+def on_a_terminal(*arguments):
+    """Run a command with a terminal for all its streams; return its status and what it showed."""
+    leader, follower = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "100", "LINES": "30"}
+    child = subprocess.Popen(
+        [*RIG, *arguments], stdin=follower, stdout=follower, stderr=follower, env=environment, start_new_session=True
+    )
+    os.close(follower)
+    shown = b""
+    with suppress(OSError):  # the terminal is gone with the last process that has it open
+        while data := os.read(leader, 65536):
+            shown += data
+    os.close(leader)
+    return child.wait(300), shown.decode(errors="replace")
+
+
+def test_a_run_on_a_terminal_says_how_to_watch_and_stop_it():
+    _, shown = on_a_terminal("run", "magnet-beam/backbone-short", "-o", "run.h5")
+    assert shown.startswith("in another terminal, `rig watch` shows this run and `rig stop` ramps it down\r\n")
+    assert "rig watch" not in said("run", "magnet-beam/backbone-short", "-o", "again.h5")[2]
+
+
+def test_on_a_terminal_a_run_is_drawn_and_its_end_stays_to_be_read(running):
+    running("run.h5")
+    stopping = subprocess.Popen(
+        [sys.executable, "-c", "import time; time.sleep(3); from rig.cli import main; main()", "stop"]
+    )
+    status, shown = on_a_terminal("watch")
+    assert stopping.wait(60) == 0
+    assert status == 0
+    assert "frequency" in shown
+    assert " Hz" in shown
+    last = shown.split("\x1b[?1049l")[-1]  # back on the screen that was there before
+    assert "stopped by `rig stop`" in last

@@ -1,0 +1,37 @@
+"""``rig`` as a process of its own, and the address that it prints."""
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from tests.waiting import LONG_S
+
+CODE = "from rig.cli import main; main()"
+
+
+def started(*words: str, **options: object) -> "subprocess.Popen[str]":
+    """A process with its output to be read."""
+    return subprocess.Popen(
+        [sys.executable, "-c", CODE, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )  # type: ignore[call-overload]
+
+
+def address_in(line: str) -> str:
+    """The address that a line tells."""
+    found = re.search(r"https?://\S+\?token=[\w-]+", line)
+    assert found is not None, line
+    return found[0]
+
+
+@contextmanager
+def monitor(*words: str, **options: object) -> Iterator[tuple["subprocess.Popen[str]", str]]:
+    """``rig monitor`` and its address; killed afterwards if it still goes on."""
+    with started("monitor", *words, **options) as process:
+        assert process.stdout is not None
+        try:
+            yield process, address_in(process.stdout.readline())
+        finally:
+            process.kill()
+            process.communicate(timeout=LONG_S)
