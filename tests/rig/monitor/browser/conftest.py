@@ -90,6 +90,13 @@ class Browser:
     def click(self, name):
         self.driver.find_element("id", name).click()
 
+    def point_at(self, selector):
+        """Move the pointer into the middle of an element."""
+        from selenium.webdriver import ActionChains
+
+        found = self.driver.find_element("css selector", selector)
+        ActionChains(self.driver).move_to_element(found).perform()
+
     def press(self, key):
         self.driver.find_element("tag name", "body").send_keys(key)
 
