@@ -6,6 +6,7 @@ import logging
 import os
 import socket
 import ssl
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -20,7 +21,6 @@ from rig.live.reader import View
 from rig.monitor.certificate import from_files, self_signed
 from rig.monitor.connections import MOST_CONNECTIONS, FeedConnection, WebConnection
 from rig.monitor.feed import Feed, Look
-from rig.monitor.folder import Folder
 from rig.monitor.opening import open_in_browser
 from rig.monitor.security import Keys
 from rig.monitor.server import Site, application
@@ -132,7 +132,11 @@ class PageServer:
         names = (self.address.host, *LOOPBACK) if self.address.loopback else (self.address.host,)
         self.hosts = frozenset(f"{name}:{self.port}" for name in names)
         self.feed = Feed(self.look, self.earlier)
-        folder = None if self.folder is None else Folder(self.folder)
+        folder = None
+        if self.folder is not None:
+            from rig.monitor.folder import Folder  # the page of a single run starts without it
+
+            folder = Folder(self.folder)
         site = Site(self.feed, self.keys, self.scheme, self.hosts, folder)
         config = uvicorn.Config(
             application(site),
@@ -152,7 +156,8 @@ class PageServer:
         config.load()
         config.ssl = secured[0] if secured else None
         self._server = uvicorn.Server(config)
-        logging.getLogger("uvicorn").setLevel(logging.CRITICAL)
+        for name in ("uvicorn", "asyncio"):  # what clients do wrong is no news for a terminal, which might be held
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
     @property
     def url(self) -> str:
@@ -226,7 +231,10 @@ def _way_in(server: PageServer, open_browser: bool) -> Iterator[None]:
     def used() -> None:
         if file is not None:
             file.unlink(missing_ok=True)
-        _say(f"for another browser: {server.url}")
+        line = f"for another browser: {server.url}"
+        threading.Thread(
+            target=_say, args=(line,), daemon=True
+        ).start()  # a terminal that is held must not hold the page
 
     server.keys.on_entry = used
     try:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
@@ -22,12 +22,14 @@ from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rig.monitor.connections import MOST_SOCKETS
-from rig.monitor.feed import Feed, Place
-from rig.monitor.folder import Folder
+from rig.monitor.feed import Feed, Moment, Place
 from rig.monitor.plain_pages import HARDWARE, plain_page
 from rig.monitor.security import Guard, Keys
 from rig.monitor.stopping import Stopping
 from rig.system.child import ChildFailed
+
+if TYPE_CHECKING:
+    from rig.monitor.folder import Folder
 
 __all__ = ["Site", "application"]
 
@@ -41,6 +43,7 @@ TYPES = {
 }
 LARGEST_FORM = 1024
 FORM_S = 5.0
+READ_S = 3.0
 NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
 ELSEWHERE = "Or type in a terminal of the same user: rig stop"
 HOW_TO_ENTER = (
@@ -57,7 +60,7 @@ class Site:
     keys: Keys
     scheme: str
     hosts: frozenset[str]
-    folder: Folder | None = None
+    folder: "Folder | None" = None
     stopping: Stopping = field(default_factory=Stopping)
 
 
@@ -87,7 +90,7 @@ def application(site: Site) -> ASGIApp:
         Route("/folder/{n:int}/figure.png", pages.figure),
         Route("/folder/{n:int}/table.txt", pages.table),
     ]
-    handlers: Mapping[Any, Any] = {HTTPException: pages.refused}
+    handlers: Mapping[Any, Any] = {HTTPException: pages.refused, Exception: pages.refused}
     return Guard(
         Starlette(routes=routes, lifespan=reading, exception_handlers=handlers), site.scheme, site.hosts, _refusal
     )
@@ -170,16 +173,26 @@ class _Pages:
     async def stop(self, request: Request) -> Response:
         """Ask the run to ramp down, and say what comes of it."""
         await self._form(request)
-        self._site.stopping.ask(self._feed.view or (await self._feed.fresh()).view)
-        return await self._where_the_ramp_is(request)
+        view = self._feed.view
+        self._site.stopping.ask(view)
+        moment = await self._now()
+        if moment is not None and moment.view is not view:  # another run has begun meanwhile
+            self._site.stopping.ask(moment.view)
+        return self._where_the_ramp_is(request, moment)
 
     async def stopping(self, request: Request) -> Response:
         """Where the ramp is."""
         self._must_be_known(request)
-        return await self._where_the_ramp_is(request)
+        return self._where_the_ramp_is(request, await self._now())
 
-    async def _where_the_ramp_is(self, request: Request) -> Response:
-        word, heading, text = self._site.stopping.state(await self._feed.fresh())
+    async def _now(self) -> Moment | None:
+        """Return what there is now; None if it cannot be read in time."""
+        with contextlib.suppress(TimeoutError):
+            return await asyncio.wait_for(self._feed.fresh(), READ_S)
+        return None
+
+    def _where_the_ramp_is(self, request: Request, moment: Moment | None) -> Response:
+        word, heading, text = self._site.stopping.state(moment)
         if "application/json" in request.headers.get("accept", ""):
             return JSONResponse({"state": word, "text": f"{heading}. {text}"})
         onward = "" if word in ("none", "off", "driven") else "/stopping"
@@ -209,7 +222,7 @@ class _Pages:
         """The table of a file."""
         return Response(await self._of_file(request, "table"), media_type="text/plain; charset=utf-8")
 
-    def _folder(self, request: Request) -> Folder:
+    def _folder(self, request: Request) -> "Folder":
         self._must_be_known(request)
         if self._site.folder is None:
             raise HTTPException(404)
@@ -252,7 +265,11 @@ class _Pages:
     async def refused(self, request: Request, error: Exception) -> Response:
         """Say in plain words what is wrong."""
         status = error.status_code if isinstance(error, HTTPException) else 500
-        texts = {403: "This browser is not known here.", 404: "There is no such page."}
+        texts = {
+            403: "This browser is not known here.",
+            404: "There is no such page.",
+            500: "The page's server has failed.",
+        }
         told = (
             error.detail if isinstance(error, HTTPException) and status == 422 else "The request cannot be understood."
         )

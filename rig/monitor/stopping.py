@@ -2,10 +2,10 @@
 
 import time
 
-from rig.errors import RecordingError
 from rig.live.reader import View
 from rig.monitor.feed import Moment
 from rig.monitor.plain_pages import HARDWARE
+from rig.text.printable import error_text
 
 __all__ = ["Stopping"]
 
@@ -32,14 +32,17 @@ class Stopping:
         self._refused = ""
         try:
             view.request_stop(BY_PAGE)
-        except RecordingError as error:
-            self._refused = str(error)
+        except Exception as error:  # whatever it is, it must be said
+            self._refused = error_text(error)
 
-    def state(self, moment: Moment) -> tuple[str, str, str]:
+    def state(self, moment: Moment | None) -> tuple[str, str, str]:
         """Return a word, a heading and a sentence on where the ramp is.
 
         The word is ``none`` (no run), ``driven`` (nobody has asked here), ``asked``, ``ramping``, ``off`` or ``failed``.
+        ``moment`` is None if the run cannot be read.
         """
+        if moment is None:
+            return "failed", HARDWARE, "A stop may be asked for, but what the run does cannot be read."
         shown = moment.shown or {}
         cause = f" {shown['cause']}." if shown.get("cause") else ""
         if moment.view is None or moment.facts is None:

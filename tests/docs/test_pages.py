@@ -32,6 +32,7 @@ NOT_RUN = {
     ("docs/emulator.md", "runs until Ctrl-C"),
     ("docs/hardware-in-the-loop.md", "takes half a minute each; tests/hardware runs the same"),
     ("docs/monitor.md", "runs until Ctrl-C"),
+    ("docs/monitor.md", "takes a minute by the clock and needs Chromium"),
     ("docs/user-guide.md", "a minute of wall clock"),
     ("docs/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/writing-a-driver.md", "installs a package"),

@@ -4,10 +4,11 @@ import html
 import re
 import subprocess
 import sys
+import threading
 
 import pytest
 
-from rig.monitor import stopping
+from rig.monitor import server, stopping
 from rig.monitor.sources import Latest, chosen
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode
@@ -106,6 +107,25 @@ def test_a_request_that_cannot_be_left_says_to_use_the_hardware_stop(run, inside
     assert onward(answer)
     run.step(GuardMode.OFF, EndReason.FORCE_LIMIT)
     assert heading(inside.get("/stopping")) == "OUTPUT AT 0 V"
+
+
+def test_a_run_that_cannot_be_read_is_asked_all_the_same(run, inside, monkeypatch):
+    over = threading.Event()
+    monkeypatch.setattr(server, "READ_S", 0.1)
+    monkeypatch.setattr(run, "frame", over.wait)
+    try:
+        answer = inside.stop()
+        assert heading(answer) == "USE THE HARDWARE STOP"
+        assert run.stops == ["stopped on the page"]
+    finally:
+        over.set()
+
+
+def test_a_server_that_fails_over_it_says_to_use_the_hardware_stop(run, inside, monkeypatch):
+    monkeypatch.setattr(stopping.Stopping, "ask", lambda self, view: 1 / 0)
+    answer = inside.stop()
+    assert answer.status == 500
+    assert heading(answer) == "NOT STOPPED: USE THE HARDWARE STOP"
 
 
 def test_a_run_that_has_died_says_to_use_the_hardware_stop(run, inside):
