@@ -64,7 +64,7 @@ def test_a_trip_names_channel_value_and_cause_and_the_output_at_0_v_once_it_is(p
     told.trip()
     page.shows("state", "tripped")
     assert page.text("cause") == "force above its limit on channel force: 35.2 N"
-    assert page.text("detail") == "ramping down"
+    assert page.text("detail") == "ramping down, output 0.39 V"
     told.end("force above its limit on channel force (35.2 N)", EndReason.FORCE_LIMIT)
     page.shows("detail", "OUTPUT AT 0 V")
 
