@@ -126,7 +126,7 @@ def test_a_run_that_does_not_answer_or_is_killed_wants_the_hardware_stop(running
     assert "not at 0 V within 0." in out
     assert out.endswith("USE THE HARDWARE STOP\n")
     stopping = subprocess.Popen([*RIG, "stop"], stdout=subprocess.PIPE, text=True)
-    time.sleep(1.0)
+    wait_until(lambda: "/frame\n" in Path(f"/proc/{stopping.pid}/maps").read_text(), "rig stop follows the run")
     child.kill()
     out, _ = stopping.communicate(timeout=120)
     assert stopping.returncode == 1
