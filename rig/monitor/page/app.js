@@ -23,7 +23,10 @@ let waiting = false;
 
 const feed = new Feed(token, (message) => {
   for (const part of parts) {
-    if (message.is === "whole") part.reset(message);
+    if (message.is === "whole") {
+      part.reset(message);
+      part.drawn = -Infinity; // it is drawn at once
+    }
     part.take(message);
     part.dirty = true;
   }

@@ -14,7 +14,7 @@ export class Events {
 
   reset({ facts }) {
     this.rate = facts?.sample_rate_hz ?? 1;
-    this.list.replaceChildren();
+    this.anew = true;
     this.new = [];
     this.parts = 0;
   }
@@ -41,6 +41,8 @@ export class Events {
   }
 
   draw() {
+    if (this.anew) this.list.replaceChildren();
+    this.anew = false;
     if (!this.new.length) return;
     const made = this.new.map(([time, kind, text]) => {
       const item = document.createElement("li");

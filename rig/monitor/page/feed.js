@@ -1,6 +1,7 @@
 // What the server says: by a socket while there is one, else by asking twice a second.
 
 const POLL_MS = 500; // a second would look stale
+const SILENCE_MS = 750; // after which the page asks although there is a socket: before it looks stale
 const PATIENCE_MS = 2000; // a socket that says nothing for so long is closed and opened anew
 const RETRY_MS = [250, 500, 1000, 2000];
 
@@ -46,7 +47,7 @@ export class Feed {
   look() {
     const now = performance.now();
     if (this.socket && now - this.since > PATIENCE_MS && now - this.heard > PATIENCE_MS / 2) this.socket.close();
-    if (now - this.heard > POLL_MS / 2) this.poll();
+    if (!this.socket || now - this.heard > SILENCE_MS) this.poll();
   }
 
   async poll() {

@@ -28,11 +28,13 @@ export function plot(element, options, least = 60) {
   return made;
 }
 
-/** Range of an axis around values: some room on both sides, and never nothing. */
-export function around(least, most, room = 0.06) {
+/** Range of an axis around values: some room on both sides, at least `narrowest` wide. */
+export function around(least, most, narrowest = 0) {
   if (!(least <= most)) return [0, 1];
-  const half = Math.max((most - least) * room, 1e-4 * Math.max(Math.abs(least), Math.abs(most)), 1e-9);
-  return [least - half, most + half];
+  const largest = Math.max(Math.abs(least), Math.abs(most));
+  const wide = Math.max(1.12 * (most - least), 2e-4 * largest, narrowest) || 2;
+  const middle = (least + most) / 2;
+  return [middle - wide / 2, middle + wide / 2];
 }
 
 /** Values of ticks without needless digits. */

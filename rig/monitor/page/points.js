@@ -48,8 +48,7 @@ export class Points {
 
   reset({ facts, earlier }) {
     this.clear();
-    this.body.replaceChildren();
-    this.head.replaceChildren();
+    this.anew = true; // the table is emptied when it is drawn: a "whole" that says nothing new must not flicker
     this.facts = facts;
     if (!facts) return;
     const metres = facts.level_unit === "m";
@@ -62,7 +61,6 @@ export class Points {
     this.axes = keys.map((key) => this.columns.find((column) => column.key === key) ?? name);
     this.plot.name(this.axes.map(({ key, ...column }) => ({ key, title: title(column) })));
     this.earlier = (earlier?.lines ?? []).filter((line) => line.is === "point" && line.accepted).map((line) => this.slim(line));
-    this.head.append(row("th", [...this.shown.map(title), "quality"]));
     this.changed = true;
   }
 
@@ -93,7 +91,7 @@ export class Points {
 
   draw() {
     if (!this.facts) return;
-    if (this.fresh.length) this.drawTable();
+    if (this.anew || this.fresh.length) this.drawTable();
     const present = this.present();
     if (this.changed || present || this.shownPresent) this.plot.show([...this.points.values()], this.earlier, present);
     this.shownPresent = present;
@@ -106,6 +104,11 @@ export class Points {
   }
 
   drawTable() {
+    if (this.anew) {
+      this.head.replaceChildren(row("th", [...this.shown.map(title), "quality"]));
+      this.body.replaceChildren();
+    }
+    this.anew = false;
     const below = this.scroll.scrollTop + this.scroll.clientHeight >= this.scroll.scrollHeight - 30;
     for (const [number, point] of this.fresh) {
       const mark = !point.accepted ? "✕" : point.quality === "good" ? "●" : "○";

@@ -100,7 +100,7 @@ export class Status {
     const frame = this.message?.frame;
     const known = frame?.state ?? "starting";
     const away = connection === "gone" || connection === "died";
-    const state = connection === "none" ? "no run" : away ? "NOT CONNECTED" : known;
+    const state = { none: "no run", waiting: "no data", gone: "NOT CONNECTED", died: "NOT CONNECTED" }[connection] ?? known;
     document.body.dataset.connection = connection;
     document.body.dataset.state = away ? "away" : known;
     say(at("state"), state);
@@ -114,9 +114,10 @@ export class Status {
     if (connection === "stale") return `STALE: nothing new for ${number(this.age(), 1)} s`;
     if (!frame || connection === "none") return "";
     const [good, wanted] = frame.settled ?? [];
-    const off = this.message.replay ? "replay, nothing moves" : frame.output_off ? "OUTPUT AT 0 V" : frame.guard;
-    if (frame.state === "settling" && wanted) return `${good} of ${wanted} periods · ${off}`;
-    return off ?? "";
+    const output = `output ${quantity(frame.voltage_v, "V", 3)}`;
+    const guard = frame.output_off ? "OUTPUT AT 0 V" : frame.guard === "ramping down" ? `ramping down, ${output}` : frame.guard;
+    const now = this.message.replay ? "replay, nothing moves" : (guard ?? "");
+    return frame.state === "settling" && wanted ? `${good} of ${wanted} periods · ${now}` : now;
   }
 
   /** Why the output came down. Where a run ended before it told that it is at 0 V, somebody has to see to that. */

@@ -16,7 +16,7 @@ export class Stop {
       this.press();
     });
     document.addEventListener("keydown", (event) => {
-      if (event.key !== KEY || event.repeat || !form.checkVisibility()) return;
+      if (event.key !== KEY || event.repeat || !form.getClientRects().length) return;
       event.preventDefault();
       this.press();
     });

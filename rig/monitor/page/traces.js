@@ -14,8 +14,8 @@ const SPANS = [
 const LOCKED = 2;
 const ARMED = 1;
 const STRIPS = [
-  { key: "frequency_hz", name: "frequency", unit: "Hz", digits: 6, ink: "text" },
-  { key: "phase_error_deg", name: "phase error", unit: "°", digits: 3, ink: "text" },
+  { key: "frequency_hz", name: "frequency", unit: "Hz", digits: 6, narrowest: 0.01, ink: "text" },
+  { key: "phase_error_deg", name: "phase error", unit: "°", digits: 3, narrowest: 1, ink: "text" },
   { key: "force", name: "force", role: "force", ink: "force" },
   { key: "drive", name: "response", role: "drive", ink: "response" },
   { key: "voltage_v", name: "drive voltage", unit: "V", ink: "output", fromZero: true },
@@ -109,7 +109,7 @@ export class Traces {
 
   rangeOf(strip, low, high) {
     if (low == null) return [0, 1];
-    return strip.fromZero ? [0, Math.max(high * 1.08, 1e-3)] : around(low, high, 0.08);
+    return strip.fromZero ? [0, Math.max(high * 1.08, 1e-3)] : around(low, high, strip.narrowest);
   }
 
   /** Hatch where the loop was not locked. */

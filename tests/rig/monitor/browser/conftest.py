@@ -11,11 +11,11 @@ import pytest
 from rig.monitor.process import PageServer
 from rig.monitor.sources import always
 from tests.rig.monitor.browser.told import Told
+from tests.waiting import LONG_S
 
 REQUIRED = "VIBROLOCK_BROWSER"
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome"), ("chromedriver",)
 ARGUMENTS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--window-size=1400,900")
-PATIENCE_S = 30.0
 
 
 def without_a_browser(why):
@@ -47,7 +47,7 @@ def started(chromium="chromium", chromedriver="chromedriver"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which(chromedriver)))
-    driver.set_page_load_timeout(PATIENCE_S)
+    driver.set_page_load_timeout(LONG_S)
     return driver
 
 
@@ -66,7 +66,7 @@ class Browser:
         from selenium.webdriver.support.wait import WebDriverWait
 
         wait = WebDriverWait(
-            self.driver, PATIENCE_S, poll_frequency=0.02, ignored_exceptions=[StaleElementReferenceException]
+            self.driver, LONG_S, poll_frequency=0.02, ignored_exceptions=[StaleElementReferenceException]
         )
         try:
             return wait.until(lambda _: condition())
@@ -89,6 +89,13 @@ class Browser:
 
     def click(self, name):
         self.driver.find_element("id", name).click()
+
+    def point_at(self, selector):
+        """Move the pointer into the middle of an element."""
+        from selenium.webdriver import ActionChains
+
+        found = self.driver.find_element("css selector", selector)
+        ActionChains(self.driver).move_to_element(found).perform()
 
     def press(self, key):
         self.driver.find_element("tag name", "body").send_keys(key)
@@ -145,7 +152,7 @@ def serve(browser):
     browser.driver.get("about:blank")  # before the servers go
     for server, thread in running:
         server.end()
-        thread.join(PATIENCE_S)
+        thread.join(LONG_S)
         assert not thread.is_alive()
         getattr(server.feed.view, "close", lambda: None)()
 

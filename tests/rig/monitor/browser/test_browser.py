@@ -64,7 +64,7 @@ def test_a_trip_names_channel_value_and_cause_and_the_output_at_0_v_once_it_is(p
     told.trip()
     page.shows("state", "tripped")
     assert page.text("cause") == "force above its limit on channel force: 35.2 N"
-    assert page.text("detail") == "ramping down"
+    assert page.text("detail") == "ramping down, output 0.39 V"
     told.end("force above its limit on channel force (35.2 N)", EndReason.FORCE_LIMIT)
     page.shows("detail", "OUTPUT AT 0 V")
 
@@ -81,6 +81,16 @@ def test_curves_scope_harmonics_and_bars_are_drawn(page, told):
     shares = [item.text for item in page.driver.find_elements("css selector", "#shares li")]
     assert len(shares) == 12
     assert any(re.search(r"force limit\s+0\s%\s+of 34.0\sN", text) for text in shares)
+
+
+def test_all_traces_are_read_where_one_is_pointed_at(page, told):
+    told.trace(100)
+    readings = lambda: [text.text for text in page.driver.find_elements("css selector", ".strip b")]  # noqa: E731
+    page.until(lambda: readings()[0].startswith("24.35"), "the last frequency")
+    page.point_at("#canvas-frequency .u-over")
+    page.until(lambda: all(re.search(r" at 0:0\d", text) for text in readings()[:1] + readings()[2:]), "the time")
+    page.point_at("#title")
+    page.until(lambda: not any(" at " in text for text in readings()), "the last values")
 
 
 def test_who_comes_late_sees_all_points_and_one_measured_again_once(browser, serve, told):
