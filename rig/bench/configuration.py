@@ -2,7 +2,7 @@
 
 import json
 import tomllib
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -27,6 +27,7 @@ __all__ = [
 LARGEST_TOML_BYTES = 1_000_000
 MOST_DOTS = 100  # between two commas of a line: the parser's time grows with the square of the number of a key's parts
 MOST_FAULTS = 5  # in one message
+AS_CLOSE = 0.05  # of the likeness of two words
 FEW_NAMES = 10  # listed in one message
 
 
@@ -134,6 +135,13 @@ def _follows(detail: dict[str, Any], details: list[dict[str, Any]]) -> bool:
     return detail["type"] == "too_short" and any(inside)
 
 
+def _closest(key: str, keys: set[str]) -> list[str]:
+    """Return the key that is meant, or all that are as close: ``levels_mN`` may be ``levels_m`` as well as ``levels_n``."""
+    found = get_close_matches(key.lower(), sorted(keys), n=5)
+    likeness = [SequenceMatcher(None, one, key.lower()).ratio() for one in found]
+    return sorted(one for one, like in zip(found, likeness, strict=True) if like >= max(likeness) - AS_CLOSE)
+
+
 def _fault(detail: dict[str, Any], keys: set[str]) -> str:
     path = ""
     for part in detail["loc"]:
@@ -144,8 +152,8 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
             path += f".{part}" if path else str(part)
     message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if detail["type"] == "extra_forbidden":
-        close = get_close_matches(str(detail["loc"][-1])[:100], sorted(keys), n=1)
-        return f"{path}: unknown key" + (f", did you mean {close[0]}?" if close else "")
+        close = _closest(str(detail["loc"][-1])[:100], keys)
+        return f"{path}: unknown key" + (f", did you mean {' or '.join(close)}?" if close else "")
     if detail["type"] == "missing":
         return f"{path}: is missing"
     if detail["type"] == "value_error":

@@ -37,6 +37,8 @@ def _foreign(path: Path) -> str:
         if start.startswith(signature):
             return name
     text = all(32 <= byte < 127 or byte in b"\t\r\n" for byte in start)
+    if text and path.suffix == ".toml" and path.with_suffix(".h5").is_file():
+        return f"a text file; {path.with_suffix('.h5').name} beside it may be what is meant"
     return "a text file" if text else "no HDF5 file"
 
 

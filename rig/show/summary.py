@@ -158,6 +158,7 @@ def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, An
         "overruns": sum(loop["overruns"] for loop in loops),
         "periods": sum(loop["periods"] for loop in loops),
         "wall_s": wall,
+        "by_the_clock": any("wake_up_us" in loop for loop in loops),
         "realtime_factor": samples / rate_hz / busy if busy > 0 else None,
         "end_to_end_factor": samples / rate_hz / wall if wall > 0 else None,
     }

@@ -25,8 +25,7 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     path = Path(printable(str(path)))
     loop = summary["loop"]
     accepted = sum(point["accepted"] for point in summary["points"])
-    factor = loop["realtime_factor"]
-    pace = f", {factor:.0f} times real time in the loop" if factor else ""
+    pace = f", {_pace(loop)} in the loop" if loop["realtime_factor"] and not loop["by_the_clock"] else ""
     ended = summary["parts"][-1]["ended"] if summary["parts"] else "nothing recorded"
     print(f"{ended}: {accepted} of {summary['points_planned']} points accepted, {loop['samples']} samples{pace}")
     for line in (summary["skipped"], summary["measured_again"]):
@@ -46,6 +45,11 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     for name, count in summary["counters"].items():
         if count:
             print(f"warning: {name.replace('_', ' ')}: {count} samples")
+
+
+def _pace(loop: dict[str, Any]) -> str:
+    """Return how fast the loop was; one that a clock paces is neither quick nor slow."""
+    return "by the clock" if loop["by_the_clock"] else f"{loop['realtime_factor']:.0f} times real time"
 
 
 def print_summary(summary: dict[str, Any]) -> None:
@@ -75,8 +79,7 @@ def print_summary(summary: dict[str, Any]) -> None:
         _print_points(summary["kind"], summary["former_points"])
     line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
     if loop["realtime_factor"] is not None:
-        factor = f"{loop['realtime_factor']:.0f} times real time"
-        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {factor}"
+        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {_pace(loop)}"
     print(line)
     for number_shown, part in enumerate(summary["parts"], 1):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""

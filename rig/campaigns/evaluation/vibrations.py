@@ -74,7 +74,7 @@ def failed_point(
         why += ": force or drive signal is too small for its phase to be read"
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
-        why += f" ({phase}amplitude drift {100.0 * drift:.2g} %)"
+        why += f" ({phase}amplitude drift {100.0 * drift:.3g} %)"
     if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
         why += f"; {POLARITY_HINT}"
     failed = replace(planned_point(plan, target), settled=False, settle_periods=float(outcome["periods"]))

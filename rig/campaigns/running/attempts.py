@@ -70,7 +70,7 @@ def _reason(entry: np.void, plays: bool) -> str:
     if int(entry["outcome"]) != Outcome.DISTURBED:
         return ", ".join(told)
     error_deg, drift = math.degrees(float(entry["mean_error_rad"])), 100.0 * float(entry["drift"])
-    course = f" (averaged phase error {error_deg:.2f} deg, amplitude drift {drift:.2g} %)" if not plays else ""
+    course = f" (averaged phase error {error_deg:.2f} deg, amplitude drift {drift:.3g} %)" if not plays else ""
     return "; ".join([f"the settle rule was broken while recording{course}", *told])
 
 

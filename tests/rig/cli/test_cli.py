@@ -252,7 +252,8 @@ def test_a_mistake_is_answered_in_one_line_and_leaves_no_file(command, tmp_path,
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        (("levels_v", "levels_w"), "levels_w: unknown key, did you mean levels_v?"),
+        (("levels_v", "levels_mN"), "levels_mN: unknown key, did you mean levels_m or levels_n?"),
+        (("levels_v", "levels_w"), "levels_w: unknown key, did you mean levels_m or levels_n or levels_v?"),
         (("[0.4, 0.8]", "[0.4, -0.8]"), "levels_v[1] = -0.8: allowed is above 0"),
         (("[0.4, 0.8]", "[]"), "levels_v = []"),
         (("[0.4, 0.8]", "[0.4, 0.4]"), "given twice"),
