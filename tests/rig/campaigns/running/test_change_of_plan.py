@@ -322,7 +322,11 @@ def _toml(text: str) -> str:
         ("--plan magnet-beam/sweep-1", 1, "kind = 'sweep': allowed is 'backbone', the kind of run.h5"),
         ("--plan friction-beam/backbone", 1, "bench = 'friction-beam'"),
         ("--plan magnet-beam/nosuch", 1, "there is no such plan"),
-        ("--plan unknown.toml", 1, "unknown.toml: levels_w: unknown key, did you mean levels_m or levels_n or levels_v?"),
+        (
+            "--plan unknown.toml",
+            1,
+            "unknown.toml: levels_w: unknown key, did you mean levels_m or levels_n or levels_v?",
+        ),
         ("--plan newtons.toml", 1, "newtons.toml: levels in N: allowed are levels in V"),
         ("--plan missing.toml", 1, "missing.toml: there is no such file"),
         ("--seed -1", 2, "--seed"),
