@@ -12,13 +12,17 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
-from rig.errors import RigError
-from rig.monitor.process import PageServer, lower_priority
-from rig.monitor.sources import Latest
-from rig.system.stop_signals import ended_in_order
+from rig.monitor.priority import lower_priority
 
 
 def _main(process: int) -> None:
+    lower_priority()  # before the libraries are read, which takes longest
+
+    from rig.errors import RigError
+    from rig.monitor.process import PageServer
+    from rig.monitor.sources import Latest
+    from rig.system.stop_signals import ended_in_order
+
     gone = threading.Event()
 
     def wait() -> None:
@@ -29,7 +33,6 @@ def _main(process: int) -> None:
         return bool(facts["process"] == process)
 
     threading.Thread(target=wait, name="the run's process", daemon=True).start()
-    lower_priority()
     try:
         server = PageServer(Latest(of_that_process), alone=gone.is_set)
     except (RigError, OSError) as error:

@@ -22,18 +22,18 @@ from rig.monitor.certificate import from_files, self_signed
 from rig.monitor.connections import MOST_CONNECTIONS, FeedConnection, WebConnection
 from rig.monitor.feed import Feed, Look
 from rig.monitor.opening import open_in_browser
+from rig.monitor.priority import lower_priority
 from rig.monitor.security import Keys
 from rig.monitor.server import Site, application
 from rig.monitor.sources import always, of_an_earlier_run
 from rig.system.stop_signals import ended_in_order
 
-__all__ = ["Address", "PageServer", "Serving", "lower_priority", "serve"]
+__all__ = ["Address", "PageServer", "Serving", "serve"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 LARGEST_HEADERS = 16384
 LARGEST_MESSAGE = 1024
 GRACE_S = 2
-NICE = 5
 LINGER_S = 60.0
 """Time after which a server whose run is over ends, once nobody watches any more."""
 
@@ -242,12 +242,6 @@ def _way_in(server: PageServer, open_browser: bool) -> Iterator[None]:
     finally:
         if file is not None:
             file.unlink(missing_ok=True)
-
-
-def lower_priority() -> None:
-    """Let the loop go first where processors are few; what this process starts does the same."""
-    with suppress(OSError, AttributeError):  # not on Windows
-        os.nice(NICE)
 
 
 def _say(line: str) -> None:

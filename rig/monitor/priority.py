@@ -1,0 +1,14 @@
+"""The loop goes first where processors are few."""
+
+import os
+from contextlib import suppress
+
+__all__ = ["lower_priority"]
+
+NICE = 5
+
+
+def lower_priority() -> None:
+    """Let this process, and what it starts, stand back behind those that drive."""
+    with suppress(OSError, AttributeError):  # not on Windows
+        os.nice(NICE)
