@@ -82,11 +82,11 @@ def commands() -> Iterator[Ratio]:
 
 def pnlss() -> Iterator[Ratio]:
     """An iteration of a nonlinear state-space fit."""
-    for name, found in _json("benchmarks.pnlss_iteration", "--json").items():
-        for key, value in found.items():
-            if key.endswith("over_syrk") or key == "times_plain_numpy":
-                over = "dsyrk of its Jacobian's size" if "syrk" in key else "itself; plain numpy in its place"
-                yield Ratio(f"PNLSS iteration, {name}, {key.replace('_', ' ')}", over, value)
+    for threads, sizes in _json("benchmarks.pnlss_iteration", "--json").items():
+        for size, found in sizes.items():
+            what = f"PNLSS iteration, {size}, {threads}"
+            yield Ratio(what, "dsyrk of its Jacobian's size, wall time", found["wall_over_syrk"])
+            yield Ratio(f"plain numpy, {size}, {threads}", "PNLSS iteration", found["times_plain_numpy"])
 
 
 def wall_clock(minutes: float) -> Iterator[Ratio]:
