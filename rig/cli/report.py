@@ -12,7 +12,7 @@ __all__ = ["report_"]
 
 def report_(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Recordings, models, or folders of rig reproduce.")
+        list[Path], typer.Argument(metavar="FILE", help="Recordings, models, or folders of rig reproduce.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="HTML file to write.")],
     title: Annotated[str, typer.Option(help="Title; by the first file.")] = "",

@@ -11,7 +11,8 @@ from rig.text.printable import printable
 __all__ = ["Block", "Chapter", "Facts", "Picture", "Section", "Table", "Text", "blocks_of", "typeset"]
 
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
-_SIGNS = (("m/s^2", "m/s²"), ("kg^-1/2", "kg^−½"), ("+-", "±"), (">= ", "≥ "))
+_DIGIT = re.compile(r"\d")
+_SIGNS = (("m/s^2", "m/s²"), ("+-", "±"), (">= ", "≥ "))
 
 
 def typeset(value: Any) -> str:
@@ -39,11 +40,13 @@ class Facts:
 
     kind: ClassVar[str] = "facts"
     caption: str
-    """What they are."""
+    """What they are; empty if the heading above says it."""
     rows: Sequence[tuple[str, str]]
     """Name and value."""
     code: bool = False
     """Whether the names are keys of a file."""
+    dense: bool = False
+    """Whether they are set in two columns: many short ones."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class Table:
     def numeric(self) -> tuple[bool, ...]:
         """Whether each column has nothing but numbers."""
         return tuple(
-            all(_NUMERIC.fullmatch(row[column]) for row in self.rows) and any(row[column] for row in self.rows)
+            all(_NUMERIC.fullmatch(row[column]) for row in self.rows)
+            and any(_DIGIT.search(row[column]) for row in self.rows)
             for column in range(len(self.headings))
         )
 

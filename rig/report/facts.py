@@ -27,7 +27,7 @@ def subject_section(recording: Recording) -> Section:
         ("ended", "; ".join(endings(recording))),
         ("notes", "; ".join(note for about in abouts for note in about.get("notes") or ())),
     ]
-    return Section("What was tested", [Facts("The test", [(name, value) for name, value in rows if value])])
+    return Section("What was tested", [Facts("", [(name, value) for name, value in rows if value])])
 
 
 def endings(recording: Recording) -> list[str]:
@@ -53,7 +53,7 @@ def bench_section(recording: Recording) -> Section:
                 str(one["role"]) + (", loopback" if one.get("loopback") else ""),
                 str(one.get("sensor") or "-"),
                 str(one.get("serial_number") or "-"),
-                f"{number(one['sensitivity_v_per_unit'], '.6g', 1e3)} mV/({one['unit']})",
+                _sensitivity(one),
                 number(one.get("range_v"), "g"),
                 str(one.get("calibrated") or "-"),
                 str(one.get("calibration_due") or "-") + (" (overdue)" if i in overdue else ""),
@@ -73,8 +73,13 @@ def bench_section(recording: Recording) -> Section:
     ]
     if bench["specimen"].get("drive_mode_shape") is not None:
         facts.append(("mode shape at the drive point", f"{bench['specimen']['drive_mode_shape']:g} kg^-1/2"))
-    blocks.append(Facts("Limits and facts of the bench", facts))
+    blocks.append(Facts("Limits and facts of the bench", facts, dense=True))
     return Section("Bench and sensors", blocks)
+
+
+def _sensitivity(channel: Mapping[str, Any]) -> str:
+    unit = str(channel["unit"])
+    return f"{number(channel['sensitivity_v_per_unit'], '.6g', 1e3)} mV/{f'({unit})' if '/' in unit else unit}"
 
 
 def _overdue(channel: Mapping[str, Any], day: str) -> bool:
@@ -103,7 +108,7 @@ def safety_section(recording: Recording) -> Section:
 def plan_section(recording: Recording) -> Section:
     """Return every key of the plan in force that has a value."""
     rows = key_rows(recording.configuration["plan"])
-    return Section("Plan", [Facts("Keys of the plan", rows, code=True)])
+    return Section("Plan", [Facts("Keys of the plan in force, given ones and defaults", rows, code=True, dense=True)])
 
 
 def files_and_versions(recording: Recording, files: Table) -> Section:
@@ -113,7 +118,7 @@ def files_and_versions(recording: Recording, files: Table) -> Section:
         ("seed", "none: a real bench" if recording.seed is None else str(recording.seed)),
         ("integrity", recording.integrity),
     ]
-    return Section("Versions and files", [Facts("Versions", facts), files])
+    return Section("Versions and files", [Facts("", facts), files])
 
 
 def _abouts(recording: Recording) -> Sequence[dict[str, Any]]:

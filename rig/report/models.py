@@ -28,6 +28,6 @@ def model_chapter(path: Path, pictures: Pictures) -> Chapter:
             Section("Figure", [pictures.of_file(path, f"The {kind}, as rig plot draws it.")]),
             Section("What it is, how well it fits, and where it holds", blocks_of(printed, "Values")),
             Section("Notes", [*notes]),
-            Section("File", [Facts("The file", [("integrity", summary["integrity"])]), table_of_files([path])]),
+            Section("File", [Facts("", [("integrity", summary["integrity"])]), table_of_files([path])]),
         ],
     )

@@ -131,7 +131,7 @@ def _loop(path: Path, summary: Mapping[str, Any], pictures: Pictures) -> list[Bl
             str(n),
             str(part["rows"]),
             part["ended"] or "cut short",
-            number((part["loop"] or {}).get("overruns"), "d"),
+            number((part["loop"] or {}).get("overruns"), ".0f"),
             ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in (part["counters"] or {}).items() if count)
             or "none",
             ", ".join(part["changed"]) or "-",

@@ -114,7 +114,7 @@ def _made(study: Mapping[str, Any], table: Mapping[str, Any], levels: int | None
         ("scatter of modal frequencies", f"{100 * float(study['scatter']):g} %"),
     ]
     headings = ("trained at", "models", "time a model\ns", "longest\ns", "iterations", "iterate chosen")
-    return [Facts("The study", facts), Table("Fits", headings, rows)]
+    return [Facts("", facts), Table("Fits", headings, rows)]
 
 
 def _beside_the_paper(specimen: str, own: Sequence[Mapping[str, Any]]) -> list[Block]:

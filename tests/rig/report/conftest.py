@@ -16,8 +16,8 @@ CHANGES = {
     "magnet-beam/backbone": {"levels_v": [0.4, 0.8], "record_periods": 8},
     "magnet-beam/stepped-phase-fast": {"levels_n": [0.25], "start_deg": -110.0, "stop_deg": -80.0, "step_deg": 15.0},
     "magnet-beam/continuous-backbone": {},
-    "magnet-beam/response-controlled": {"levels_m": [0.00045, 0.0007], "phase_lags_deg": [-120.0, -90.0, -60.0]},
-    "magnet-beam/stepped-sine-up": {"levels_v": [0.4], "steps": 3, "record_periods": 8},
+    "magnet-beam/response-controlled": {"levels_m": [0.00045, 0.00055, 0.0007], "phase_lags_deg": [-120.0, -100.0, -80.0, -60.0]},
+    "magnet-beam/stepped-sine-up": {"levels_n": [0.25], "steps": 3, "record_periods": 8},
     "magnet-beam/sweep-1": {"rate_hz_per_s": 2.0},
     "magnet-beam/multisine-1": LINES | {"resolution_hz": 0.5},
     "friction-beam/dwell": {"cycles": 300, "mean_s": 0.5, "record_every": 4, "telemetry_s": 0.02, "ramp_periods": 20.0},
@@ -27,9 +27,8 @@ CHANGES = {
 
 def short(name: str):
     """The shipped plan, shortened."""
-    table = load_plan(name).model_dump(mode="json")
-    changes = {key: value for key, value in CHANGES[name].items() if key not in LINES or key in table}
-    return plan_from({key: value for key, value in (table | changes).items() if value is not None}, name)
+    table = load_plan(name).model_dump(mode="json") | CHANGES[name]
+    return plan_from({key: value for key, value in table.items() if value is not None}, name)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
+CELLS = {"td", "th", "dt", "dd"}
 OUTSIDE = {"src", "href", "xlink:href", "data", "action", "poster", "srcset", "formaction"}
 
 
@@ -36,11 +37,11 @@ class Page(HTMLParser):
                 self.links.append(value or "")
             if name.startswith("on"):
                 self.events.append(name)
-        if tag == "table":
+        if tag in ("table", "dl"):
             self.tables.append([])
-        elif tag == "tr":
+        elif tag == "tr" or (tag == "div" and self.open[-2] == "dl"):
             self.tables[-1].append([])
-        elif tag in ("td", "th"):
+        elif tag in CELLS:
             self.tables[-1][-1].append("")
         elif re.fullmatch("h[1-6]", tag):
             self.headings.append(tag)
@@ -57,7 +58,7 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if "style" not in self.open:
             self.words.append(data)
-        if self.open and {"td", "th"} & set(self.open) and self.tables:
+        if self.open and CELLS & set(self.open) and self.tables:
             self.tables[-1][-1][-1] += data
 
     @property

@@ -15,13 +15,26 @@ from rig.text.console import PrintedTable, collected
 from tests.rig.exchange.conftest import matrix, modes, responses  # noqa: F401 (fixtures)
 from tests.rig.report.page import read
 
+PLAN = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4, 0.8]
+record_periods = 8
+
+[controller]
+low_pass_rad_s = 6.283185307179586
+k1 = 2.0
+k2 = 6.283185307179586
+centre_frequency_hz = 24.0
+frequency_window_hz = [21.933, 26.807]
+"""
 MADE = (
     "identify backbone.h5 -o nonlinear-mode.h5",
     "identify response-controlled.h5 --model force-surface -o force-surface.h5",
     "identify multisine.h5 --model exciter -o exciter.h5",
     "identify multisine.h5 --model pnlss --degrees 2 --rate 200 --iterations 2 -o pnlss.h5",
-    "predict nonlinear-mode.h5 --force 0.2 -o predictions.h5",
-    "rehearse magnet-beam/backbone --exact -n 2 -o rehearsal.h5",
+    "predict nonlinear-mode.h5 --frequency-response 0.2 -o predictions.h5",
+    "rehearse plan.toml --exact -n 2 -o rehearsal.h5",
     "check --bench magnet-beam -o check.h5",
 )
 
@@ -32,6 +45,7 @@ def shelf(recordings, tmp_path_factory):
     folder = tmp_path_factory.mktemp("shelf")
     for path in recordings.values():
         (folder / path.name).symlink_to(path)
+    (folder / "plan.toml").write_text(PLAN)
     for line in MADE:
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
