@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from rig.figures.style import MAIN, REJECTED, SECOND, title, unit_text
 from rig.models.files.files import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
-from rig.report.document import Chapter, Picture, Section, Table
+from rig.report.document import Chapter, Section, Table
 from rig.report.facts import endings
 from rig.report.pictures import Pictures
 from rig.show.point_table import points_from
@@ -67,11 +68,12 @@ def _chapter(kind: str, paths: Sequence[Path], pictures: Pictures) -> Chapter:
         lambda page: _draw(page, kind, found), (9.0, 2.6 * len(ys) + 0.8), f"Points of {len(paths)} {kind} recordings."
     )
     caption = f"{len(paths)} recordings of kind {kind}"
-    sections = [Section("Recordings", [Table(caption, headings, [one.row for one in found])])]
-    if isinstance(picture, Picture) or ys:
-        what = ", ".join(y.heading for y in ys)
-        sections.append(Section(f"Their points: {what} over {x.heading}", [picture]))
-    return Chapter(f"Comparison: {kind}", ", ".join(one.name for one in found), [], sections)
+    what = ", ".join(y.heading for y in ys)
+    sections = [
+        Section("Recordings", [Table(caption, headings, [one.row for one in found])]),
+        Section(f"Their points: {what} over {x.heading}", [picture]),
+    ]
+    return Chapter(f"{len(found)} {kind} recordings compared", ", ".join(one.name for one in found), [], sections)
 
 
 def _compared(path: Path) -> _Compared:
@@ -81,7 +83,7 @@ def _compared(path: Path) -> _Compared:
         accepted = f"{sum(point.accepted for point in points)} of {summary['points_planned']}"
         seed = "-" if recording.seed is None else str(recording.seed)
         row = (
-            *(path.name, summary["specimen"], summary["bench"], recording.started, seed, accepted),
+            *(path.name, summary["specimen"], summary["bench"], recording.started.replace("T", " "), seed, accepted),
             "; ".join(endings(recording)),
         )
         return _Compared(path.name, row, points)
@@ -93,6 +95,7 @@ def panels(columns: Sequence[Column]) -> tuple[Column, list[Column]]:
     Cycles where there are some; the frequency where the phase lag is what changes; else the amplitude of the vibration; the
     level where a point is no single vibration.
     """
+    wanted: tuple[str, ...]
     known = {column.key: column for column in columns if column.heading != "+-"}
     if "cycles" in known:
         x, wanted = known["cycles"], ("frequency_hz", "damping_ratio", "amplitude_m")
@@ -110,7 +113,7 @@ def _draw(page: "Figure", kind: str, found: Sequence[_Compared]) -> None:
     columns = CAMPAIGNS[kind].columns
     x, ys = panels(columns)
     axes = page.subplots(len(ys), 1, sharex=True, squeeze=False)[:, 0]
-    spread = {before.key: one for before, one in zip(columns, columns[1:], strict=False) if one.heading == "+-"}
+    spread = {before.key: one for before, one in pairwise(columns) if one.heading == "+-"}
     for axis, y in zip(axes, ys, strict=True):
         for n, one in enumerate(found):
             _panel(axis, one, n, x, y, spread.get(y.key))

@@ -12,6 +12,8 @@ __all__ = ["Block", "Chapter", "Facts", "Picture", "Section", "Table", "Text", "
 
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
 _DIGIT = re.compile(r"\d")
+_SHORT = 14
+_FACT = re.compile(r"(\S.{0,13}?|) {2,}(\S.*)")
 _SIGNS = (("m/s^2", "m/s²"), ("+-", "±"), (">= ", "≥ "))
 
 
@@ -62,6 +64,11 @@ class Table:
     """The cells."""
     marked: frozenset[int] = frozenset()
     """Rows that are set off: those of points that are not used, of tests that failed."""
+
+    @property
+    def short(self) -> bool:
+        """Whether it is to stand on one page of paper."""
+        return len(self.rows) <= _SHORT
 
     @property
     def numeric(self) -> tuple[bool, ...]:
@@ -119,12 +126,24 @@ class Chapter:
 
 
 def blocks_of(printed: Iterable[str | PrintedTable], caption: str) -> list[Block]:
-    """Return what was printed (`rig.text.console.collected`) as blocks; the line before a table is its caption."""
+    """Return what was printed (`rig.text.console.collected`) as blocks.
+
+    The line before a table is its caption. Lines of a name and, two spaces and more behind it, a value are facts.
+    """
     out: list[Block] = []
     for one in printed:
+        last = out[-1] if out else None
         if isinstance(one, PrintedTable):
-            before = out.pop().text if out and isinstance(out[-1], Text) and not out[-1].role else caption
-            out.append(Table(before, one.headings, one.rows))
+            if isinstance(last, Text) and not last.role:
+                out[-1] = Table(last.text, one.headings, one.rows)
+            else:
+                out.append(Table(caption, one.headings, one.rows))
+        elif fact := _FACT.fullmatch(one):
+            row = (fact[1].strip(), fact[2])
+            if isinstance(last, Facts):
+                out[-1] = Facts("", [*last.rows, row])
+            else:
+                out.append(Facts("", [row]))
         else:
             role = "note" if one.startswith(("note: ", "warning: ", "FINDING ")) else ""
             out.append(Text(one.strip(), role))

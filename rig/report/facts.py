@@ -34,7 +34,9 @@ def endings(recording: Recording) -> list[str]:
     """Return how each part of a recording ended."""
     if not recording.parts:
         return ["nothing recorded"]
-    texts = ["cut short, without a record of the end" if part.end is None else part.end["text"] for part in recording.parts]
+    texts = [
+        "cut short, without a record of the end" if part.end is None else part.end["text"] for part in recording.parts
+    ]
     return texts if len(texts) == 1 else [f"part {n}: {text}" for n, text in enumerate(texts, 1)]
 
 
@@ -98,7 +100,9 @@ def safety_section(recording: Recording) -> Section:
             text = f"armed by {how} ({armed.get('by') or 'unknown'}), {armed.get('at', '')}"
         else:
             text = "no record of arming"
-        cautions = "; ".join(armed.get("cautions") or ()) or ("-" if how == "virtual" else "none: the last check counts")
+        cautions = "; ".join(armed.get("cautions") or ()) or (
+            "-" if how == "virtual" else "none: the last check counts"
+        )
         rows.append((str(n), text, cautions, "; ".join(about.get("remarks") or ()) or "-"))
     if rows:
         blocks.append(Table("Before each part", ("part", "armed", "against it (check, limits)", "remarks"), rows))

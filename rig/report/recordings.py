@@ -76,13 +76,16 @@ def point_table(kind: str, points: Sequence[Point[Any]], caption: str) -> Table:
 def _points(kind: str, points: Sequence[Point[Any]], summary: Mapping[str, Any]) -> list[Block]:
     if not points:
         return [Text("No point was measured.", "note")]
-    blocks: list[Block] = [point_table(kind, points, "Every point of the plan, by its last measurement")]
-    if any("+-" in heading for heading in blocks[0].headings):  # type: ignore[union-attr]
+    table = point_table(kind, points, "Every point of the plan, by its last measurement")
+    blocks: list[Block] = [table]
+    if any("+-" in heading for heading in table.headings):
         blocks.append(Text("± is the 95 % interval of the value on its left: 1.96 standard errors.", "note"))
     with collected() as printed:
         print_findings({**summary, "skipped": "", "measured_again": ""})
     blocks += blocks_of(printed, "")
-    blocks += [Text(f"{point_name(p.number)} repeats the first, for the drift.", "note") for p in points if p.repeats_first]
+    blocks += [
+        Text(f"{point_name(p.number)} repeats the first, for the drift.", "note") for p in points if p.repeats_first
+    ]
     former = points_from(kind, summary["former_points"])
     if former:
         blocks.append(point_table(kind, former, "No longer asked for by the plan, and not used"))
@@ -140,7 +143,9 @@ def _loop(path: Path, summary: Mapping[str, Any], pictures: Pictures) -> list[Bl
     ]
     headings = ("part", "rows", "how it ended", "overruns", "what was counted, samples", "changed in the plan")
     blocks.append(Table("Parts of the recording", headings, rows))
-    blocks += [Text(f"part {n}: not readable: {p['lost']}", "bad") for n, p in enumerate(summary["parts"], 1) if p["lost"]]
+    blocks += [
+        Text(f"part {n}: not readable: {p['lost']}", "bad") for n, p in enumerate(summary["parts"], 1) if p["lost"]
+    ]
     for n, part in enumerate(summary["parts"], 1):
         with collected() as printed:
             print_loop(part["loop"] or {}, part["counters"] or {})
@@ -159,10 +164,7 @@ def _check(recording: Recording, summary: Mapping[str, Any], pictures: Pictures)
     findings = Table(
         "Every test of the check",
         ("what", "channel", "verdict", "value", "unit", "allowed"),
-        [
-            (f["name"], f["channel"], f["verdict"], number(f["value"], ".4g"), f["unit"], f["allowed"])
-            for f in tests
-        ],
+        [(f["name"], f["channel"], f["verdict"], number(f["value"], ".4g"), f["unit"], f["allowed"]) for f in tests],
         marked,
     )
     advice: list[Block] = [

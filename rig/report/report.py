@@ -25,9 +25,11 @@ def write_report(sources: Sequence[Path], output: Path, title: str = "") -> None
     """Write a report on recordings, models and folders of `rig reproduce` into one HTML file, which needs no other file.
 
     Files appear in the order given, recordings of the same kind first in a comparison. Without a ``title``, the report is named
-    after its first chapter. Raises `RecordingError` if a file cannot be read or ``output`` cannot be written; it is then as it was.
+    after what is in it. Raises `RecordingError` if a file cannot be read or ``output`` cannot be written; it is then as it was.
     """
-    doubled = next((one for n, one in enumerate(sources) if one.absolute() in [s.absolute() for s in sources[:n]]), None)
+    doubled = next(
+        (one for n, one in enumerate(sources) if one.absolute() in [s.absolute() for s in sources[:n]]), None
+    )
     if doubled is not None:
         raise RecordingError(f"{doubled}: is given twice")
     pictures = Pictures()
@@ -35,7 +37,7 @@ def write_report(sources: Sequence[Path], output: Path, title: str = "") -> None
     chapters = comparisons(files, pictures) if len(files) > 1 else []
     for source in sources:
         chapters += study_chapters(source) if source.is_dir() else [_chapter(source, pictures)]
-    text = _rendered(title or _usual_title(chapters), chapters, sources, output)
+    text = _rendered(title or _usual_title(chapters, sources), chapters, sources, output)
     with whole_file(output) as path:
         path.write_text(text, encoding="utf-8")
 
@@ -48,9 +50,10 @@ def _chapter(path: Path, pictures: Pictures) -> Chapter:
         return recording_chapter(path, pictures)
 
 
-def _usual_title(chapters: Sequence[Chapter]) -> str:
-    rest = len(chapters) - 1
-    return f"Report: {chapters[0].title}" + (f" and {rest} more" if rest else "")
+def _usual_title(chapters: Sequence[Chapter], sources: Sequence[Path]) -> str:
+    if len(chapters) == 1:
+        return f"Report: {chapters[0].title}"
+    return f"Report on {sources[0].name}" if len(sources) == 1 else f"Report on {len(sources)} files"
 
 
 def _rendered(title: str, chapters: Sequence[Chapter], sources: Sequence[Path], output: Path) -> str:

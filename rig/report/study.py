@@ -32,7 +32,9 @@ def study_chapters(folder: Path) -> list[Chapter]:
     Raises `RecordingError` if the folder holds no study, or a damaged one.
     """
     if not (folder / "study.json").is_file():
-        raise RecordingError(f"{folder}: is a folder without study.json; allowed is a file, or a folder of rig reproduce")
+        raise RecordingError(
+            f"{folder}: is a folder without study.json; allowed is a file, or a folder of rig reproduce"
+        )
     study = _read(folder / "study.json")
     tables = sorted(folder.glob("*/table.json"))
     if not tables:
@@ -55,14 +57,18 @@ def _chapter(folder: Path, study: Mapping[str, Any], results: Path) -> Chapter:
     table = _read(results / "table.json")
     errors = {name: list(rows) for name, rows in table["errors"].items()}
     own = [row for row in errors[next(iter(errors))] if row["model"] is None and row["test"] == _OWN_LEVEL]
-    files = [folder / "study.json", *(results / name for name in ("models.json", "table.json") if (results / name).is_file())]
+    files = [
+        folder / "study.json",
+        *(results / name for name in ("models.json", "table.json") if (results / name).is_file()),
+    ]
     return Chapter(
         f"The paper's campaign on {study['specimen']}: models {results.name}",
         str(results),
         [
             Text(
-                "Multisines were recorded on a virtual rig, polynomial nonlinear state-space models identified from them, tested "
-                "on realisations that they were not trained on, and their steady responses and sweeps held against the rig's own."
+                "Multisines were recorded on a virtual rig. Polynomial nonlinear state-space models were identified from them, "
+                "tested on realisations that they were not trained on, and asked for steady responses and sweeps, which are "
+                "held against the rig's own."
             )
         ],
         [
@@ -134,8 +140,8 @@ def _beside_the_paper(specimen: str, own: Sequence[Mapping[str, Any]]) -> list[B
     return [
         Table(caption, headings, rows),
         Text(
-            "The paper's numbers are of one accelerometer of a real rig; those here of a virtual one, which is the same in every "
-            "run unless there is scatter.",
+            "The paper's numbers are of one accelerometer of a real rig; those here are of a virtual one, which is the same in "
+            "every run unless there is scatter.",
             "note",
         ),
     ]
@@ -177,8 +183,13 @@ def _steady(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
         for row in rows
     ]
     headings = ("trained at", "force", "held", "rig\nmm", "model\nmm", "error\n%", "frequency\n%", "range use")
-    lost = [f"trained at {row['training_set']}, {row['held']}: {row['notes'][-1]}" for row in rows if not row["complete"]]
-    return [Table("Peaks of the selected models against the rig's own", headings, body), *(Text(one, "note") for one in lost)]
+    lost = [
+        f"trained at {row['training_set']}, {row['held']}: {row['notes'][-1]}" for row in rows if not row["complete"]
+    ]
+    return [
+        Table("Peaks of the selected models against the rig's own", headings, body),
+        *(Text(one, "note") for one in lost),
+    ]
 
 
 def _sweeps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
@@ -203,6 +214,9 @@ def _sweeps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
 def _figures(results: Path) -> list[Block]:
     found = [(results / name, caption) for name, caption in _FIGURES.items() if (results / name).is_file()]
     return [
-        Picture(caption, source=f"data:image/png;base64,{b64encode(read_bytes(path, _LARGEST_BYTES, RecordingError)).decode()}")
+        Picture(
+            caption,
+            source=f"data:image/png;base64,{b64encode(read_bytes(path, _LARGEST_BYTES, RecordingError)).decode()}",
+        )
         for path, caption in found
     ]

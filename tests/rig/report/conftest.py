@@ -16,7 +16,10 @@ CHANGES = {
     "magnet-beam/backbone": {"levels_v": [0.4, 0.8], "record_periods": 8},
     "magnet-beam/stepped-phase-fast": {"levels_n": [0.25], "start_deg": -110.0, "stop_deg": -80.0, "step_deg": 15.0},
     "magnet-beam/continuous-backbone": {},
-    "magnet-beam/response-controlled": {"levels_m": [0.00045, 0.00055, 0.0007], "phase_lags_deg": [-120.0, -100.0, -80.0, -60.0]},
+    "magnet-beam/response-controlled": {
+        "levels_m": [0.00045, 0.00055, 0.0007],
+        "phase_lags_deg": [-120.0, -100.0, -80.0, -60.0],
+    },
     "magnet-beam/stepped-sine-up": {"levels_n": [0.25], "steps": 3, "record_periods": 8},
     "magnet-beam/sweep-1": {"rate_hz_per_s": 2.0},
     "magnet-beam/multisine-1": LINES | {"resolution_hz": 0.5},
@@ -87,7 +90,5 @@ def hostile(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("hostile") / "run<b>.h5"
     plan = short("magnet-beam/backbone").model_copy(update={"description": "</table><img src=x onerror=alert(2)>"})
     operator, notes = "<a href='http://example.org'>Eve</a>", ["<style>*{}</style>"]
-    rig.run(
-        plan, bench=laboratory_bench(), output=path, operator=operator, specimen_serial="<&>", notes=notes
-    ).close()
+    rig.run(plan, bench=laboratory_bench(), output=path, operator=operator, specimen_serial="<&>", notes=notes).close()
     return path

@@ -26,7 +26,10 @@ def test_a_report_is_written_and_kept_unless_it_may_be_replaced(command, recordi
     [
         (["missing.h5", "-o", "r.html"], "missing.h5: cannot be read (No such file or directory)"),
         (["text.h5", "-o", "r.html"], "text.h5: not a file of vibrolock, but a text file"),
-        (["folder", "-o", "r.html"], "folder: is a folder without study.json; allowed is a file, or a folder of rig reproduce"),
+        (
+            ["folder", "-o", "r.html"],
+            "folder: is a folder without study.json; allowed is a file, or a folder of rig reproduce",
+        ),
         (["begun", "-o", "r.html"], "begun: holds no results yet; the same rig reproduce again takes it up"),
         (["RUN", "-o", "nowhere/r.html"], "nowhere/r.html: there is no folder nowhere"),
         (["RUN", "-o", "r.pdf"], "r.pdf: reports are written as .html"),

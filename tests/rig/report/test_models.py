@@ -76,9 +76,7 @@ def check_against_show(path, report):
     assert "SHA-256" in page.text
 
 
-@pytest.mark.parametrize(
-    "kind", ["nonlinear-mode", "force-surface", "exciter", "pnlss", "predictions", "rehearsal"]
-)
+@pytest.mark.parametrize("kind", ["nonlinear-mode", "force-surface", "exciter", "pnlss", "predictions", "rehearsal"])
 def test_a_model_of_every_kind_has_what_rig_show_says_and_its_figure(kind, shelf, tmp_path):
     assert kind_of(shelf / f"{kind}.h5") == kind
     check_against_show(shelf / f"{kind}.h5", tmp_path / "report.html")
@@ -126,7 +124,9 @@ def test_a_study_stands_beside_the_papers_numbers(tmp_path, shelf, recordings):
     (folder / "study.json").write_text(
         json.dumps({"specimen": "magnet-beam", "bench": {"name": "<b>"}, "scatter": 0.001, "seed": 3})
     )
-    (folder / "force" / "models.json").write_text(json.dumps({"variant": "force", "iterations": 8, "levels": ["2.6 N"]}))
+    (folder / "force" / "models.json").write_text(
+        json.dumps({"variant": "force", "iterations": 8, "levels": ["2.6 N"]})
+    )
     own = {"training_set": "2.6 N", "test": "same level", "model": None, "mean": 0.0127, "standard_deviation": 0.0003}
     own |= {"largest": 0.02, "models": 5, "runs": 50, "unbounded_runs": 1, "unbounded_models": 1, "range_use": 0.9}
     times = {"training_set": "2.6 N", "models": 5, "seconds_mean": 1.25, "seconds_most": 2.0, "iterations_mean": 8.0}
