@@ -73,7 +73,7 @@ def _chapter(kind: str, paths: Sequence[Path], pictures: Pictures) -> Chapter:
         Section("Recordings", [Table(caption, headings, [one.row for one in found])]),
         Section(f"Their points: {what} over {x.heading}", [picture]),
     ]
-    return Chapter(f"{len(found)} {kind} recordings compared", ", ".join(one.name for one in found), [], sections)
+    return Chapter(f"Comparison of {len(found)} {kind} recordings", ", ".join(one.name for one in found), [], sections)
 
 
 def _compared(path: Path) -> _Compared:
@@ -128,11 +128,11 @@ def _draw(page: "Figure", kind: str, found: Sequence[_Compared]) -> None:
 def _panel(axis: "Axes", one: _Compared, n: int, x: Column, y: Column, spread: Column | None) -> None:
     colour, marker = COLOURS[n % len(COLOURS)], MARKERS[n % len(MARKERS)]
     used = [point for point in one.points if point.accepted]
-    errors = _values(used, spread) if spread is not None else np.full(len(used), np.nan)
+    errors = None if spread is None else _values(used, spread)
     axis.errorbar(
         _values(used, x),
         _values(used, y),
-        np.where(np.isfinite(errors), errors, 0.0),
+        errors,
         fmt=marker,
         ms=4.5,
         mfc="none" if n else colour,

@@ -1,8 +1,9 @@
 """What a report consists of: chapters, sections, and the few kinds of blocks that the template knows."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, ClassVar
 
 from rig.text.console import PrintedTable
@@ -13,7 +14,7 @@ __all__ = ["Block", "Chapter", "Facts", "Picture", "Section", "Table", "Text", "
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
 _DIGIT = re.compile(r"\d")
 _SHORT = 14
-_FACT = re.compile(r"(\S.{0,13}?|) {2,}(\S.*)")
+_FACT = re.compile(r"(\S.{0,13}?| {10,}) {2,}(\S.*)")
 _SIGNS = (("m/s^2", "m/s²"), ("+-", "±"), (">= ", "≥ "))
 
 
@@ -125,16 +126,17 @@ class Chapter:
         return [section for section in self.sections if section.blocks]
 
 
-def blocks_of(printed: Iterable[str | PrintedTable], caption: str) -> list[Block]:
+def blocks_of(printed: Sequence[str | PrintedTable], caption: str) -> list[Block]:
     """Return what was printed (`rig.text.console.collected`) as blocks.
 
-    The line before a table is its caption. Lines of a name and, two spaces and more behind it, a value are facts.
+    The line before a table is its caption unless it is indented. Lines of a name, two spaces or more, and a value are facts;
+    so are lines that are indented as far as the values.
     """
     out: list[Block] = []
-    for one in printed:
+    for before, one in pairwise(["", *printed]):
         last = out[-1] if out else None
         if isinstance(one, PrintedTable):
-            if isinstance(last, Text) and not last.role:
+            if isinstance(last, Text) and not last.role and not str(before).startswith(" "):
                 out[-1] = Table(last.text, one.headings, one.rows)
             else:
                 out.append(Table(caption, one.headings, one.rows))

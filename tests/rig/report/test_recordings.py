@@ -106,5 +106,5 @@ def test_several_recordings_of_a_kind_are_compared_and_listed(recordings, hostil
     write_report([recordings["sweep"], recordings["backbone"], hostile], tmp_path / "report.html")
     page = read(tmp_path / "report.html")
     assert page.headings.count("h2") == 1 + 4  # contents, comparison, three files
-    assert "2 backbone recordings compared" in page.text
-    assert "sweep recordings compared" not in page.text
+    assert "Comparison of 2 backbone recordings" in page.text
+    assert "sweep recordings" not in page.text
