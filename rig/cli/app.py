@@ -24,6 +24,7 @@ from rig.cli.options import say_what_is_imported
 from rig.cli.predict import predict
 from rig.cli.rehearse import rehearse_
 from rig.cli.replay import replay_
+from rig.cli.report import report_
 from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
 from rig.cli.show import plot_, show
@@ -69,6 +70,7 @@ app.command()(resume)
 app.command()(monitor)
 app.command()(show)
 app.command("plot")(plot_)
+app.command("report")(report_)
 app.command()(doctor)
 app.command("watch")(watch_)
 app.command("replay")(replay_)

@@ -1,6 +1,8 @@
-"""Pages: figures on their way into a file."""
+"""Pages: figures on their way into a file or into a document."""
 
-from collections.abc import Iterator
+import io
+import re
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +13,7 @@ from rig.figures.style import STYLE
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["page_for"]
+__all__ = ["page_for", "svg_of"]
 
 
 @contextmanager
@@ -26,11 +28,36 @@ def page_for(file: Path, size_in: tuple[float, float]) -> Iterator["Figure"]:
     with mpl.rc_context(STYLE):
         page = Figure(figsize=size_in, layout="constrained")
         yield page
-        engine = page.get_layout_engine()
-        if engine is not None and page.axes:
-            engine.execute(page)
-        page.set_layout_engine(None)  # with one, all would be drawn a second time for the layout's sake
+        _lay_out(page)
         try:
             page.savefig(file)
         except OSError as error:
             raise RecordingError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def svg_of(draw: Callable[["Figure"], None], size_in: tuple[float, float], name: str) -> str:
+    """Return what ``draw`` draws on an empty page of a size (inches) as an ``<svg>`` element for an HTML document.
+
+    ``name`` (letters and digits) begins every id in it and must differ from those of the document's other figures. Nothing in
+    the element refers to anything outside of it.
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    text = io.StringIO()
+    with mpl.rc_context({**STYLE, "svg.hashsalt": name, "svg.fonttype": "path"}):
+        page = Figure(figsize=size_in, layout="constrained")
+        draw(page)
+        _lay_out(page)
+        page.savefig(text, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    svg = text.getvalue()
+    svg = re.sub(r"<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    return re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+
+
+def _lay_out(page: "Figure") -> None:
+    """Lay out the page once; with a layout engine, savefig would draw all of it a second time."""
+    engine = page.get_layout_engine()
+    if engine is not None and page.axes:
+        engine.execute(page)
+    page.set_layout_engine(None)

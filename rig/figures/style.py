@@ -55,7 +55,7 @@ def say_why_empty(axis: "Axes", text: str) -> None:
 def title(page: "Figure", text: str) -> None:
     """Write a title at the top left, unless the text is empty."""
     if text:
-        page.suptitle(text, fontsize=11, x=0.01, ha="left")
+        page.suptitle(text, fontsize=11, x=0.01, ha="left", parse_math=False)
 
 
 def unit_text(unit: str) -> str:

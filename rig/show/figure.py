@@ -1,7 +1,9 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and omitted data."""
 
+from collections.abc import Callable
 from pathlib import Path
 from pkgutil import resolve_name
+from typing import TYPE_CHECKING
 
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
@@ -12,7 +14,10 @@ from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.show.lateness_figure import draw_lateness
 
-__all__ = ["plot"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["drawing", "plot"]
 
 CHECK = "rig.check.figure:draw_recorded_check"
 
@@ -29,17 +34,31 @@ def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
         raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
     if figure.exists() and source.exists() and figure.samefile(source):
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
-    kind = kind_of(source)
-    size_in = KINDS[kind].figure_in if kind in KINDS and not lateness else (9.0, 6.4)
+    size_in, draw = drawing(source, lateness=lateness)
     with page_for(figure, size_in) as page:
+        draw(page)
+
+
+def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float], Callable[["Figure"], None]]:
+    """Return the size (inches) of the page for a file, and the function that draws the file's contents on an empty page.
+
+    The arguments are those of `plot`. Raises `RecordingError` if the file is not one of ours; the function raises it, too.
+    """
+    kind = kind_of(source)
+    if kind in KINDS and not lateness:
+        return KINDS[kind].figure_in, lambda page: _draw_model(page, source, kind)
+    return (9.0, 6.4), lambda page: _draw_recording(page, source, lateness=lateness)
+
+
+def _draw_model(page: "Figure", source: Path, kind: str) -> None:
+    found = load(source)
+    with understood(source, kind):
+        resolve_name(KINDS[kind].draw)(page, found)
+
+
+def _draw_recording(page: "Figure", source: Path, *, lateness: bool) -> None:
+    with Recording(source) as recording:
         if lateness:
-            with Recording(source) as recording:
-                draw_lateness(page, recording)
-        elif kind in KINDS:
-            found = load(source)
-            with understood(source, kind):
-                resolve_name(KINDS[kind].draw)(page, found)
+            draw_lateness(page, recording)
         else:
-            with Recording(source) as recording:
-                draw = CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw
-                resolve_name(draw)(page, recording)
+            resolve_name(CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw)(page, recording)

@@ -5,18 +5,16 @@ from pathlib import Path
 from typing import Any
 
 from rig.arming.run_facts import About, user_name
-from rig.campaigns.evaluation.point import Attempt, point_name
-from rig.campaigns.evaluation.stored_point import point_from, value_of
-from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.campaigns.evaluation.point import point_name
 from rig.check.report import say
 from rig.models.files.files import KINDS
 from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
-from rig.show.progress import value_text
+from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
 from rig.text.console import number, print_table
 from rig.text.printable import printable, printable_strings
 
-__all__ = ["print_summary", "say_how_it_ended"]
+__all__ = ["loop_line", "print_findings", "print_rehearsal", "print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
@@ -47,9 +45,26 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
             print(f"warning: {name.replace('_', ' ')}: {count} samples")
 
 
-def _pace(loop: dict[str, Any]) -> str:
+def _pace(loop: Mapping[str, Any]) -> str:
     """Return how fast the loop was; one that a clock paces is neither quick nor slow."""
     return "by the clock" if loop["by_the_clock"] else f"{loop['realtime_factor']:.0f} times real time"
+
+
+def loop_line(loop: Mapping[str, Any]) -> str:
+    """Return samples, periods, overruns and speed of the loop of a recording in one line."""
+    line = f"{loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
+    if loop["realtime_factor"] is not None:
+        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {_pace(loop)}"
+    return line
+
+
+def print_findings(summary: Mapping[str, Any]) -> None:
+    """Print what concerns all points of a recording: skipped and repeated ones, drift, the mode shape of the damping."""
+    for line in (summary["skipped"], summary["measured_again"]):
+        if line:
+            print(line)
+    _print_drift(summary["drift"])
+    _print_mode_shape(summary["drive_mode_shape"])
 
 
 def print_summary(summary: dict[str, Any]) -> None:
@@ -66,21 +81,13 @@ def print_summary(summary: dict[str, Any]) -> None:
         for note in summary["notes"]:
             print(f"note: {note}")
         return
-    loop = summary["loop"]
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
     _print_points(summary["kind"], summary["points"])
-    for line in (summary["skipped"], summary["measured_again"]):
-        if line:
-            print(line)
-    _print_drift(summary["drift"])
-    _print_mode_shape(summary["drive_mode_shape"])
+    print_findings(summary)
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
         _print_points(summary["kind"], summary["former_points"])
-    line = f"loop: {loop['samples']} samples at {loop['sample_rate_hz']:g} Hz"
-    if loop["realtime_factor"] is not None:
-        line += f", {loop['periods']} periods, {loop['overruns']} overruns, {_pace(loop)}"
-    print(line)
+    print(f"loop: {loop_line(summary['loop'])}")
     for number_shown, part in enumerate(summary["parts"], 1):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
         print(f"part {number_shown}: {part['rows']} rows, {part['ended'] or 'cut short'}{changed}")
@@ -88,7 +95,7 @@ def print_summary(summary: dict[str, Any]) -> None:
             print(f"  not readable: {part['lost']}")
         _print_advice(part)
         _print_about(part["about"] or {})
-        _print_rehearsal((part["about"] or {}).get("rehearsal"), part.get("beside_rehearsal"))
+        print_rehearsal((part["about"] or {}).get("rehearsal"), part.get("beside_rehearsal"))
         print_loop(part["loop"] or {}, part["counters"] or {})
 
 
@@ -139,7 +146,7 @@ def _print_about(about: dict[str, Any]) -> None:
         print(f"  {line}")
 
 
-def _print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, Any] | None) -> None:
+def print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, Any] | None) -> None:
     """Print what a rehearsal had promised, who overrode what, and where the run left what was foreseen."""
     if not rehearsal:
         return
@@ -159,44 +166,17 @@ def _print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, A
 
 def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
     """Print a table of points, then their warnings. Points are counted from 1."""
-    result: type[Any] = CAMPAIGNS[kind].result
-    points = [point_from({key: value for key, value in one.items() if value is not None}, result) for one in tables]
-    columns = [
-        column
-        for column in CAMPAIGNS[kind].columns
-        if not column.optional or any(value_of(point, column.key) is not None for point in points)
-    ]
+    points = points_from(kind, tables)
+    columns = shown_columns(kind, points)
     remarks = [point.reason or ("the first again" if point.repeats_first else "") for point in points]
     headings = ("point", "level", "", *(f"{column.heading} {column.unit}" for column in columns), "settled", "quality")
-    rows = [
-        (
-            str(point.number + 1),
-            f"{point.level:.4g}",
-            point.level_unit,
-            *(value_text(column, point) for column in columns),
-            {True: "yes", False: "no", None: "-"}[point.settled],
-            str(point.quality),
-        )
-        for point in points
-    ]
+    rows = point_rows(points, columns)
     if any(remarks):
         headings = (*headings, "remark")
         rows = [(*row, remark) for row, remark in zip(rows, remarks, strict=True)]
     print_table(headings, rows)
     for point in points:
-        for number_shown, attempt in enumerate(point.refused_before, 1):
-            print(
-                f"note: {point_name(point.number)}: attempt {number_shown} refused{_where(attempt)}: {attempt.reason}"
-            )
+        for line in attempts_refused(point):
+            print(f"note: {line}")
         for warning in point.warnings or ():
             print(f"warning: {point_name(point.number)}: {warning}")
-
-
-def _where(attempt: Attempt) -> str:
-    """Return frequency and force of a refused attempt as far as they are known."""
-    told = [
-        f"{value:.4g} {unit}"
-        for value, unit in ((attempt.frequency_hz, "Hz"), (attempt.force_n, "N"))
-        if value is not None
-    ]
-    return f" at {', '.join(told)}" if told else ""

@@ -1,12 +1,52 @@
-"""Tables and JSON documents on standard output."""
+"""Tables and JSON documents on standard output, and the same as blocks of a document."""
 
+import contextlib
+import io
 import json
-from collections.abc import Mapping, Sequence
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rig.text.printable import printable
 
-__all__ = ["number", "print_json", "print_table"]
+__all__ = ["PrintedTable", "collected", "number", "print_json", "print_table"]
+
+
+@dataclass(frozen=True)
+class PrintedTable:
+    """A table as it was given to `print_table`."""
+
+    headings: tuple[str, ...]
+    """One for each column."""
+    rows: tuple[tuple[str, ...], ...]
+    """The cells, row by row."""
+
+
+class _Collector(io.StringIO):
+    """Standard output that keeps lines and tables apart."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.blocks: list[str | PrintedTable] = []
+
+    def take_lines(self) -> None:
+        """Turn the text so far into one block for each line; empty lines are left out."""
+        self.blocks += [line.rstrip() for line in self.getvalue().split("\n") if line.strip()]
+        self.seek(0)
+        self.truncate()
+
+
+@contextlib.contextmanager
+def collected() -> Iterator[list[str | PrintedTable]]:
+    """Collect what is printed, line by line and table by table, instead of showing it; for documents with the same content.
+
+    The list is filled when the context ends.
+    """
+    collector = _Collector()
+    with contextlib.redirect_stdout(collector):
+        yield collector.blocks
+        collector.take_lines()
 
 
 def print_json(value: Mapping[str, Any]) -> None:
@@ -31,6 +71,10 @@ def number(value: float | None, pattern: str, scale: float = 1.0) -> str:
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table of right-aligned columns."""
+    if isinstance(sys.stdout, _Collector):
+        sys.stdout.take_lines()
+        sys.stdout.blocks.append(PrintedTable(tuple(headings), tuple(map(tuple, rows))))
+        return
     lines = [[printable(cell) for cell in row] for row in [headings, *rows]]
     widths = [max(len(row[column]) for row in lines) for column in range(len(headings))]
     for row in lines:

@@ -46,6 +46,7 @@ ALLOWED = {
     "show --json run.h5": FILES,
     "plot run.h5 -o run.png": FILES | MATPLOTLIB,
     "plot mode.h5 -o mode.svg": FILES | MATPLOTLIB,
+    "report run.h5 mode.h5 -o report.html": FILES | MATPLOTLIB | {"jinja2", "markupsafe"},
     "identify run.h5 -o again.h5": FILES,
     "export run.h5 -o run.csv": FILES | {"identification.pnlss"},
     "analyse modes --bench magnet-beam": {"numpy", "pydantic", "simulators"} | NUMBA | {"scipy.linalg"},

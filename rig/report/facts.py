@@ -1,0 +1,137 @@
+"""Who tested what on which bench with which sensors: the facts of a recording, of any kind."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rig.arming.run_facts import About
+from rig.recording.reader import Recording
+from rig.report.document import Block, Facts, Section, Table, Text
+from rig.report.keys import key_rows, limit_rows
+from rig.text.console import number
+
+__all__ = ["bench_section", "endings", "files_and_versions", "plan_section", "safety_section", "subject_section"]
+
+
+def subject_section(recording: Recording) -> Section:
+    """Return what was tested, by whom, on which bench, when, and how it ended."""
+    bench, plan = recording.configuration["bench"], recording.configuration["plan"]
+    abouts = _abouts(recording)
+    rows = [
+        ("specimen", bench["specimen"]["name"]),
+        *((name.replace("_", " "), _each(abouts, name)) for name in About.single()),
+        ("test", recording.kind + (f": {plan['description']}" if plan.get("description") else "")),
+        ("bench", bench["name"] + (f": {bench['description']}" if bench.get("description") else "")),
+        ("driver", bench["driver"]["name"]),
+        ("device", "; ".join(dict.fromkeys(filter(None, (_device(about) for about in abouts))))),
+        ("started", recording.started),
+        ("ended", "; ".join(endings(recording))),
+        ("notes", "; ".join(note for about in abouts for note in about.get("notes") or ())),
+    ]
+    return Section("What was tested", [Facts("", [(name, value) for name, value in rows if value])])
+
+
+def endings(recording: Recording) -> list[str]:
+    """Return how each part of a recording ended."""
+    if not recording.parts:
+        return ["nothing recorded"]
+    texts = [
+        "cut short, without a record of the end" if part.end is None else part.end["text"] for part in recording.parts
+    ]
+    return texts if len(texts) == 1 else [f"part {n}: {text}" for n, text in enumerate(texts, 1)]
+
+
+def bench_section(recording: Recording) -> Section:
+    """Return sensors with their calibration, and the limits of the bench."""
+    bench = recording.configuration["bench"]
+    day = recording.started[:10]
+    channels = bench["channels"]
+    overdue = frozenset(i for i, one in enumerate(channels) if _overdue(one, day))
+    sensors = Table(
+        "Channels and sensors",
+        ("channel", "role", "sensor", "serial number", "sensitivity", "range\nV", "calibrated", "due"),
+        [
+            (
+                str(one["name"]),
+                str(one["role"]) + (", loopback" if one.get("loopback") else ""),
+                str(one.get("sensor") or "-"),
+                str(one.get("serial_number") or "-"),
+                _sensitivity(one),
+                number(one.get("range_v"), "g"),
+                str(one.get("calibrated") or "-"),
+                str(one.get("calibration_due") or "-") + (" (overdue)" if i in overdue else ""),
+            )
+            for i, one in enumerate(channels)
+        ],
+        overdue,
+    )
+    blocks: list[Block] = [sensors]
+    if not any(one.get("serial_number") or one.get("calibrated") for one in channels):
+        blocks.append(Text("The bench states no serial numbers and no calibration dates.", "note"))
+    facts = [
+        ("sample rate", f"{bench['sample_rate_hz']:g} Hz"),
+        ("output range", f"{bench['output_range_v']:g} V"),
+        *limit_rows(bench["limits"]),
+        ("linear frequency of the mode", f"{bench['specimen']['linear_frequency_hz']:g} Hz"),
+    ]
+    if bench["specimen"].get("drive_mode_shape") is not None:
+        facts.append(("mode shape at the drive point", f"{bench['specimen']['drive_mode_shape']:g} kg^-1/2"))
+    blocks.append(Facts("Limits and facts of the bench", facts, dense=True))
+    return Section("Bench and sensors", blocks)
+
+
+def _sensitivity(channel: Mapping[str, Any]) -> str:
+    unit = str(channel["unit"])
+    return f"{number(channel['sensitivity_v_per_unit'], '.6g', 1e3)} mV/{f'({unit})' if '/' in unit else unit}"
+
+
+def _overdue(channel: Mapping[str, Any], day: str) -> bool:
+    return bool(channel.get("calibration_due")) and str(channel["calibration_due"]) < day
+
+
+def safety_section(recording: Recording) -> Section:
+    """Return who let the bench move, what spoke against it, and the remarks made before the start."""
+    rows, blocks = [], list[Block]()
+    for n, about in enumerate(_abouts(recording), 1):
+        armed = about.get("armed") or {}
+        how = armed.get("how")
+        if how == "virtual":
+            text = "a virtual bench, on which nothing physical moves"
+        elif how:
+            text = f"armed by {how} ({armed.get('by') or 'unknown'}), {armed.get('at', '')}"
+        else:
+            text = "no record of arming"
+        cautions = "; ".join(armed.get("cautions") or ()) or (
+            "-" if how == "virtual" else "none: the last check counts"
+        )
+        rows.append((str(n), text, cautions, "; ".join(about.get("remarks") or ()) or "-"))
+    if rows:
+        blocks.append(Table("Before each part", ("part", "armed", "against it (check, limits)", "remarks"), rows))
+    return Section("Checks and arming", blocks)
+
+
+def plan_section(recording: Recording) -> Section:
+    """Return every key of the plan in force that has a value."""
+    rows = key_rows(recording.configuration["plan"])
+    return Section("Plan", [Facts("Keys of the plan in force, given ones and defaults", rows, code=True, dense=True)])
+
+
+def files_and_versions(recording: Recording, files: Table) -> Section:
+    """Return versions, seed and digests."""
+    facts = [
+        ("recorded by", f"vibrolock {recording.software_version}"),
+        ("seed", "none: a real bench" if recording.seed is None else str(recording.seed)),
+        ("integrity", recording.integrity),
+    ]
+    return Section("Versions and files", [Facts("", facts), files])
+
+
+def _abouts(recording: Recording) -> Sequence[dict[str, Any]]:
+    return [part.information.get("about") or {} for part in recording.parts]
+
+
+def _each(abouts: Sequence[Mapping[str, Any]], name: str) -> str:
+    return ", ".join(dict.fromkeys(str(about[name]) for about in abouts if about.get(name)))
+
+
+def _device(about: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in (about.get("device") or {}).items())

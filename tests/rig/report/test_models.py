@@ -1,0 +1,144 @@
+"""A report on what is no recording: models, predictions, rehearsals, imported measurements, checks, and studies."""
+
+import json
+import sys
+
+import pytest
+
+from rig.cli import main
+from rig.models.files.files import KINDS, save
+from rig.recording.arrays import kind_of
+from rig.report.paper import SAME_LEVEL, PaperError, agreement
+from rig.report.report import write_report
+from rig.show.summary import summarise
+from rig.text.console import PrintedTable, collected
+from tests.rig.exchange.conftest import matrix, modes, responses  # noqa: F401 (fixtures)
+from tests.rig.report.page import read
+
+PLAN = """
+kind = "backbone"
+bench = "magnet-beam"
+levels_v = [0.4, 0.8]
+record_periods = 8
+
+[controller]
+low_pass_rad_s = 6.283185307179586
+k1 = 2.0
+k2 = 6.283185307179586
+centre_frequency_hz = 24.0
+frequency_window_hz = [21.933, 26.807]
+"""
+MADE = (
+    "identify backbone.h5 -o nonlinear-mode.h5",
+    "identify response-controlled.h5 --model force-surface -o force-surface.h5",
+    "identify multisine.h5 --model exciter -o exciter.h5",
+    "identify multisine.h5 --model pnlss --degrees 2 --rate 200 --iterations 2 -o pnlss.h5",
+    "predict nonlinear-mode.h5 --frequency-response 0.2 -o predictions.h5",
+    "rehearse plan.toml --exact -n 2 -o rehearsal.h5",
+    "check --bench magnet-beam -o check.h5",
+)
+
+
+@pytest.fixture(scope="module")
+def shelf(recordings, tmp_path_factory):
+    """A folder of recordings and of what the commands make of them."""
+    folder = tmp_path_factory.mktemp("shelf")
+    for path in recordings.values():
+        (folder / path.name).symlink_to(path)
+    (folder / "plan.toml").write_text(PLAN)
+    for line in MADE:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(folder)
+            patch.setattr(sys, "argv", ["rig", *line.split()])
+            with pytest.raises(SystemExit) as stop:
+                main()
+        assert not stop.value.code, line
+    return folder
+
+
+def check_against_show(path, report):
+    """Every table and every line that `rig show` prints of a model stands in the report."""
+    write_report([path], report)
+    page = read(report)
+    summary = summarise(path)
+    with collected() as printed:
+        KINDS[summary["kind"]].say(summary)
+    plain = page.text.replace("±", "+-").replace("m/s²", "m/s^2").replace("kg^−½", "kg^-1/2").replace("≥ ", ">= ")
+    rows = [[cell.replace("≥ ", ">= ") for cell in row] for row in page.rows()]
+    assert printed
+    for one in printed:
+        if isinstance(one, PrintedTable):
+            for row in one.rows:
+                assert [" ".join(cell.split()) for cell in row] in rows
+        else:
+            assert " ".join(one.split()) in plain
+    assert "svg" in page.seen
+    assert "SHA-256" in page.text
+
+
+@pytest.mark.parametrize("kind", ["nonlinear-mode", "force-surface", "exciter", "pnlss", "predictions", "rehearsal"])
+def test_a_model_of_every_kind_has_what_rig_show_says_and_its_figure(kind, shelf, tmp_path):
+    assert kind_of(shelf / f"{kind}.h5") == kind
+    check_against_show(shelf / f"{kind}.h5", tmp_path / "report.html")
+
+
+@pytest.mark.parametrize("name", ["modes", "matrix", "responses"])
+def test_modes_and_imported_measurements_too(name, request, tmp_path):
+    save(request.getfixturevalue(name), tmp_path / "thing.h5")
+    check_against_show(tmp_path / "thing.h5", tmp_path / "report.html")
+
+
+def test_a_check_has_its_verdict_and_every_test(shelf, tmp_path):
+    write_report([shelf / "check.h5"], tmp_path / "report.html")
+    page = read(tmp_path / "report.html")
+    summary = summarise(shelf / "check.h5")
+    assert f"Verdict: {summary['verdict']}." in page.text
+    names = [row[:3] for row in page.rows()]
+    for finding in summary["findings"]:
+        assert [finding["name"], finding["channel"], finding["verdict"]] in names
+
+
+def row(mean, unbounded=0):
+    return {"mean": mean, "unbounded_models": unbounded, "models": 5}
+
+
+@pytest.mark.parametrize(
+    ("found", "paper", "begins"),
+    [
+        (row(0.012), PaperError(0.013, 0.003), "Agrees: within one"),
+        (row(0.018), PaperError(0.013, 0.003), "Agrees to 1.7"),
+        (row(0.04), PaperError(0.013, 0.003), "Does not agree: it differs by 9.0"),
+        (row(0.04, 2), PaperError(None, None), "As in the paper, some are unstable: 2 of 5"),
+        (row(0.04), PaperError(None, None), "Other than in the paper, none"),
+        (row(None, 5), PaperError(0.013, 0.003), "Other than in the paper, every"),
+        (row(0.04), None, "The paper gives no number"),
+    ],
+)
+def test_a_sentence_says_how_far_a_number_agrees_with_the_papers(found, paper, begins):
+    assert agreement(found, paper).startswith(begins)
+
+
+def test_a_study_stands_beside_the_papers_numbers(tmp_path, shelf, recordings):
+    folder = tmp_path / "study"
+    (folder / "force").mkdir(parents=True)
+    (folder / "study.json").write_text(
+        json.dumps({"specimen": "magnet-beam", "bench": {"name": "<b>"}, "scatter": 0.001, "seed": 3})
+    )
+    (folder / "force" / "models.json").write_text(
+        json.dumps({"variant": "force", "iterations": 8, "levels": ["2.6 N"]})
+    )
+    own = {"training_set": "2.6 N", "test": "same level", "model": None, "mean": 0.0127, "standard_deviation": 0.0003}
+    own |= {"largest": 0.02, "models": 5, "runs": 50, "unbounded_runs": 1, "unbounded_models": 1, "range_use": 0.9}
+    times = {"training_set": "2.6 N", "models": 5, "seconds_mean": 1.25, "seconds_most": 2.0, "iterations_mean": 8.0}
+    table = {"specimen": "magnet-beam", "input": "force", "with_backbone": False, "saturating": 0, "scatter": 0.001}
+    table |= {"seed": 3, "states": 2, "realisations": None, "iterations": 8, "output": "drive", "failures": {}}
+    table |= {"times": [times | {"chosen_mean": 2.0}], "errors": {"chosen on validation data": [own]}}
+    (folder / "force" / "table.json").write_text(json.dumps(table | {"steady": [], "sweeps": []}))
+    write_report([folder], tmp_path / "report.html")
+    page = read(tmp_path / "report.html")
+    paper = str(SAME_LEVEL["magnet-beam"]["2.6 N"])
+    sentence = "Agrees: within one standard deviation of the paper's models."
+    assert ["2.6 N", "5", "unbounded 1 of 50; 1.27 % (0.03 %)", paper, sentence] in page.rows()
+    command = "rig reproduce magnet-beam -o FOLDER --iterations 8 --models 5 --scatter 0.001 --seed 3"
+    assert command in page.text
+    assert ["bench", "<b>"] in page.rows()
