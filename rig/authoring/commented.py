@@ -5,6 +5,7 @@ space (``# Largest force, N.``), a key does not (``#block = 1``): without its ``
 """
 
 import json
+import re
 import textwrap
 from collections.abc import Iterator
 from typing import Any
@@ -29,7 +30,7 @@ def _about(description: str, title: str) -> list[str]:
 
 def _text(words: str) -> list[str]:
     """Return a text as lines of a comment."""
-    return textwrap.wrap(words, WIDTH, initial_indent="# ", subsequent_indent="# ")
+    return textwrap.wrap(words, WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
 
 
 def _table(
@@ -102,10 +103,13 @@ def _holds_tables(node: Schema, definitions: Schema) -> bool:
 
 
 def _meaning(node: Schema) -> str:
-    """Return what a key means and what is allowed, in one paragraph."""
-    words = " ".join(str(node.get("description", node.get("title", ""))).split())
-    allowed = _allowed(node)
-    return f"{words} [{allowed}]" if allowed else words
+    """Return what a key means, its unit if the description does not name it, and what is allowed, in one paragraph."""
+    title = str(node.get("title", ""))
+    words = " ".join(str(node.get("description", title)).split())
+    unit = title.rpartition("(")[2].removesuffix(")") if title.endswith(")") else ""
+    named = re.search(rf"(?<!\w){re.escape(unit)}(?!\w)", words) is not None
+    facts = ", ".join(part for part in ("" if named else unit, _allowed(node)) if part)
+    return f"{words} [{facts}]" if facts else words
 
 
 def _allowed(node: Schema) -> str:
