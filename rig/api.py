@@ -116,9 +116,7 @@ class Run:
         By default all rows of the last part. ``columns``, ``part``, ``point``, ``from_s``, ``to_s`` and ``every`` select
         (`rig.measurements.tables.telemetry`).
         """
-        return telemetry(
-            self.recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every
-        )
+        return telemetry(self.recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every)
 
     def close(self) -> None:
         """Close the file. A temporary file is deleted."""

@@ -36,7 +36,7 @@ def _if_chosen(variant: Schema, definitions: Schema) -> Schema:
 
 def _tag(variant: Schema) -> str:
     """Return the key that tells the variants of a union apart."""
-    return next(key for key, part in variant["properties"].items() if "const" in part)
+    return next(str(key) for key, part in variant["properties"].items() if "const" in part)
 
 
 def _name(node: Schema) -> str:

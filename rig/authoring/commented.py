@@ -52,9 +52,7 @@ def _table(
             yield from _inner(name, given, keys[name], definitions, (*path, name))
 
 
-def _inner(
-    name: str, given: dict[str, Any], node: Schema, definitions: Schema, path: tuple[str, ...]
-) -> Iterator[str]:
+def _inner(name: str, given: dict[str, Any], node: Schema, definitions: Schema, path: tuple[str, ...]) -> Iterator[str]:
     """Yield the lines of a table inside another, or of a list of tables."""
     dotted = ".".join(path)
     if name not in given:
@@ -95,9 +93,7 @@ def _fits(value: dict[str, Any], node: Schema) -> bool:
 
 def _holds_tables(node: Schema, definitions: Schema) -> bool:
     if "items" in node:
-        return isinstance(node["items"], dict) and _holds_tables(
-            _resolved(node["items"], definitions), definitions
-        )
+        return isinstance(node["items"], dict) and _holds_tables(_resolved(node["items"], definitions), definitions)
     union = [part for part in [*node.get("oneOf", ()), *node.get("anyOf", ())] if "$ref" in part]
     return "properties" in node or bool(union)
 

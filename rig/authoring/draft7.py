@@ -22,7 +22,7 @@ _LEFT_OUT = ("title", "discriminator", "prefixItems")
 
 def draft7(schema: Schema) -> Schema:
     """Return a schema of pydantic in draft 7: definitions under ``definitions``, titles with units, unions with their tag."""
-    out = _converted(schema)
+    out: Schema = _converted(schema)
     for name, key in _tags(schema):
         variant = out["definitions"][name]
         variant["required"] = list(dict.fromkeys([key, *variant.get("required", ())]))

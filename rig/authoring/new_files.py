@@ -1,4 +1,4 @@
-"""New files to begin with: a bench, a plan, a bench with a virtual rig, a driver; each with the schema that an editor checks it by."""
+"""New files to begin with: bench, plan, bench with a virtual rig, driver; each with the schema that an editor checks it by."""
 
 import json
 import os
@@ -7,9 +7,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import rig
 from rig.authoring.commented import commented
-from rig.authoring.schemas import Schema, schema_of
+from rig.authoring.draft7 import Schema
+from rig.authoring.schemas import schema_of
 from rig.bench.configuration import read_toml
 from rig.errors import ConfigurationError
 from rig.system.whole_file import whole_file
@@ -107,11 +107,13 @@ def _plan(kind: str, bench: str | None) -> dict[str, Any]:
     found = [(name, table) for name, table in tables if table["kind"] == kind]
     # The bench's own before another's, magnet-beam's before another's, the plan named after its kind before others.
     name, table = min(found, key=lambda one: (one[1]["bench"] != bench, "magnet-beam/" not in one[0], len(one[0])))
-    told = "" if bench in (None, table["bench"]) else f"; its numbers are for the bench {table['bench']}, to be replaced"
+    told = (
+        "" if bench in (None, table["bench"]) else f"; its numbers are for the bench {table['bench']}, to be replaced"
+    )
     return {**table, "bench": bench or table["bench"], "description": f"begun from the shipped plan {name}{told}"}
 
 
 def _driver_template() -> Path:
     """Return the folder of the template, which stands in ``docs`` in the source and inside the package in a wheel."""
     inside = Path(str(resources.files("rig.authoring"))) / "driver-template"
-    return inside if inside.is_dir() else Path(str(rig.__file__)).parents[1] / "docs" / "driver-template"
+    return inside if inside.is_dir() else Path(__file__).parents[2] / "docs" / "driver-template"

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.campaigns.kinds import KINDS
@@ -38,7 +39,7 @@ def points_table(recording: Recording) -> "pandas.DataFrame":
     except ImportError:
         raise _missing("pandas") from None
     campaign = KINDS[recording.kind]
-    points = [point_from(table, campaign.result) for table in recording.latest.values()]
+    points: list[Point[Any]] = [point_from(table, campaign.result) for table in recording.latest.values()]
     columns = {column.key: [_number(value_of(point, column.key)) for point in points] for column in campaign.columns}
     table = {
         "level": [point.level for point in points],
@@ -74,6 +75,8 @@ def telemetry(
 
     Parameters
     ----------
+    recording
+        The open recording.
     columns
         Names of channels and columns; by default all.
     part
@@ -126,7 +129,9 @@ def _stretch(recording: Recording, part: int | None, point: int | None) -> tuple
         return number, 0, recording.parts[number].n_rows
     table = recording.latest.get(point - 1)
     if table is None:
-        raise RecordingError(f"`point` = {point}: {recording.path} has {', '.join(str(n + 1) for n in recording.latest)}")
+        raise RecordingError(
+            f"`point` = {point}: {recording.path} has {', '.join(str(n + 1) for n in recording.latest)}"
+        )
     number = int(table["part"])
     if part is not None and part != number + 1:
         raise RecordingError(f"`part` = {part}: point {point} is in part {number + 1}")

@@ -3,8 +3,8 @@
 __all__ = ["titled", "unit_of"]
 
 UNITS = {
-    "v_per_unit": "V per N or m/s^2", "octaves_per_min": "octaves/min", "hz_per_s": "Hz/s", "v_per_s": "V/s", "v_s2_m": "V s^2/m",
-    "rms_v": "V RMS", "rms_n": "N RMS", "valid_h": "hours", "periods": "periods",
+    "v_per_unit": "V per N or m/s^2", "octaves_per_min": "octaves/min", "hz_per_s": "Hz/s", "v_per_s": "V/s",
+    "v_s2_m": "V s^2/m", "rms_v": "V RMS", "rms_n": "N RMS", "valid_h": "hours", "periods": "periods",
     "m_s2": "m/s^2", "n_m_rad": "N m/rad", "n_s_m": "N s/m", "n_m4": "N m^4", "n_m3": "N/m^3", "n_m2": "N/m^2",
     "kg_m3": "kg/m^3", "kg_m2": "kg m^2", "rad_s": "rad/s", "n_m": "N/m", "n_a": "N/A", "v_n": "V/N",
     "a_v": "A/V", "per_m2": "1/m^2", "per_m": "1/m", "per_kg": "1/kg", "ohm": "ohm", "deg": "deg", "hz": "Hz", "pa": "Pa",

@@ -27,7 +27,6 @@ LEVELS = {
 """Amplitude law and unit of the levels, by plan key."""
 
 
-
 def exactly_one(*groups: tuple[str, ...]) -> JsonDict:
     """Return the JSON schema of a table that has the keys of exactly one of the groups."""
     return {"oneOf": [{"required": list(group)} for group in groups]}

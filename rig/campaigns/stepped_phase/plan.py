@@ -25,7 +25,9 @@ class SteppedPhasePlan(SettledPlan):
     lag still has only one. Each level is approached from ``start_v`` at the first lag.
     """
 
-    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("phase_lags_deg",), ("start_deg", "stop_deg"))]})
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("phase_lags_deg",), ("start_deg", "stop_deg"))]}
+    )
 
     kind: Literal["stepped-phase"] = "stepped-phase"
     """Kind of campaign."""

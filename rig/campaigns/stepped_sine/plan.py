@@ -26,7 +26,9 @@ class SteppedSinePlan(TonePlan):
     every frequency.
     """
 
-    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("frequencies_hz",), ("start_hz", "stop_hz"))]})
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("frequencies_hz",), ("start_hz", "stop_hz"))]}
+    )
 
     kind: Literal["stepped-sine"] = "stepped-sine"
     """Kind of campaign."""

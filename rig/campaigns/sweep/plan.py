@@ -26,7 +26,9 @@ class SweepPlan(TonePlan):
     ``hold_periods``. Then the frequency moves, linearly or logarithmically in time. Every row is recorded.
     """
 
-    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("rate_hz_per_s",), ("rate_octaves_per_min",))]})
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("rate_hz_per_s",), ("rate_octaves_per_min",))]}
+    )
 
     kind: Literal["sweep"] = "sweep"
     """Kind of campaign."""

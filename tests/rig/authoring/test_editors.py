@@ -39,7 +39,12 @@ def complaints(checker, folder):
     names = sorted(path.name for path in folder.glob("*.toml"))
     home = {"HOME": str(folder), "XDG_CACHE_HOME": str(folder), "NO_COLOR": "1", "RUST_LOG": "error"}
     out = subprocess.run(
-        [program(checker), *options, *names], cwd=folder, env={**os.environ, **home}, capture_output=True, text=True, check=False
+        [program(checker), *options, *names],
+        cwd=folder,
+        env={**os.environ, **home},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     printed = re.sub(r"\x1b\[[0-9;]*m", "", out.stdout + out.stderr)
     pattern = r'invalid file error=.* path="[^"]*/([^"/]+)"' if checker == "taplo" else r"^\s*at ([\w.-]+\.toml):\d+"

@@ -1,4 +1,4 @@
-"""JSON Schemas of benches, plans and virtual rigs: they accept what the program accepts, and refuse what a schema can refuse."""
+"""JSON Schemas of benches, plans and virtual rigs: they accept what the program accepts, and refuse what they can express."""
 
 import copy
 import json
@@ -159,7 +159,8 @@ def changed(table, path, value):
 
 BROKEN_BENCHES = [
     ("name", None), ("name", ""), ("name", 3), ("nmae", "x"), ("sample_rate_hz", None), ("sample_rate_hz", 0),
-    ("sample_rate_hz", "fast"), ("sample_rate_hz", 2e6), ("block", 0), ("block", 1.5), ("block", True), ("output_range_v", -1.0),
+    ("sample_rate_hz", "fast"), ("sample_rate_hz", 2e6), ("block", 0), ("block", 1.5), ("block", True),
+    ("output_range_v", -1.0),
     ("driver", None), ("driver.name", None), ("driver.name", ""), ("driver.nam", "virtual"), ("limits", None),
     ("limits.voltage_v", 0.0), ("limits.voltage_v", 101.0), ("limits.voltage_mv", 100.0), ("limits.force_n", None),
     ("limits.frequency_hz", [8.0]), ("limits.frequency_hz", [8.0, 20.0, 30.0]), ("limits.frequency_hz", [0.0, 20.0]),

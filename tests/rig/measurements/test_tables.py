@@ -43,7 +43,12 @@ def test_rows_are_channels_over_time_at_the_instants_at_which_they_were_sampled(
     (part,) = run.recording.parts
     assert data.sizes["time"] == part.n_rows
     np.testing.assert_array_equal(data["drive"], part.rows("inputs")[:, 1])
-    assert [data[name].attrs["units"] for name in ("force", "drive", "frequency_hz", "output_v")] == ["N", "m/s^2", "Hz", "V"]
+    assert [data[name].attrs["units"] for name in ("force", "drive", "frequency_hz", "output_v")] == [
+        "N",
+        "m/s^2",
+        "Hz",
+        "V",
+    ]
     assert data["force"].attrs["role"] == "force"
     assert data["time"].attrs["units"] == "s"
     steps = np.diff(data["time"]) * 5000.0
