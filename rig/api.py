@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from identification import (
     Backbone,
@@ -23,7 +24,12 @@ from rig.campaigns.running.runner import carry_out, take_up
 from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
 from rig.measurements.experiments import experiments
 from rig.measurements.experiments.periods import Periods
+from rig.measurements.tables import points_table, telemetry
 from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 __all__ = ["Run", "resume", "run"]
 
@@ -90,6 +96,27 @@ class Run:
             transient_periods=transient_periods,
             segment_periods=segment_periods,
         )
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return the points as a table, one row a point, with units in ``attrs`` (`rig.measurements.tables.points_table`)."""
+        return points_table(self.recording)
+
+    def to_xarray(
+        self,
+        *,
+        columns: Sequence[str] | None = None,
+        part: int | None = None,
+        point: int | None = None,
+        from_s: float | None = None,
+        to_s: float | None = None,
+        every: int = 1,
+    ) -> "xarray.Dataset":
+        """Return recorded rows over time with units: channels by their names, and the loop's own columns.
+
+        By default all rows of the last part. ``columns``, ``part``, ``point``, ``from_s``, ``to_s`` and ``every`` select
+        (`rig.measurements.tables.telemetry`).
+        """
+        return telemetry(self.recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every)
 
     def close(self) -> None:
         """Close the file. A temporary file is deleted."""

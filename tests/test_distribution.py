@@ -1,7 +1,14 @@
-"""What is installed: the names, and what a wheel contains."""
+"""What is installed: the names, what wheel and sdist contain, and that a wheel works in an environment of its own."""
 
+import importlib.util
+import json
+import os
 import subprocess
 import sys
+import sysconfig
+import tarfile
+import tomllib
+import venv
 import zipfile
 from importlib import import_module
 from importlib.metadata import packages_distributions
@@ -21,19 +28,105 @@ def test_the_package_is_this_distribution_and_no_other(name):
     assert set(packages_distributions().get(name, ["vibrolock"])) == {"vibrolock"}
 
 
-def test_a_wheel_holds_benches_plans_specimens_the_page_and_type_markers(tmp_path):
-    subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(tmp_path), str(ROOT)], check=True
-    )
-    (wheel,) = tmp_path.glob("*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
-    for wanted in (
-        "rig/bench/shipped/magnet-beam.toml",
-        "rig/campaigns/shipped/magnet-beam/backbone.toml",
-        "rig/campaigns/shipped/magnet-beam-symmetric/backbone.toml",
-        "simulators/specimens/magnet-beam.toml",
-        "rig/monitor/page/index.html",
-        *(f"{package}/py.typed" for package in PACKAGES),
-    ):
-        assert wanted in names
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """Wheel and sdist, built without a network: the sdist from the source, the wheel from the sdist."""
+    if importlib.util.find_spec("hatchling") is None:
+        pytest.skip("the build backend hatchling is not installed (pip install 'vibrolock[dev]')")
+    folder = tmp_path_factory.mktemp("built")
+    _run([sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(folder)], ROOT)
+    (sdist,) = folder.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder, filter="data")
+    source = folder / sdist.name.removesuffix(".tar.gz")
+    _run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)], source)
+    (wheel,) = folder.glob("*.whl")
+    return wheel, sdist
+
+
+def _run(command, folder, **further):
+    out = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, **further)
+    assert out.returncode == 0, out.stdout + out.stderr
+    return out.stdout
+
+
+def tracked(*folders):
+    """Files that the project has below folders, without what Python leaves there."""
+    for folder in folders:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.is_file() and "__pycache__" not in path.parts:
+                yield path.relative_to(ROOT).as_posix()
+
+
+def test_a_wheel_holds_all_modules_benches_plans_specimens_the_page_templates_and_type_markers(built):
+    names = set(zipfile.ZipFile(built[0]).namelist())
+    wanted = {name for name in tracked(*PACKAGES) if not name.endswith((".nbi", ".nbc"))}
+    assert {"rig/monitor/page/index.html", "rig/monitor/page/uplot/uPlot.iife.min.js"} <= wanted
+    assert {"rig/bench/shipped/magnet-beam.toml", "rig/campaigns/shipped/magnet-beam/backbone.toml"} <= wanted
+    assert {"simulators/specimens/magnet-beam.toml", "rig/authoring/starts/bench.toml"} <= wanted
+    assert {f"{package}/py.typed" for package in PACKAGES} <= wanted
+    assert wanted - names == set()
+    template = {name.replace("docs/", "rig/authoring/") for name in tracked("docs/driver-template")}
+    assert template
+    assert template - names == set()
     assert not [name for name in names if name.startswith(("tests/", "benchmarks/", "docs/"))]
+
+
+def test_an_sdist_also_holds_tests_documentation_and_what_a_contributor_reads(built):
+    with tarfile.open(built[1]) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    files = {"pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "SECURITY.md"}
+    assert files <= names
+    assert {"tests/conftest.py", "docs/user-guide.md", "benchmarks/__main__.py"} <= names
+
+
+@pytest.fixture(scope="module")
+def empty(built, tmp_path_factory):
+    """An environment that holds this wheel alone; the libraries that it needs are found behind it."""
+    folder = tmp_path_factory.mktemp("empty")
+    venv.create(folder, with_pip=False)
+    scripts = folder / ("Scripts" if os.name == "nt" else "bin")
+    install = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", str(built[0])]
+    _run([sys.executable, "-m", "pip", "--python", str(scripts / "python"), *install], folder)
+    paths = sysconfig.get_paths(vars={"base": str(folder), "platbase": str(folder)})
+    libraries = dict.fromkeys(Path(str(one.__file__)).parents[1] for one in map(import_module, ("numpy", "typer")))
+    (Path(paths["purelib"]) / "libraries.pth").write_text("\n".join(map(str, libraries)))
+    return scripts
+
+
+def _in(empty, folder, name, *arguments):
+    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    return _run([str(empty / name), *arguments], folder, env=environment)
+
+
+def test_commands_and_their_help_work_from_the_wheel(empty, tmp_path):
+    assert "Phase-locked nonlinear vibration tests" in _in(empty, tmp_path, "rig", "--help")
+    where = _in(empty, tmp_path, "python", "-c", "import rig; print(rig.__file__)")
+    assert Path(where.strip()).is_relative_to(empty.parent)
+    helps = """
+import typer
+from rig.cli import app
+group = typer.main.get_command(app)
+for name in group.commands:
+    assert not app([name, "--help"], prog_name="rig", standalone_mode=False)
+print(len(group.commands))
+"""
+    assert int(_in(empty, tmp_path, "python", "-c", helps).split()[-1]) > 20
+
+
+def test_new_files_and_shipped_ones_come_from_the_wheel(empty, tmp_path):
+    assert "magnet-beam/backbone" in _in(empty, tmp_path, "rig", "list")
+    _in(empty, tmp_path, "rig", "new", "driver", "-o", "box")
+    assert (tmp_path / "box" / "vibrolock_box" / "driver.py").exists()
+    _in(empty, tmp_path, "rig", "new", "rig", "-o", "mine.toml")
+    schema = json.loads((tmp_path / "bench.schema.json").read_text(encoding="utf-8"))
+    assert schema["properties"]["name"]["description"] == "Name, used in plan names and files."
+
+
+def test_the_version_and_the_licence_are_those_of_the_citation():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {project['version']}\n" in citation
+    assert f"\nlicense: {project['license']}\n" in citation
+    assert f"\n  - name: {project['authors'][0]['name']}\n" in citation
+    assert f"\n## [{project['version']}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from rig.bench.channels import Channel
 from rig.bench.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
@@ -46,7 +46,7 @@ class Limits(Configured):
     """Largest instantaneous acceleration of any drive or response channel, m/s^2."""
     displacement_m: float = Field(gt=0)
     """Largest displacement of any drive or response channel, m; by integrating its acceleration twice, without its mean."""
-    frequency_hz: tuple[float, float]
+    frequency_hz: tuple[float, float] = Field(json_schema_extra={"items": {"exclusiveMinimum": 0}})
     """Lowest and highest frequency of the oscillator, Hz."""
     slew_v_per_s: float = Field(100.0, gt=0)
     """Largest rate of change of the output amplitude, V/s."""
@@ -76,7 +76,7 @@ class SpecimenFacts(Configured):
     """Name, for files and figures."""
     linear_frequency_hz: float = Field(gt=0)
     """Frequency of the mode under test at low level, Hz."""
-    drive_mode_shape: float | None = Field(None)
+    drive_mode_shape: float | None = Field(None, json_schema_extra={"not": {"const": 0}})
     """Mass-normalised shape of this mode at the drive channel, kg^-1/2; from a modal test. Damping needs it."""
 
     @field_validator("drive_mode_shape")
@@ -109,6 +109,8 @@ class Arming(Configured):
 class EmergencyStop(Configured):
     """A switch on an input channel that brings the output to 0 V at once."""
 
+    model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["above_v"]}, {"required": ["below_v"]}]})
+
     channel: str = Field(min_length=1)
     """Name of a channel with role ``monitor``."""
     above_v: float | None = Field(None, ge=-100, le=100)
@@ -140,7 +142,12 @@ class Bench(Configured):
     """Range of the output converter, V."""
     output_resolution_v: float | None = Field(None, gt=0, le=1)
     """Voltage of the output converter's least bit, V; if None, that of 16 bit over its range."""
-    channels: tuple[Channel, ...] = Field(min_length=2)
+    channels: tuple[Channel, ...] = Field(
+        min_length=2,
+        json_schema_extra={
+            "allOf": [{"contains": {"properties": {"role": {"const": role}}}} for role in ("force", "drive")]
+        },
+    )
     """The input channels, in the device's order."""
     limits: Limits
     """What the bench may be asked for."""

@@ -4,12 +4,14 @@ from datetime import date
 from enum import IntEnum
 from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from rig.bench.configuration import Configured
 
 __all__ = ["Channel", "Role"]
 
+UNITS = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}
+"""Unit of a channel by its role; a monitor has any."""
 DATE = r"^(\d{4}-\d{2}-\d{2})?$"
 
 
@@ -36,13 +38,25 @@ class Role(IntEnum):
 class Channel(Configured):
     """An input channel: what is connected to it and how it is scaled."""
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "allOf": [
+                {"if": {"properties": {"role": {"const": role}}}, "then": {"properties": {"unit": {"const": unit}}}}
+                for role, unit in UNITS.items()
+            ]
+        }
+    )
+
     name: str = Field(min_length=1, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     """Name, used in files and messages."""
-    role: str = Field(pattern="^(force|drive|response|monitor)$")
+    role: str = Field(
+        pattern="^(force|drive|response|monitor)$",
+        json_schema_extra={"enum": ["force", "drive", "response", "monitor"]},
+    )
     """``force``, ``drive``, ``response`` or ``monitor``; see `Role`."""
     unit: str
     """Physical unit: N for a force, m/s^2 for drive and response."""
-    sensitivity_v_per_unit: float
+    sensitivity_v_per_unit: float = Field(json_schema_extra={"not": {"const": 0}})
     """Volts per unit; negative for a sensor that is mounted the other way round."""
     range_v: float = Field(10.0, gt=0, le=100)
     """Largest voltage that sensor and converter deliver undistorted, V."""
@@ -79,7 +93,7 @@ class Channel(Configured):
             )
         for name in ("calibrated", "calibration_due"):
             _check_day(name, getattr(self, name))
-        wanted = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}.get(self.role, self.unit)
+        wanted = UNITS.get(self.role, self.unit)
         if self.unit != wanted:
             raise ValueError(f"unit = {self.unit!r}: a channel with role {self.role!r} is in {wanted!r}")
         return self

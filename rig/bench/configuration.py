@@ -12,6 +12,7 @@ from rig.bench.vetting import objection_to
 from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
 from rig.text.printable import shown
+from vibrolock.described import Described
 
 __all__ = [
     "Configured",
@@ -31,8 +32,11 @@ AS_CLOSE = 0.05  # of the likeness of two words
 FEW_NAMES = 10  # listed in one message
 
 
-class Configured(BaseModel):
-    """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused."""
+class Configured(Described):
+    """Base of every part of a bench or plan: frozen, unknown keys and non-finite numbers refused.
+
+    The docstring under a field describes it in the JSON schema (`rig.authoring.schemas`).
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 

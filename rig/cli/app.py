@@ -27,6 +27,7 @@ from rig.cli.replay import replay_
 from rig.cli.report import report_
 from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
+from rig.cli.schema import new, schema
 from rig.cli.show import plot_, show
 from rig.cli.stop import stop
 from rig.cli.tune import tune_
@@ -55,6 +56,8 @@ def _common(
 
 
 app.command("list")(list_)
+app.command()(new)
+app.command()(schema)
 app.command()(identify)
 app.command()(predict)
 app.command("import")(import_)

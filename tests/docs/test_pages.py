@@ -27,7 +27,9 @@ centre_frequency_hz = 24.0
 frequency_window_hz = [22.0, 27.0]
 """
 NEEDS = {"docs/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
+LIBRARIES = {"docs/editors-and-tables.md": ("pandas", "xarray")}  # optional ones that a page uses
 NOT_RUN = {
+    ("docs/editors-and-tables.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
     ("README.md", "needs the device"),
     ("docs/emulator.md", "runs until Ctrl-C"),
     ("docs/hardware-in-the-loop.md", "takes half a minute each; tests/hardware runs the same"),
@@ -67,6 +69,8 @@ def nothing_of_a_page_stays(tmp_path):
 def test_a_page_does_what_it_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
+    for library in LIBRARIES.get(name_of(page), ()):
+        pytest.importorskip(library, reason=f"{library} is not installed (pip install 'vibrolock[tables]')")
     if name_of(page) in NEEDS:
         Path("quick.toml").write_text(QUICK)
         rig.run("quick.toml", output=NEEDS[name_of(page)]).close()

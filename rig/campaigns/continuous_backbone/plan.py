@@ -2,10 +2,11 @@
 
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
+from rig.campaigns.planning.levels import ONE_LEVEL_KEY
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
@@ -23,6 +24,8 @@ class ContinuousBackbonePlan(LockedPlan):
     the level. The slow flow gives modal frequency and damping at every instant. The results at the given levels are means of
     the way up and the way down.
     """
+
+    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY, {"required": ["levels_m"]}]})
 
     kind: Literal["continuous-backbone"] = "continuous-backbone"
     """Kind of campaign."""

@@ -2,11 +2,12 @@
 
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.campaigns.planning.drive_shape import drive_shape
+from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
@@ -38,6 +39,8 @@ class DwellPlan(SettledPlan):
     first and the last. For the other means one row every ``telemetry_s`` is stored, so that the file of a ten-hour test stays
     small.
     """
+
+    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("cycles",), ("duration_s",))]})
 
     kind: Literal["dwell"] = "dwell"
     """Kind of campaign."""

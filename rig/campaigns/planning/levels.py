@@ -4,7 +4,8 @@ import math
 from dataclasses import replace
 from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.config import JsonDict
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
@@ -13,7 +14,7 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
 
-__all__ = ["LEVELS", "Levels"]
+__all__ = ["LEVELS", "ONE_LEVEL_KEY", "Levels", "exactly_one"]
 
 START_RAMP_PERIODS = 10.0
 
@@ -26,16 +27,29 @@ LEVELS = {
 """Amplitude law and unit of the levels, by plan key."""
 
 
+def exactly_one(*groups: tuple[str, ...]) -> JsonDict:
+    """Return the JSON schema of a table that has the keys of exactly one of the groups."""
+    return {"oneOf": [{"required": list(group)} for group in groups]}
+
+
+ONE_LEVEL_KEY = exactly_one(*((key,) for key in LEVELS))
+"""What the JSON schema says of the level keys together."""
+ABOVE_ZERO: JsonDict = {"minItems": 1, "uniqueItems": True, "items": {"exclusiveMinimum": 0}}
+"""What the JSON schema says of a list of levels; `Levels` itself says it in clearer words."""
+
+
 class Levels(Configured):
     """Levels in exactly one of four quantities. If a loop holds the levels, the run may begin at a voltage, ``start_v``."""
 
-    levels_v: tuple[float, ...] | None = None
+    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY]})
+
+    levels_v: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
     """Levels as amplitude of the output voltage, V peak."""
-    levels_n: tuple[float, ...] | None = None
+    levels_n: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
     """Levels as amplitude of the fundamental force, N peak."""
-    levels_rms_n: tuple[float, ...] | None = None
+    levels_rms_n: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
     """Levels as root mean square of the force, all harmonics together, N."""
-    levels_m: tuple[float, ...] | None = None
+    levels_m: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
     """Levels as amplitude of the drive point's fundamental displacement, m peak."""
     start_v: float | None = Field(None, gt=0)
     """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
+from rig.campaigns.planning.levels import ONE_LEVEL_KEY
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
@@ -24,6 +25,8 @@ class ResponseControlledPlan(SettledPlan):
     At a held displacement a nonlinear structure responds like a linear one: no folds, no jumps, one frequency at each lag.
     Points are given by lag, not by frequency, so that they stay around a resonance that shifts with the level.
     """
+
+    model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY, {"required": ["levels_m"]}]})
 
     kind: Literal["response-controlled"] = "response-controlled"
     """Kind of campaign."""

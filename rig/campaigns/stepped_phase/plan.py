@@ -5,8 +5,9 @@ from dataclasses import replace
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
@@ -23,6 +24,10 @@ class SteppedPhasePlan(SettledPlan):
     The frequency follows the requested phase lag. At a fold of the response, where one frequency has three vibrations, every
     lag still has only one. Each level is approached from ``start_v`` at the first lag.
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("phase_lags_deg",), ("start_deg", "stop_deg"))]}
+    )
 
     kind: Literal["stepped-phase"] = "stepped-phase"
     """Kind of campaign."""

@@ -4,10 +4,11 @@ from functools import partial
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
+from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.plan import Target, TonePlan
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
@@ -24,6 +25,10 @@ class SteppedSinePlan(TonePlan):
     direction decides which of them is found; the unstable one is never found. At a held displacement there is one force at
     every frequency.
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("frequencies_hz",), ("start_hz", "stop_hz"))]}
+    )
 
     kind: Literal["stepped-sine"] = "stepped-sine"
     """Kind of campaign."""

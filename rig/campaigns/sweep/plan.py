@@ -3,10 +3,11 @@
 import math
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
+from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.plan import Target, TonePlan
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
@@ -24,6 +25,10 @@ class SweepPlan(TonePlan):
     well as it can. Starting from rest, the level is reached at the first frequency by a half-cosine ramp and held for
     ``hold_periods``. Then the frequency moves, linearly or logarithmically in time. Every row is recorded.
     """
+
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [ONE_LEVEL_KEY, exactly_one(("rate_hz_per_s",), ("rate_octaves_per_min",))]}
+    )
 
     kind: Literal["sweep"] = "sweep"
     """Kind of campaign."""

@@ -5,19 +5,13 @@ from functools import cache
 from typing import Any
 
 from rig.errors import ConfigurationError
+from rig.text.units import unit_of
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["part_keys", "parts", "specimens"]
 
 Schema = dict[str, Any]
 
-UNITS = {
-    "m_s2": "m/s^2", "n_m_rad": "N m/rad", "n_s_m": "N s/m", "n_m4": "N m^4", "n_m3": "N/m^3", "n_m2": "N/m^2",
-    "kg_m3": "kg/m^3", "kg_m2": "kg m^2", "v_per_unit": "V per N or m/s^2", "rad_s": "rad/s", "n_m": "N/m", "n_a": "N/A",
-    "a_v": "A/V", "per_m2": "1/m^2", "per_m": "1/m", "ohm": "ohm", "deg": "deg", "hz": "Hz", "pa": "Pa", "kg": "kg",
-    "samples": "samples", "per_s": "1/s", "s": "s", "h": "H", "v": "V", "n": "N", "m": "m", "a": "A",
-}  # fmt: skip
-"""Units by the end of a key, longer ends first."""
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
 _BOUNDS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
 _FEW = 4
@@ -106,17 +100,13 @@ def _keys(schema: Schema, name: str, path: str = "") -> Iterator[dict[str, Any]]
         yield {
             "key": path + key,
             "type": _type(field),
-            "unit": _unit(key),
+            "unit": unit_of(key),
             "required": key in required,
             "default": field.get("default"),
             "description": _plain(str(field.get("description", ""))),
         }
         if "$ref" in inner:
             yield from _keys(_resolved(inner["$ref"]), name, f"{path}{key}{'[]' if 'items' in field else ''}.")
-
-
-def _unit(key: str) -> str:
-    return next((unit for end, unit in UNITS.items() if key.endswith(f"_{end}")), "")
 
 
 def _type(field: Schema) -> str:

@@ -36,11 +36,28 @@ MATPLOTLIB = {
 NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser"}  # the last two are loaded by numba where they are installed
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
 FILES = {"numpy", "pydantic", "h5py"}
+CAN = {
+    "can",
+    "cantools",
+    "bitstruct",
+    "textparser",
+    "crccheck",
+    "argparse_addons",
+    "wrapt",
+    "msgpack",
+    "packaging",
+    "asyncio",
+}
+DRIVERS = {"numpy", "pydantic", "simulators", "serial", "cobs"} | CAN | NUMBA  # whose options a schema describes
 
 ALLOWED = {
     "--help": set(),
     "list": {"numpy", "pydantic", "scipy", "simulators"},
     "list beam": {"numpy", "pydantic", "scipy", "simulators"},
+    "schema backbone": {"numpy", "pydantic"},
+    "schema bench": DRIVERS,
+    "new plan -o new-plan.toml": {"numpy", "pydantic"},
+    "new driver -o box": DRIVERS,
     "show run.h5": FILES,
     "show mode.h5": FILES,
     "show --json run.h5": FILES,

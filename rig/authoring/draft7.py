@@ -1,0 +1,98 @@
+"""JSON Schemas as pydantic makes them (draft 2020-12), rewritten in draft 7, which Taplo, Tombi and other TOML editors know.
+
+What TOML cannot hold (null) is left out. What a reader of draft 7 would ignore is said in its words: a ``$ref`` beside other
+words, ``prefixItems``, the ``discriminator`` of a union.
+"""
+
+from typing import Any
+
+from rig.text.units import titled
+
+__all__ = ["DRAFT", "Schema", "draft7", "plain"]
+
+DRAFT = "http://json-schema.org/draft-07/schema#"
+
+Schema = dict[str, Any]
+
+_NAMED = {"properties": "properties", "$defs": "definitions", "definitions": "definitions"}
+_LISTED = ("allOf", "anyOf", "oneOf")
+_SINGLE = ("items", "additionalProperties", "contains", "not", "if", "then", "else")
+_LEFT_OUT = ("title", "discriminator", "prefixItems")
+
+
+def draft7(schema: Schema) -> Schema:
+    """Return a schema of pydantic in draft 7: definitions under ``definitions``, titles with units, unions with their tag."""
+    out: Schema = _converted(schema)
+    for name, key in _tags(schema):
+        variant = out["definitions"][name]
+        variant["required"] = list(dict.fromkeys([key, *variant.get("required", ())]))
+    return out
+
+
+def plain(text: str) -> str:
+    """Return a docstring as paragraphs of one line each, with Markdown's marks for code."""
+    paragraphs = (" ".join(part.split()) for part in text.replace("``", "`").split("\n\n"))
+    return "\n\n".join(part for part in paragraphs if part)
+
+
+def _tags(node: Any) -> set[tuple[str, str]]:
+    """Return name and tag of every definition that is a variant of a tagged union: a file must give the tag."""
+    if isinstance(node, list):
+        return set().union(*map(_tags, node)) if node else set()
+    if not isinstance(node, dict):
+        return set()
+    found = set().union(*(_tags(value) for value in node.values())) if node else set()
+    if isinstance(union := node.get("discriminator"), dict):
+        found |= {(_name(reference), str(union["propertyName"])) for reference in union["mapping"].values()}
+    return found
+
+
+def _name(reference: str) -> str:
+    return reference.rpartition("/")[2]
+
+
+def _converted(node: Any, key: str = "") -> Any:
+    """Return a schema converted; ``key`` is the name of the property that it describes."""
+    if not isinstance(node, dict):
+        return node
+    out: Schema = {"title": titled(key)} if key else {}
+    for word, value in node.items():
+        if word in _NAMED:
+            of_keys = word == "properties"
+            out[_NAMED[word]] = {name: _converted(part, name if of_keys else "") for name, part in value.items()}
+        elif word in _LISTED:
+            out[word] = [_converted(part) for part in value if part != {"type": "null"}]
+        elif word in _SINGLE:
+            out[word] = _converted(value)
+        elif word == "$ref":
+            out[word] = f"#/definitions/{_name(value)}"
+        elif word == "description":
+            out[word] = plain(value)
+        elif word not in _LEFT_OUT and not (word == "default" and value is None):
+            out[word] = value
+    if "prefixItems" in node:
+        _list_items(out, [_converted(part) for part in node["prefixItems"]])
+    if len(out.get("anyOf", ())) == 1:  # the other choice was null
+        _absorb(out, out.pop("anyOf")[0])
+    if "$ref" in out and len(out) > 1:
+        out["allOf"] = [{"$ref": out.pop("$ref")}, *out.get("allOf", ())]
+    return out
+
+
+def _list_items(out: Schema, parts: list[Schema]) -> None:
+    """Describe the items of a list of fixed length: by one schema if all are alike, else one by one."""
+    if all(part == parts[0] for part in parts):
+        out["items"] = {**parts[0], **out.get("items", {})}
+    else:
+        out["items"] = parts
+
+
+def _absorb(out: Schema, only: Schema) -> None:
+    """Put the words of the only choice that is left beside the others, whose words count where both have them."""
+    for word, value in only.items():
+        if word == "allOf":
+            out["allOf"] = [*value, *out.get("allOf", ())]
+        elif word == "items" and "items" in out:
+            out["items"] = {**value, **out["items"]}
+        else:
+            out.setdefault(word, value)

@@ -1,0 +1,139 @@
+"""JSON Schemas of benches, plans and virtual rigs, written from the models that read them.
+
+The description of a key is the docstring under its field, its title has its unit. A schema refuses what the program refuses
+for a reason that a schema can express: an unknown key, a wrong type, a value out of range, a missing key, a wrong choice.
+Rules between numbers, such as a limit beyond a channel's range, stay with the program.
+"""
+
+from typing import Any
+
+from pydantic import AliasChoices, BaseModel
+
+from rig.authoring.changes import Loosened, reachable, requirements
+from rig.authoring.draft7 import DRAFT, Schema, draft7, plain
+from rig.errors import ConfigurationError
+from rig.text.printable import shown
+
+__all__ = ["bench_schema", "plan_schema", "rig_schema", "schema_names", "schema_of"]
+
+
+def schema_names() -> tuple[str, ...]:
+    """Names of all schemas: ``bench``, ``plan``, ``rig``, and every kind of plan."""
+    from rig.campaigns.kinds import KINDS
+
+    return ("bench", "plan", "rig", *KINDS)
+
+
+def schema_of(name: str) -> Schema:
+    """Return the schema ``bench``, ``plan``, ``rig`` or that of a kind of plan; `ConfigurationError` for another name."""
+    if name not in schema_names():
+        raise ConfigurationError(f"WHAT = {shown(name)}: allowed is {', '.join(schema_names())}")
+    return {"bench": bench_schema, "rig": rig_schema, "plan": plan_schema}.get(name, lambda: plan_schema(name))()
+
+
+def plan_schema(kind: str | None = None) -> Schema:
+    """Return the schema of plans of a kind; without a kind, of all plans: one schema for each ``kind``."""
+    from rig.campaigns.kinds import KINDS
+
+    if kind is not None:
+        return _whole(_of_plan(KINDS[kind].plan), f"{kind} plan")
+    definitions: Schema = {}
+    for name, campaign in KINDS.items():
+        schema = _of_plan(campaign.plan)
+        definitions |= schema.pop("definitions")
+        definitions[f"{name}-plan"] = schema
+    union = {"description": "Plan of a test.", "oneOf": [{"$ref": f"#/definitions/{name}-plan"} for name in KINDS]}
+    return _whole({"type": "object", **union, "definitions": definitions}, "plan")
+
+
+def rig_schema() -> Schema:
+    """Return the schema of a virtual rig: all of its parts, or changes of a shipped ``specimen``."""
+    schema = _of_rig()
+    definitions = schema.pop("definitions")
+    rules = _unless("specimen", requirements(schema, definitions))
+    loose = Loosened(definitions).table(schema)
+    return _whole({**loose, "allOf": [*loose.get("allOf", ()), rules], "definitions": definitions}, "virtual rig")
+
+
+def bench_schema() -> Schema:
+    """Return the schema of a bench: all of its keys, or changes of a ``base``."""
+    from rig.bench import Bench
+
+    schema = draft7(Bench.model_json_schema())
+    definitions = schema.pop("definitions")
+    loosened = Loosened(definitions)
+    asked = requirements(schema, definitions)
+    loose = loosened.table(schema)
+    options = _options_of_drivers()
+    for name, option in options.items():
+        definitions |= option.pop("definitions", {})
+        rules = requirements(option, definitions)
+        if name == "virtual":
+            rules = {"required": ["options"], "properties": {"options": _unless("specimen", rules)}}
+        else:
+            rules = {"required": ["options"], "properties": {"options": rules}}
+        asked["properties"]["driver"].setdefault("allOf", []).append(_where_named(name, rules))
+        definitions[f"{name}-options"] = loosened.table(option)
+    _describe_driver(definitions["DriverChoiceChanges"], options)
+    loose["properties"] = {"base": _BASE, **loose["properties"]}
+    loose["allOf"] = [*loose.get("allOf", ()), _unless("base", asked)]
+    return _whole({**loose, "definitions": definitions}, "bench")
+
+
+_BASE = {
+    "title": "base",
+    "type": "string",
+    "description": "Shipped bench (`rig list`), or a .toml file in the same folder, that this file changes key by key.",
+}
+
+
+def _describe_driver(table: Schema, options: Schema) -> None:
+    """Say in the table of a driver which options the drivers of the product have; others have options of their own."""
+    known = {driver: {"$ref": f"#/definitions/{driver}-options"} for driver in options}
+    table["properties"]["options"]["anyOf"] = [*known.values(), {"type": "object"}]  # so that an editor completes them
+    table["allOf"] = [_where_named(driver, {"properties": {"options": own}}) for driver, own in known.items()]
+
+
+def _where_named(driver: str, rules: Schema) -> Schema:
+    return {"if": {"properties": {"name": {"const": driver}}, "required": ["name"]}, "then": rules}
+
+
+def _unless(key: str, rules: Schema) -> Schema:
+    """Return rules for a table that does not have a key."""
+    return {"if": {"not": {"required": [key]}}, "then": rules}
+
+
+def _options_of_drivers() -> dict[str, Schema]:
+    from rig.drivers.can import CanOptions
+    from rig.drivers.serial import SerialOptions
+    from rig.drivers.virtual.driver import Queue
+
+    rig, queue = _of_rig(), draft7(Queue.model_json_schema())
+    del rig["properties"]["seed"]  # is given to the run
+    rig["properties"] |= queue["properties"]
+    rig["definitions"] |= queue["definitions"]
+    return {"virtual": rig, "serial": _of(SerialOptions), "can": _of(CanOptions)}
+
+
+def _of(model: type[BaseModel]) -> Schema:
+    return {"definitions": {}, **draft7(model.model_json_schema())}
+
+
+def _of_rig() -> Schema:
+    from simulators.virtual_rig import VirtualRig
+
+    return _of(VirtualRig)
+
+
+def _of_plan(model: type[BaseModel]) -> Schema:
+    schema = _of(model)
+    for name, field in model.model_fields.items():
+        if isinstance(choices := field.validation_alias, AliasChoices):
+            schema["properties"] |= {str(other): schema["properties"][name] for other in choices.choices}
+    return {**schema, "required": ["kind", *schema.get("required", ())]}
+
+
+def _whole(schema: Schema, title: str) -> Schema:
+    """Return a schema with its heading, and without what nothing refers to."""
+    described: dict[str, Any] = {"description": plain(schema.pop("description", ""))}
+    return reachable({"$schema": DRAFT, "title": f"vibrolock {title}", **described, **schema})

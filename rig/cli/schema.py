@@ -1,0 +1,51 @@
+"""``rig schema`` and ``rig new``: what an editor checks files by, and files to begin with."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rig.cli.options import Overwrite
+
+__all__ = ["new", "schema"]
+
+
+def schema(
+    what: Annotated[str, typer.Argument(help="bench, plan, rig (the parts of a virtual rig) or a kind of plan.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write; default: print it.")] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """The JSON Schema of benches, plans or virtual rigs, by which an editor completes and checks their files."""
+    from rig.authoring.new_files import schema_text, written
+    from rig.authoring.schemas import schema_of
+
+    text = schema_text(schema_of(what))
+    if output is None:
+        print(text, end="")
+    else:
+        written({output: text}, overwrite)
+
+
+def new(
+    what: Annotated[str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig) or driver (a folder).")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="File to write; of a driver, the folder.")],
+    kind: Annotated[str, typer.Option(help="Kind of a plan.")] = "backbone",
+    bench: Annotated[str | None, typer.Option(help="Bench of a plan; default: that of the shipped plan.")] = None,
+    schema_file: Annotated[
+        Path | None, typer.Option("--schema", help="Where the schema is written; default: beside OUTPUT.")
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """A commented file to begin with, every key explained, and its schema for the editor beside it."""
+    from rig.authoring.new_files import new_driver, new_file
+    from rig.errors import ConfigurationError
+    from rig.text.printable import shown
+
+    if what == "driver":
+        new_driver(output, overwrite)
+        print(f"{output}: take it apart and put your device in its place (docs/writing-a-driver.md)")
+        return
+    if what not in ("bench", "plan", "rig"):
+        raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig or driver")
+    beside = new_file(what, output, kind=kind, bench=bench, schema_file=schema_file, overwrite=overwrite)
+    print(f"{output}: a {what} to begin with, checked by {beside}")
