@@ -24,7 +24,7 @@ def stop(
     """Ramp runs down and wait until their output is at 0 V; status 1 if that is not known of all. No emergency stop."""
     from rig.errors import RecordingError
     from rig.live.place import base_folder, runs
-    from rig.live.reader import run_into
+    from rig.live.reader import left_behind, run_into
     from rig.monitor.coming_down import ComingDown
     from rig.text.printable import printable
 
@@ -36,6 +36,7 @@ def stop(
         folders = [] if found is None else [found.folder]
         if found is not None:
             found.close()
+    folders = folders or left_behind(file)
     if not folders:
         raise RecordingError("no run is under way" if file is None else f"{file}: no run into this file is under way")
     cause = f"stopped by `rig stop` (process {os.getpid()})"

@@ -42,6 +42,10 @@ class Live(Protocol):
     def line(self, what: str, told: Mapping[str, Any]) -> None:
         """Take a point, an event, a remark or how the part began or ended: ``what`` is to be told of it."""
 
+    @property
+    def stop_requested(self) -> bool:
+        """Whether a stop was requested."""
+
     def another_part(self) -> bool:
         """Say that one more part is going to be started; return whether it may be: not once a stop was requested."""
 
@@ -57,6 +61,9 @@ class Unpublished:
 
     def line(self, what: str, told: Mapping[str, Any]) -> None:
         """Do nothing."""
+
+    stop_requested = False
+    """Nobody could request one."""
 
     def another_part(self) -> bool:
         """Return True: nobody could request a stop."""
@@ -136,10 +143,15 @@ class Publisher:
         In this order: whoever requests a stop and then still reads that frame has been heeded.
         """
         checksum, self._frames[:HEAD] = self._frames[:HEAD], bytes(HEAD)
-        if (self.folder / STOP).exists():
+        if self.stop_requested:
             self._frames[:HEAD] = checksum
             return False
         return True
+
+    @property
+    def stop_requested(self) -> bool:
+        """Whether a request was left."""
+        return (self.folder / STOP).exists()
 
     def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Look for requests to stop, in a thread of its own."""
@@ -195,8 +207,8 @@ class Publisher:
         frame, t = self._frame[0], loop.tick.arrays
         progress, guard, vibration = t.progress[0], t.guard[0], t.control["vibration"][0]
         frame["sample"], frame["lock"] = loop.tick.sample, rows["lock"][-1]
-        # Where the driver has failed, nobody knows more of the output than what was put out last.
-        frame["guard"] = guard["mode"] if loop.failure is None else rows["guard"][-1]
+        # From the last row, not from the guard: where the driver has failed, nobody knows more of the output.
+        frame["guard"] = rows["guard"][-1]
         for name in ("reason", "channel", "value"):
             frame[name] = guard[name]
         at = int(progress["segment"])
@@ -206,7 +218,7 @@ class Publisher:
             frame[name] = -1 if segment is None else segment[name]
         frame["target"] = 0.0 if segment is None else segment["level"]
         frame["finished"], frame["total"] = finished, total
-        frame["level"], frame["voltage_v"] = progress["level"], guard["amplitude_v"]
+        frame["level"], frame["voltage_v"] = progress["level"], abs(rows["command_v"][-1])
         frame["frequency_hz"] = loop.tick.frequency_hz
         errors = rows["phase_error_rad"]
         known = errors[np.isfinite(errors)]

@@ -13,11 +13,11 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.live.layout import BINS, FRAME, HEAD, bin_dtype
-from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, lives, runs
+from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, base_folder, lives, runs
 from rig.live.stopping import request_stop
 from rig.tick.layout import recorded_row
 
-__all__ = ["Frame", "LiveRun", "View", "run_into"]
+__all__ = ["Frame", "LiveRun", "View", "left_behind", "run_into"]
 
 TRIES = 20
 
@@ -153,3 +153,15 @@ def run_into(recording: Path | None = None) -> LiveRun | None:
                 return run
             run.close()
     return None
+
+
+def left_behind(recording: Path | None = None) -> list[Path]:
+    """Return the folders of runs whose process has ended without a word: of those into a file, or of all."""
+    found = []
+    for folder in base_folder().iterdir():
+        if folder.name.startswith(".") or lives(folder):
+            continue
+        with suppress(RecordingError), LiveRun(folder) as run:
+            if recording is None or Path(run.facts["recording"]).resolve() == recording.resolve():
+                found.append(folder)
+    return found

@@ -21,6 +21,7 @@ def _main(process: int) -> None:
     from rig.errors import RigError
     from rig.monitor.process import PageServer
     from rig.monitor.sources import Latest
+    from rig.monitor.stopping import Stopping
     from rig.system.stop_signals import ended_in_order
 
     gone = threading.Event()
@@ -34,7 +35,9 @@ def _main(process: int) -> None:
 
     threading.Thread(target=wait, name="the run's process", daemon=True).start()
     try:
-        server = PageServer(Latest(of_that_process), alone=gone.is_set)
+        stopping = Stopping(expecting=lambda: not gone.is_set())
+        look = Latest(of_that_process, on_found=stopping.begun)
+        server = PageServer(look, alone=gone.is_set, stopping=stopping)
     except (RigError, OSError) as error:
         _tell({"error": str(error)})
         return

@@ -69,7 +69,7 @@ class ComingDown:
             return Outcome(False, f"{self._refused}: {HARDWARE}")
         if (waited_s := time.monotonic() - self._began_s) < self._longest_s():
             return None
-        last = "nothing is known of its output"
+        last = "it has not begun; the request stays, and nothing is known of its output"
         if frame is not None and guard is not None:
             last = f"guard {guard.name.lower()}, {float(frame.state['voltage_v']):.3f} V, {frame.age_s:.1f} s ago"
         return Outcome(False, f"not at 0 V within {waited_s:.1f} s ({last}): {HARDWARE}")

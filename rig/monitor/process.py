@@ -26,11 +26,13 @@ from rig.monitor.priority import lower_priority
 from rig.monitor.security import Keys
 from rig.monitor.server import Site, application
 from rig.monitor.sources import always, of_an_earlier_run
+from rig.monitor.stopping import Stopping
 from rig.system.stop_signals import ended_in_order
 
 __all__ = ["Address", "PageServer", "Serving", "serve"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+DEFAULT_PORTS = {"http": 80, "https": 443}
 LARGEST_HEADERS = 16384
 LARGEST_MESSAGE = 1024
 GRACE_S = 2
@@ -122,6 +124,9 @@ class PageServer:
     """Whether whoever started the server has gone, so that it ends by itself: at once where there never was a run, else some
     time after the run."""
 
+    stopping: Stopping = field(default_factory=Stopping)
+    """Leaves requests to stop."""
+
     def __post_init__(self) -> None:
         self.keys = Keys()
         secured = self.address.secured()
@@ -130,14 +135,15 @@ class PageServer:
         self.port = int(self.socket.getsockname()[1])
         self.scheme = "https" if secured else "http"
         names = (self.address.host, *LOOPBACK) if self.address.loopback else (self.address.host,)
-        self.hosts = frozenset(f"{name}:{self.port}" for name in names)
+        left_out = self.port == DEFAULT_PORTS[self.scheme]  # by browsers
+        self.hosts = frozenset(name if left_out else f"{name}:{self.port}" for name in names)
         self.feed = Feed(self.look, self.earlier)
         folder = None
         if self.folder is not None:
             from rig.monitor.folder import Folder  # the page of a single run starts without it
 
             folder = Folder(self.folder)
-        site = Site(self.feed, self.keys, self.scheme, self.hosts, folder)
+        site = Site(self.feed, self.keys, self.scheme, self.hosts, folder, self.stopping)
         config = uvicorn.Config(
             application(site),
             http=WebConnection,

@@ -7,7 +7,6 @@ nothing: forms and sockets need a second token, which only the page knows, and a
 
 import secrets
 from collections.abc import Callable
-from http.cookies import CookieError, SimpleCookie
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -56,13 +55,8 @@ class Keys:
 
     def known(self, headers: Headers) -> bool:
         """Return whether a request has the cookie."""
-        cookies: SimpleCookie = SimpleCookie()
-        try:
-            cookies.load("; ".join(headers.getlist("cookie")))
-        except CookieError:
-            return False
-        found = cookies.get(self.cookie_name)
-        return found is not None and same(found.value, self.cookie)
+        pairs = (one.strip().partition("=") for one in ";".join(headers.getlist("cookie")).split(";"))
+        return any(name == self.cookie_name and same(value, self.cookie) for name, _, value in pairs)
 
     def acts(self, token: str | None) -> bool:
         """Return whether this is the token for forms and sockets."""

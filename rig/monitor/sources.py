@@ -28,11 +28,17 @@ def always(view: View) -> Callable[[View | None], View]:
 class Latest:
     """Chooses the youngest run whose facts say that it is ``wanted``. One that has ended is shown until another begins.
 
-    ``instead`` is shown until a run begins. ``close`` it when nobody reads any more: it closes what it has shown.
+    ``instead`` is shown until a run begins; ``on_found`` is called with each that does. ``close`` it when nobody reads any
+    more: it closes what it has shown.
     """
 
-    def __init__(self, wanted: Wanted = lambda facts: True, instead: View | None = None) -> None:
-        self._wanted, self._instead = wanted, instead
+    def __init__(
+        self,
+        wanted: Wanted = lambda facts: True,
+        instead: View | None = None,
+        on_found: Callable[[View], None] = lambda view: None,
+    ) -> None:
+        self._wanted, self._instead, self._on_found = wanted, instead, on_found
         self._looked_s = float("-inf")
         self._shown: Any = instead
 
@@ -47,6 +53,7 @@ class Latest:
         if found is not None:
             self.close()
             self._shown = found
+            self._on_found(found)
         return found or shown
 
     def close(self) -> None:
@@ -75,14 +82,14 @@ def chosen(what: Path | None) -> Latest:
     """
     if what is None:
         return Latest()
-    path = what.absolute()
+    path = what.resolve()
     if path.is_dir():
-        return Latest(lambda facts: Path(facts["recording"]).parent == path)
+        return Latest(lambda facts: Path(facts["recording"]).resolve().parent == path)
     if not path.parent.is_dir():
         raise RecordingError(f"{what}: there is no folder {what.parent}")
 
     def into(facts: Mapping[str, Any]) -> bool:
-        return Path(facts["recording"]) == path
+        return Path(facts["recording"]).resolve() == path
 
     under_way = run_into(path)
     if under_way is not None:

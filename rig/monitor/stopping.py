@@ -1,6 +1,7 @@
 """What is said after STOP, until the output is at 0 V."""
 
 import time
+from collections.abc import Callable
 
 from rig.live.reader import View
 from rig.monitor.feed import Moment
@@ -16,9 +17,13 @@ BY_PAGE = "stopped on the page"
 
 
 class Stopping:
-    """Leaves the request to stop and follows what comes of it."""
+    """Leaves the request to stop and follows what comes of it.
 
-    def __init__(self) -> None:
+    ``expecting`` says whether a run is about to begin: until it does, a request for it is kept.
+    """
+
+    def __init__(self, expecting: Callable[[], bool] = lambda: False) -> None:
+        self._expecting, self._kept = expecting, False
         self._asked: View | None = None
         self._asked_s = 0.0
         self._refused = ""
@@ -26,6 +31,7 @@ class Stopping:
     def ask(self, view: View | None) -> None:
         """Ask the run that is shown to ramp down."""
         if view is None:
+            self._kept = self._expecting()
             return
         if view is not self._asked:
             self._asked, self._asked_s = view, time.monotonic()
@@ -34,6 +40,12 @@ class Stopping:
             view.request_stop(BY_PAGE)
         except Exception as error:  # whatever it is, it must be said
             self._refused = error_text(error)
+
+    def begun(self, view: View) -> None:
+        """Leave a request that was kept for a run that has now begun."""
+        if self._kept:
+            self._kept = False
+            self.ask(view)
 
     def state(self, moment: Moment | None) -> tuple[str, str, str]:
         """Return a word, a heading and a sentence on where the ramp is.
@@ -45,6 +57,10 @@ class Stopping:
             return "failed", HARDWARE, "A stop may be asked for, but what the run does cannot be read."
         shown = moment.shown or {}
         cause = f" {shown['cause']}." if shown.get("cause") else ""
+        if moment.view is None and self._kept and self._expecting():
+            return "asked", "STOP IS ASKED FOR", f"The run has not been heard of yet. If anything moves: {HARDWARE}."
+        if moment.view is None and self._expecting():
+            return "driven", "NOTHING IS KNOWN OF THE RUN", f"It is about to begin, or cannot be watched: {HARDWARE}."
         if moment.view is None or moment.facts is None:
             return "none", "NO RUN IS UNDER WAY", "There is nothing to stop here."
         if hasattr(moment.view, "replay_state"):

@@ -186,7 +186,7 @@ class Execution:
             getattr(self.journal, what)(told)
         except RecordingError as error:
             self.write_error = error
-            self.loop.request_stop()
+            self.loop.request_stop(str(error))
 
     def _note_changes(self, rows: np.ndarray) -> None:
         """Record every change of the lock state and of the guard as an event with its sample number."""

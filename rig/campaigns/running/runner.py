@@ -1,7 +1,7 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import fields, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -59,7 +59,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
     seed = options.seed or 0
     _put_back(output, options.progress)
     make_way(output, options.overwrite)
-    with ExitStack() as watched:
+    with _published(plan, bench, output, options) as live:
         with open_session(bench, seed, realtime=options.realtime) as session:
             facts = _facts(plan, bench, session, options)
             header = Header(
@@ -73,7 +73,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
                 seed=seed,
             )
             settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz))
-            live = watched.enter_context(_published(plan, bench, output, facts, options.progress))
+            _refuse_stopped(live)
             with (
                 set_aside(output),
                 _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
@@ -129,13 +129,13 @@ def take_up(
     if segments := plan.segments(bench.sample_rate_hz, left.done):
         if not trust_code:
             refuse_code(bench, output.name)
-        with ExitStack() as watched:
+        with _published(plan, bench, output, options) as live:
+            for point in points:
+                live.line("point", stored(point))
             with open_session(bench, drawn, realtime=options.realtime) as session:
                 facts = _facts(plan, bench, session, options)
                 settings = tick_settings(plan, bench, segments)
-                live = watched.enter_context(_published(plan, bench, output, facts, progress))
-                for point in points:
-                    live.line("point", stored(point))
+                _refuse_stopped(live)
                 begin = partial(_execution, plan, bench, progress, live, before)
                 execution = _further_part(output, session, settings, begin, {**information, "about": facts})
             return _with_further_attempts(_whole(output, progress), execution, options, facts, live)
@@ -197,6 +197,8 @@ def _with_further_attempts(
                     f"nothing is measured again: {session.latched}; `rig resume {output}` goes on once armed"
                 )
                 return Recording(output)
+            if live.stop_requested:  # while the device was opened
+                return Recording(output)
             names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
             progress.remark(f"measured again, for what was in the way may have passed: point {names}")
             about = {**facts, "device": session.identity}
@@ -220,13 +222,17 @@ def _execution(
     return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent, live)
 
 
-def _published(
-    plan: Plan, bench: Bench, output: Path, facts: Mapping[str, Any], progress: Progress
-) -> AbstractContextManager[Live]:
-    """Let the run be watched and stopped by other processes of the user."""
+def _published(plan: Plan, bench: Bench, output: Path, options: RunOptions) -> AbstractContextManager[Live]:
+    """Let the run be watched and stopped by other processes of the user, from before its device is opened."""
     started = datetime.now(UTC).isoformat(timespec="seconds")
-    told = watched_facts(plan, bench, output, facts, started=started)
-    return published(told, len(bench.channels), progress.remark)
+    told = watched_facts(plan, bench, output, options.about.facts(), started=started)
+    return published(told, len(bench.channels), options.progress.remark)
+
+
+def _refuse_stopped(live: Live) -> None:
+    """Raise `RigError` if a stop was requested before anything was driven."""
+    if live.stop_requested:
+        raise RigError("stopped by request before anything was driven; nothing was recorded")
 
 
 def _put_back(output: Path, progress: Progress) -> None:

@@ -42,14 +42,13 @@ export class Status {
     this.ended = false;
     const facts = message.facts;
     if (!facts) return;
-    const armed = { virtual: "virtual rig: nothing moves", "": "not armed" }[facts.armed] ?? `armed: ${facts.armed}`;
     const serial = facts.specimen_serial ? `, ${facts.specimen_serial}` : "";
     const file = facts.recording.split(/[\\/]/).pop();
     const told = [
       ["bench", facts.bench],
       ["specimen", facts.specimen + serial],
       ["operator", facts.operator || "unknown"],
-      ["arming", armed],
+      ["arming", ""],
       ["recording", file],
     ];
     at("facts").replaceChildren(
@@ -63,15 +62,24 @@ export class Status {
         return pair;
       }),
     );
+    this.arm(facts.armed);
     say(at("title"), facts.purpose || facts.kind);
     document.title = `${file} · ${facts.kind}`;
     at("ramp").textContent = ` within ${quantity(facts.limits.ramp_down_s, "s", 2)}`;
+  }
+
+  /** Say how the bench was armed, which a run tells when its part begins. */
+  arm(how) {
+    const words = { virtual: "virtual rig: nothing moves", "": "not armed" }[how] ?? `armed: ${how}`;
+    const place = at("fact-arming");
+    if (place) place.textContent = place.title = words;
   }
 
   take(message) {
     this.message = message;
     for (const line of message.lines ?? []) {
       if (line.is === "part") this.ended = false;
+      if (line.about?.armed) this.arm(line.about.armed.how);
       if (line.is === "end") this.ended = true;
     }
   }

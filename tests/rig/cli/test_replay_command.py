@@ -15,7 +15,12 @@ from tests.rig.campaigns.running.test_runs import plan_with
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 
-RIG = [sys.executable, "-c", "from rig.cli import main; main()"]
+RIG = [
+    sys.executable,
+    "-c",
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # a shell's background job ignores it
+    "from rig.cli import main; main()",
+]
 
 
 @pytest.fixture(scope="module")

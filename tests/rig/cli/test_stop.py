@@ -33,7 +33,12 @@ k2 = 6.283185307179586
 centre_frequency_hz = 24.0
 frequency_window_hz = [21.933, 26.807]
 """
-RIG = [sys.executable, "-c", "from rig.cli import main; main()"]
+RIG = [
+    sys.executable,
+    "-c",
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # a shell's background job ignores it
+    "from rig.cli import main; main()",
+]
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,10 @@ from contextlib import contextmanager
 
 from tests.waiting import LONG_S
 
-CODE = "from rig.cli import main; main()"
+CODE = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "  # a shell's background job ignores it
+    "from rig.cli import main; main()"
+)
 
 
 def started(*words: str, **options: object) -> "subprocess.Popen[str]":
