@@ -15,6 +15,7 @@ from rig.live.layout import BINS
 from rig.live.place import base_folder, lives, new_folder, runs
 from rig.live.publisher import Publisher, Unpublished, published
 from rig.live.reader import LiveRun, run_into
+from rig.tick.safety.layout import GuardMode
 from tests.rig.live.writer import BENCH, FACTS, ROWS, chunk, made_loop
 
 WRITER = "tests.rig.live.writer"
@@ -272,3 +273,17 @@ def test_a_run_of_another_version_is_refused(monkeypatch):
         with pytest.raises(RecordingError, match="another version"):
             LiveRun(live.folder)
         assert lives(live.folder)
+
+
+def test_where_the_driver_has_failed_the_output_is_what_was_put_out_last():
+    """The worker writes OFF and 0 V into its state before the campaign hears of the failure; nobody knows of the output."""
+    loop = made_loop()
+    with Publisher(FACTS, N) as live, LiveRun(live.folder) as run:
+        rows = chunk(loop, 0)
+        rows["command_v"] = 0.17
+        loop.tick.arrays.guard["mode"], loop.tick.arrays.guard["amplitude_v"] = GuardMode.OFF, 0.0
+        live.take(rows, loop, 0, 1)
+        frame = run.frame()
+        assert frame is not None
+        assert frame.state["guard"] == GuardMode.ARMED
+        assert frame.state["voltage_v"] == pytest.approx(0.17)

@@ -8,6 +8,7 @@ from contextlib import ExitStack, suppress
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from rig.monitor import process
 from rig.monitor import server as module
 from rig.monitor.connections import MOST_SOCKETS
 from rig.monitor.process import PageServer
@@ -351,3 +352,23 @@ def test_connections_beyond_the_limit_are_dropped(server, monkeypatch):
     finally:
         for one in held:
             one.close()
+
+
+@pytest.mark.parametrize("other", ['theme={"mode": "dark"}', "x=a b", "=y", "x", "a=1; b", "ä=ö"])
+@pytest.mark.parametrize("first", [True, False])
+def test_cookies_of_others_on_this_machine_do_not_lock_out(inside, run, other, first):
+    """Cookies know no ports: whatever else serves on 127.0.0.1 has its own beside ours."""
+    own = inside.cookie
+    inside.cookie = (f"{other}; {own}" if first else f"{own}; {other}").encode("utf-8").decode("latin-1")
+    assert inside.stop().status == 200
+    assert run.stops
+
+
+@pytest.mark.parametrize("scheme", ["http", "https"])
+def test_a_browser_leaves_out_the_port_that_goes_without_saying(run, monkeypatch, scheme):
+    assert process.DEFAULT_PORTS == {"http": 80, "https": 443}
+    with process.Address().listen() as taken:
+        monkeypatch.setitem(process.DEFAULT_PORTS, scheme, taken.getsockname()[1])
+        monkeypatch.setattr(process.Address, "listen", lambda self: taken)
+        monkeypatch.setattr(process.Address, "secured", lambda self: (None, "x") if scheme == "https" else None)
+        assert process.PageServer(lambda shown: run).hosts == {"127.0.0.1", "localhost", "[::1]"}

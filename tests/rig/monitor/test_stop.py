@@ -193,3 +193,36 @@ def test_what_a_run_says_of_itself_is_text_on_the_page(run, inside):
     assert "<script" not in inside.get("/stopping").text
     run.facts["bench"] = "</title><script>x</script>"
     assert "</title><script>" not in inside.get("/").text
+
+
+def test_a_request_for_a_run_that_has_not_begun_is_kept_for_it(run):
+    begun: list[bool] = []
+    kept = stopping.Stopping(expecting=lambda: True)
+
+    def look(shown):
+        if begun and shown is None:
+            kept.begun(run)
+        return run if begun else None
+
+    with served(look, stopping=kept) as server:
+        inside = Visitor(server.url).enter()
+        assert heading(inside.get("/stopping")) == "NOTHING IS KNOWN OF THE RUN"
+        answer = inside.stop()
+        assert heading(answer) == "STOP IS ASKED FOR"
+        assert onward(answer)
+        assert "USE THE HARDWARE STOP" in answer.text
+        begun.append(True)
+        wait_until(lambda: run.stops, "the request reaches the run")
+        run.step(GuardMode.OFF, EndReason.STOP_REQUESTED)
+        run.tell({"is": "end", "text": "stopped on the page"})
+        wait_until(lambda: heading(inside.get("/stopping")) == "OUTPUT AT 0 V", "0 V")
+
+
+def test_a_file_is_the_same_by_another_spelling(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    for given in ("link/run.h5", "real/../link/run.h5", "link", "real/../real"):
+        wanted = chosen(tmp_path / given)._wanted
+        assert wanted({"recording": str(tmp_path / "real" / "run.h5")})
+        assert wanted({"recording": str(tmp_path / "link" / "run.h5")})
+        assert not wanted({"recording": str(tmp_path / "run.h5")})
