@@ -29,7 +29,7 @@ def schema(
 def new(
     what: Annotated[str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig) or driver (a folder).")],
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write; of a driver, the folder.")],
-    kind: Annotated[str, typer.Option(help="Kind of a plan.")] = "backbone",
+    plan_kind: Annotated[str, typer.Option("--kind", help="Kind of a plan.")] = "backbone",
     bench: Annotated[str | None, typer.Option(help="Bench of a plan; default: that of the shipped plan.")] = None,
     schema_file: Annotated[
         Path | None, typer.Option("--schema", help="Where the schema is written; default: beside OUTPUT.")
@@ -47,5 +47,5 @@ def new(
         return
     if what not in ("bench", "plan", "rig"):
         raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig or driver")
-    beside = new_file(what, output, kind=kind, bench=bench, schema_file=schema_file, overwrite=overwrite)
+    beside = new_file(what, output, kind=plan_kind, bench=bench, schema_file=schema_file, overwrite=overwrite)
     print(f"{output}: a {what} to begin with, checked by {beside}")
