@@ -12,7 +12,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 __all__ = [
     "BeamModes",
@@ -119,8 +118,7 @@ def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> t
     to the highest modes, and K may be singular (rigid-body modes). ``shift`` (rad/s)^2 is about ``omega^2`` of the lowest mode.
     """
     n = mass.shape[0]
-    with threadpool_limits(limits=1, user_api="blas"):  # more would wait for each other over so small a matrix
-        mu, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
+    mu, vectors = scipy.linalg.eigh(mass, stiffness + shift * mass, subset_by_index=[n - n_mode, n - 1])
     return np.maximum(1.0 / mu[::-1] - shift, 0.0), vectors[:, ::-1] / np.sqrt(mu[::-1])
 
 
