@@ -101,7 +101,7 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
 
 
 def test_lines_come_in_the_order_and_at_the_time_of_their_samples(watched):
-    path, seen, lines, _ = watched
+    path, _, lines, _ = watched
     with Replay(path, at_end=True) as replay:
         end = replay.lines(0)
         assert [line["is"] for line in end].count("point") == 2
@@ -118,10 +118,6 @@ def test_lines_come_in_the_order_and_at_the_time_of_their_samples(watched):
             replay.seek(line["end_sample"] / RATE + 0.01)
             assert line in replay.lines(0)
             assert replay.lines(len(replay.lines(0)) - 1) == replay.lines(0)[-1:]
-        told = [(frame, count) for frame, before, count in seen if before["state"] == "recording"]
-        for frame, count in told[::10]:  # an evaluation takes a while: the run told it later, never sooner
-            replay.seek(int(frame.state["sample"]) / RATE)
-            assert len(replay.lines(0)) >= count
 
 
 def test_bins_hold_the_least_and_greatest_of_the_rows_within_them(watched):
