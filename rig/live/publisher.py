@@ -149,6 +149,11 @@ class Publisher:
         return True
 
     @property
+    def begun(self) -> bool:
+        """Whether a part has begun; before that nothing is driven."""
+        return int(self._frame["part"][0]) > 0
+
+    @property
     def stop_requested(self) -> bool:
         """Whether a request was left."""
         return (self.folder / STOP).exists()
@@ -266,4 +271,9 @@ def published(facts: Mapping[str, Any], n_channels: int, remark: Callable[[str],
         yield Unpublished()
         return
     with publisher:
-        yield publisher
+        try:
+            yield publisher
+        except BaseException as error:
+            if not publisher.begun:  # a part that has begun says itself how it ended
+                publisher.line("end", {"text": error_text(error), "tripped": False})
+            raise

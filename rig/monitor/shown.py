@@ -90,10 +90,13 @@ def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[M
     ``shares``: for every channel how much of its range and of its limit the last rows used, and the same of output voltage and
     displacement, each 0 to 1 or above. ``scope``: the last periods of output, force and drive. ``harmonics``: their amplitudes
     from the first on, and the part of the fundamental. A part that has ended without a last frame, because its driver failed,
-    has tripped or stopped, and its output is unknown.
+    has tripped or stopped, and its output is unknown. Without a frame there is the state alone, with the cause of a run that
+    ended before anything was driven.
     """
     if frame is None:
-        return {"state": state_of(None)}
+        end = _end_of(lines)
+        refused = end is not None and all(line["is"] != "part" for line in lines)  # it ended before it began
+        return {"state": _state_at_the_end(end), "cause": end["text"]} if end and refused else {"state": state_of(None)}
     state, window = frame.state, frame.window
     guard, end = GuardMode(int(state["guard"])), _end_of(lines)
     off = guard in (GuardMode.OFF, GuardMode.DISARMED)

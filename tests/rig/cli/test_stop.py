@@ -14,7 +14,6 @@ import pytest
 
 from rig.live.place import runs
 from rig.live.reader import LiveRun
-from rig.live.stopping import request_stop
 from rig.tick.safety.layout import GuardMode
 from tests.docs.pages import ROOT
 from tests.waiting import wait_until
@@ -149,22 +148,6 @@ def test_what_a_killed_run_has_left_is_named_and_wants_the_hardware_stop(running
         assert status == 1
         assert out.endswith("its process has ended without a word: USE THE HARDWARE STOP\n")
     assert said("stop", "other.h5")[0] == 1
-
-
-def test_a_request_before_anything_is_driven_keeps_it_so(place):
-    """The request is left as soon as the run can be found, which is before its device is opened."""
-    child = subprocess.Popen(
-        [*RIG, "run", "plan.toml", "--realtime", "-o", "run.h5"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    wait_until(lambda: bool(runs()), "the run can be found")
-    request_stop(runs()[0], "stopped by a test")
-    _, err = child.communicate(timeout=120)
-    assert child.returncode == 1
-    assert "stopped by request before anything was driven; nothing was recorded" in err
-    assert not (place / "run.h5").exists()
 
 
 def children_of(pid):

@@ -13,12 +13,15 @@ import pytest
 import rig
 from controller import LockState
 from rig.arming.run_options import Silent
+from rig.campaigns.running import runner
 from rig.emulator.emulated import emulated
+from rig.errors import DaqError, RigError
 from rig.live.place import runs
 from rig.live.reader import LiveRun
 from rig.live.stopping import request_stop
 from rig.live.time_left import time_left_s
 from rig.loop.loop import Loop
+from rig.monitor.coming_down import ComingDown
 from rig.monitor.shown import as_json, shown_bins, shown_frame, state_of
 from rig.tick.safety.layout import EndReason, GuardMode
 from tests.rig.campaigns.running.test_runs import plan_with
@@ -248,3 +251,44 @@ def test_a_trip_is_told_with_channel_value_and_cause(tmp_path):
     with watching.run as run:
         last = shown_frame(run.frame(), run.facts, run.lines(0))
     assert (last["state"], last["output_off"], last["cause"]) == ("tripped", True, text)
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_a_request_while_the_device_is_opened_keeps_the_rig_still_and_is_no_death(monkeypatch, tmp_path, realtime):
+    """Found before its device is opened; nothing is driven and nothing recorded, and whoever watches is told so."""
+    told: list[ComingDown] = []
+    watching: list[LiveRun] = []
+    opened = runner.open_session
+
+    def asked_meanwhile(*arguments, **options):
+        watching.append(LiveRun(runs()[0]))
+        told.append(ComingDown(runs()[0], "stopped by a test"))
+        return opened(*arguments, **options)
+
+    monkeypatch.setattr(runner, "open_session", asked_meanwhile)
+    output = tmp_path / "run.h5"
+    with pytest.raises(RigError, match="stopped by request before anything was driven; nothing was recorded"):
+        rig.run("magnet-beam/backbone", output=output, realtime=realtime)
+    assert not list(tmp_path.glob("*run*"))
+    outcome = told[0].outcome()
+    assert outcome is not None
+    assert outcome.at_0_v
+    assert "before anything was driven" in outcome.text
+    shown = shown_frame(watching[0].frame(), watching[0].facts, watching[0].lines(0))
+    assert shown["state"] == "stopped"
+    for one in (*told, *watching):
+        one.close()
+
+
+def test_a_run_that_cannot_begin_says_why_to_those_who_watch(monkeypatch, tmp_path):
+    watching: list[LiveRun] = []
+
+    def gone(*arguments, **options):
+        watching.append(LiveRun(runs()[0]))
+        raise DaqError("the port is gone")
+
+    monkeypatch.setattr(runner, "open_session", gone)
+    with pytest.raises(DaqError):
+        rig.run("magnet-beam/backbone", output=tmp_path / "run.h5")
+    assert watching[0].lines(0)[-1]["text"] == "the port is gone"
+    watching[0].close()
