@@ -15,12 +15,12 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
 RUN = (
     "import json, sys, rig\n"
@@ -50,14 +50,18 @@ def watch(address: str, clients: int) -> None:
     assert found is not None
     feed = f"ws://{parts.netloc}/feed?token={found[1]}"
 
+    watching = threading.Barrier(clients + 1)
+
     def read() -> None:
-        with connect(feed, origin=origin, additional_headers={"Cookie": cookie}, max_size=None) as socket:  # type: ignore[arg-type]
+        with connect(feed, origin=Origin(origin), additional_headers={"Cookie": cookie}, max_size=None) as socket:
+            watching.wait()
             for _ in socket:
                 pass
 
     for _ in range(clients):
-        threading.Thread(target=read, daemon=True).start()
-    time.sleep(3600.0)
+        threading.Thread(target=read).start()  # until the server ends
+    watching.wait()
+    print("watching", flush=True)
 
 
 def once(seconds: float, clients: int, channels: int) -> dict[str, Any]:
@@ -65,20 +69,25 @@ def once(seconds: float, clients: int, channels: int) -> dict[str, Any]:
     others: dict[str, subprocess.Popen[str]] = {}
     if clients:
         others["server"] = subprocess.Popen([sys.executable, "-c", MONITOR], stdout=subprocess.PIPE, text=True)
-        line = others["server"].stdout.readline()  # type: ignore[union-attr]
-        address = line.split()[-1]
+        address = _line(others["server"]).split()[-1]
         watcher = [sys.executable, "-m", "benchmarks.watched", "--watch", address, "--clients", str(clients)]
-        others["clients"] = subprocess.Popen(watcher, text=True)
-        time.sleep(3.0)
+        others["clients"] = subprocess.Popen(watcher, stdout=subprocess.PIPE, text=True)
+        _line(others["clients"])
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", RUN, str(seconds), str(channels), str(Path(folder) / "run.h5")]
         run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-        out = json.loads(run.stdout.read())  # type: ignore[union-attr]
+        out = json.loads(_line(run))
         shares = {"campaign": _ended(run) / out["wall_s"]}
     for name, process in others.items():
         process.terminate()
         shares[name] = _ended(process) / out["wall_s"]
     return {**out, "cores": shares}
+
+
+def _line(process: "subprocess.Popen[str]") -> str:
+    """The next line that a process prints."""
+    assert process.stdout is not None
+    return process.stdout.readline()
 
 
 def _ended(process: "subprocess.Popen[str]") -> float:

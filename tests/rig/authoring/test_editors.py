@@ -47,7 +47,7 @@ def complaints(checker, folder):
         check=False,
     )
     printed = re.sub(r"\x1b\[[0-9;]*m", "", out.stdout + out.stderr)
-    pattern = r'invalid file error=.* path="[^"]*/([^"/]+)"' if checker == "taplo" else r"^\s*at ([\w.-]+\.toml):\d+"
+    pattern = r'invalid file error=.*? path="[^"]*/([^"/]+)"' if checker == "taplo" else r"^\s*at ([\w.-]+\.toml):\d+"
     found = set(re.findall(pattern, printed, re.MULTILINE))
     assert (out.returncode == 0) == (not found), printed
     return found
