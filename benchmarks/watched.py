@@ -6,6 +6,7 @@ and with none. Of each: processor time of campaign, server and clients as a shar
 """
 
 import argparse
+import contextlib
 import http.client
 import json
 import os
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
@@ -55,8 +57,9 @@ def watch(address: str, clients: int) -> None:
     def read() -> None:
         with connect(feed, origin=Origin(origin), additional_headers={"Cookie": cookie}, max_size=None) as socket:
             watching.wait()
-            for _ in socket:
-                pass
+            with contextlib.suppress(ConnectionClosed):
+                for _ in socket:
+                    pass
 
     for _ in range(clients):
         threading.Thread(target=read).start()  # until the server ends
@@ -78,8 +81,9 @@ def once(seconds: float, clients: int, channels: int) -> dict[str, Any]:
         run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         out = json.loads(_line(run))
         shares = {"campaign": _ended(run) / out["wall_s"]}
+    if clients:
+        others["server"].terminate()  # the clients end with it
     for name, process in others.items():
-        process.terminate()
         shares[name] = _ended(process) / out["wall_s"]
     return {**out, "cores": shares}
 
