@@ -9,8 +9,8 @@ import numpy as np
 from rig.analysis.levels import By, level_range, samples_for
 from rig.analysis.study import Study, length_unit, roomy
 from rig.analysis.subject import Subject, refusing
+from rig.drawing.style import MAIN, SECOND
 from rig.errors import ConfigurationError
-from rig.figures.style import MAIN, SECOND
 from rig.text.console import number, print_table
 from simulators.analysis import (
     HysteresisLoop,

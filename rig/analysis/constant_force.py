@@ -10,8 +10,8 @@ from rig.analysis.backbone import neglected
 from rig.analysis.levels import highest_resonance, most_points, samples_for
 from rig.analysis.study import Study, length_unit, level_colour
 from rig.analysis.subject import Subject, positive, refusing
+from rig.drawing.style import REJECTED, SECOND
 from rig.errors import ConfigurationError
-from rig.figures.style import REJECTED, SECOND
 from rig.text.console import number, print_table
 from simulators.analysis import (
     NotConvergedError,

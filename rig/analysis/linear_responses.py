@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from rig.analysis.levels import most_points
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
+from rig.drawing.style import MAIN
 from rig.errors import ConfigurationError
-from rig.figures.style import MAIN
 from rig.text.console import number, print_table
 from simulators.analysis import FrequencyResponses, frequency_response
 

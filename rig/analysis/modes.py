@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject
-from rig.figures.style import MAIN, REJECTED
+from rig.drawing.style import MAIN, REJECTED
 from rig.text.console import number, print_table
 from simulators.modes import LinearModes
 from simulators.structures.meshed import MeshedBeam

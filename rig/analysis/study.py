@@ -135,7 +135,7 @@ class Study(ABC):
 
 def draw(study: Study, figure: Path) -> None:
     """Draw an analysis into ``figure`` (png, pdf or svg, by its suffix); raise `RecordingError` if it cannot be written."""
-    from rig.figures.page import page_for
+    from rig.drawing.page import page_for
 
     check_ending(figure)
     with page_for(figure, study.figure_in) as page:

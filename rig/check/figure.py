@@ -8,8 +8,8 @@ import numpy as np
 
 from rig.check.assessment import Assessment, assess
 from rig.check.reference import on_lines_of
-from rig.figures.page import page_for
-from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from rig.drawing.page import page_for
+from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

@@ -117,9 +117,9 @@ def _check_outputs(
 
 
 def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Path | None, how: dict[str, Any]) -> None:
+    from rig.figures.files import plot
     from rig.models.rehearse import improve_into, rehearse_into, request_for
     from rig.rehearsal.report import lines, summary
-    from rig.show.figure import plot
     from rig.text.console import print_json
     from rig.text.printable import printable_strings
 

@@ -23,6 +23,6 @@ def plot_(
     lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
 ) -> None:
     """Draw what is in a file."""
-    from rig.show.figure import plot
+    from rig.figures.files import plot
 
     plot(file, output, lateness=lateness)

@@ -1,1 +1,1 @@
-"""Figures of recordings, models and measurements."""
+"""Figures of what is in files and of results in memory."""

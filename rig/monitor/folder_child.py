@@ -42,7 +42,7 @@ def _kind(path: Path) -> dict[str, str]:
 
 
 def _figure(path: Path) -> bytes:
-    from rig.show.figure import plot
+    from rig.figures.files import plot
 
     with tempfile.TemporaryDirectory() as folder:
         figure = Path(folder) / "figure.png"

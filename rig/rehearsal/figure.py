@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import Verdict, verdict_of
 

@@ -13,7 +13,7 @@ from rig.campaigns.evaluation.stored_point import value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.planning.plan import Column
 from rig.check.recorded import is_check
-from rig.figures.style import MAIN, REJECTED, SECOND, title, unit_text
+from rig.drawing.style import MAIN, REJECTED, SECOND, title, unit_text
 from rig.models.files.files import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from identification.errors import IdentificationError
+from rig.drawing.page import svg_of
 from rig.errors import RigError
-from rig.figures.page import svg_of
+from rig.figures.files import drawing
 from rig.report.document import Block, Picture, Text
-from rig.show.figure import drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

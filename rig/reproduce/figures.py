@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.pnlss.error_table import SAME_LEVEL
-from rig.figures.page import page_for
-from rig.figures.style import MAIN, REJECTED, SECOND, title
+from rig.drawing.page import page_for
+from rig.drawing.style import MAIN, REJECTED, SECOND, title
 from rig.reproduce.steady import Steady
 from rig.reproduce.study import Study
 from rig.reproduce.sweeps import COUPLED

@@ -3,15 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
+from rig.figures.lateness import PACED, TIMES
 from rig.text.console import number, print_table
 
-__all__ = ["PACED", "TIMES", "print_loop"]
-
-PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
-"""Printed name of each recorded pacing."""
-
-TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
-"""Times that are measured for every block, with their printed names."""
+__all__ = ["print_loop"]
 
 GRANTED = ("scheduling", "memory", "timer_slack", "processor", "garbage_collector")
 SHARES = {"p50": "p50", "p99": "p99", "p99_9": "p99.9", "largest": "largest"}

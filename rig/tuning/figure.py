@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.tuning import Design
+from rig.drawing.page import page_for
+from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
 from rig.errors import RecordingError
-from rig.figures.page import page_for
-from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

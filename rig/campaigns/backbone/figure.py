@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from identification import IdentificationError, NonlinearMode, nonlinear_mode
 from rig.campaigns.backbone.points import recorded_backbone
 from rig.campaigns.evaluation.figure import draw_history, heading
-from rig.figures.nonlinear_mode import draw_properties
-from rig.figures.style import say_why_empty
+from rig.drawing.nonlinear_mode import draw_properties
+from rig.drawing.style import say_why_empty
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, O
 from rig.campaigns.evaluation.figure import draw_history, heading
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
-from rig.figures.style import MAIN, REJECTED, SECOND, engineering, say_why_empty
+from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, say_why_empty
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

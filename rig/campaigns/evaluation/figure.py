@@ -7,7 +7,7 @@ import numpy as np
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
-from rig.figures.style import MAIN, SECOND, TRACE_BINS, title
+from rig.drawing.style import MAIN, SECOND, TRACE_BINS, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 

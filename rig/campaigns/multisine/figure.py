@@ -7,8 +7,8 @@ import numpy as np
 from identification import InstrumentResponse, PeriodicSpectra
 from rig.campaigns.evaluation.recorded import specimen_of
 from rig.campaigns.multisine.points import recorded_spectra
-from rig.figures.style import MAIN, REJECTED, SECOND, unit_text
-from rig.figures.style import title as heading
+from rig.drawing.style import MAIN, REJECTED, SECOND, unit_text
+from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from identification import ForceSurface, IdentificationError, force_surface
 from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
-from rig.figures.force_surface import draw_force_surface
+from rig.drawing.force_surface import draw_force_surface
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

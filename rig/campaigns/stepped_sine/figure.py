@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from identification import FrequencyResponse
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.recorded import specimen_of
-from rig.figures.style import REJECTED
-from rig.figures.style import title as heading
+from rig.drawing.style import REJECTED
+from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

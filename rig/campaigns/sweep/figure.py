@@ -11,8 +11,8 @@ from rig.campaigns.evaluation.recorded import point_rows, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
-from rig.figures.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
-from rig.figures.style import title as heading
+from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
+from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification import Exciter
 from identification.prediction.exciter import PARAMETERS
-from rig.figures.style import MAIN, title
+from rig.drawing.style import MAIN, title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

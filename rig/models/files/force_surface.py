@@ -103,6 +103,6 @@ FORCE_SURFACE = FileKind(
     unpack=_unpack,
     summarise=_summarise,
     say=_say,
-    draw="rig.figures.force_surface:draw_measured_surface",
+    draw="rig.drawing.force_surface:draw_measured_surface",
     figure_in=(11.0, 7.0),
 )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification import FrequencyResponse
-from rig.figures.style import REJECTED, engineering, title
+from rig.drawing.style import REJECTED, engineering, title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

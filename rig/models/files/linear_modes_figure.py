@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
-from rig.figures.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Backbone
-from rig.figures.style import MAIN, title
+from rig.drawing.style import MAIN, title
 from rig.measurements.backbone_table import backbone_from, backbone_parts
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table

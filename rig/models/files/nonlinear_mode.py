@@ -56,6 +56,6 @@ NONLINEAR_MODE = FileKind(
     unpack=NonlinearMode.from_arrays,
     summarise=_summarise,
     say=_say,
-    draw="rig.figures.nonlinear_mode:draw_mode",
+    draw="rig.drawing.nonlinear_mode:draw_mode",
     figure_in=(12.0, 6.4),
 )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from identification.channels import MOTION_UNIT
-from rig.figures.style import MAIN, REJECTED, SECOND, plain_log, say_why_empty, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, plain_log, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

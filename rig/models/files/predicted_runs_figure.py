@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import Predictions
-from rig.figures.style import REJECTED, plain_log, say_why_empty
+from rig.drawing.style import REJECTED, plain_log, say_why_empty
 
 __all__ = ["draw_runs"]
 

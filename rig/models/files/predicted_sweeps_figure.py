@@ -6,7 +6,7 @@ import numpy as np
 
 from identification import Predictions
 from identification.prediction.sweep_prediction import as_recorded
-from rig.figures.style import MAIN, REJECTED, SECOND, engineering
+from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 
 __all__ = ["draw_sweeps"]
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Predictions, ResponseBand, SteadyPrediction
-from rig.figures.style import REJECTED, engineering, title
+from rig.drawing.style import REJECTED, engineering, title
 from rig.models.files.predicted_runs_figure import draw_runs
 from rig.models.files.predicted_sweeps_figure import draw_sweeps
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification import FrequencyResponseMatrix
-from rig.figures.style import MAIN, SECOND, title
+from rig.drawing.style import MAIN, SECOND, title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -19,7 +19,7 @@ from identification import (
 from rig.campaigns.multisine.figure import draw_multisine
 from rig.campaigns.stepped_sine.figure import draw_stepped_sine
 from rig.campaigns.sweep.figure import draw_sweep
-from rig.figures.style import STYLE
+from rig.drawing.style import STYLE
 
 CHANNELS = (
     Channel("voltage", "monitor", "V"),

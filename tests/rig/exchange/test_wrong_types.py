@@ -7,9 +7,9 @@ import pytest
 
 from rig.cli.options import show_file
 from rig.errors import RecordingError
+from rig.figures.files import plot
 from rig.models.files.files import load, save
 from rig.recording.arrays import read_arrays, write_arrays
-from rig.show.figure import plot
 
 WRONG_ARRAYS = {
     "text": lambda values: np.full(values.shape, "x"),

@@ -7,9 +7,9 @@ import rig
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.cli import main
 from rig.errors import RecordingError
+from rig.figures.files import plot
+from rig.figures.lateness import exceedance, together
 from rig.recording.reader import Recording
-from rig.show.figure import plot
-from rig.show.lateness_figure import exceedance, together
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
 from tests.rig.rigs import bench_with

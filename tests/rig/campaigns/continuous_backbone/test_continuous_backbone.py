@@ -14,9 +14,9 @@ from rig.campaigns.continuous_backbone.ways import turning_point
 from rig.campaigns.evaluation.measured_together import Passage
 from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
+from rig.figures.files import plot
 from rig.measurements import continuous_backbones
 from rig.models.identify.identify import Request, identify_model
-from rig.show.figure import plot
 from rig.show.summary import summarise
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 from simulators.analysis import phase_resonance_backbone

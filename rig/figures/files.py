@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
+from rig.drawing.page import page_for
 from rig.errors import RecordingError
-from rig.figures.page import page_for
+from rig.figures.lateness import draw_lateness
 from rig.models.files.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
-from rig.show.lateness_figure import draw_lateness
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.drawing.style import STYLE
 from rig.errors import RecordingError
-from rig.figures.style import STYLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

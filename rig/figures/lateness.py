@@ -5,15 +5,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.drawing.style import MAIN, REJECTED, SECOND, title
 from rig.errors import RecordingError
-from rig.figures.style import MAIN, REJECTED, SECOND, title
 from rig.recording.reader import Recording
-from rig.show.loop_table import PACED, TIMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_lateness", "exceedance"]
+__all__ = ["PACED", "TIMES", "draw_lateness", "exceedance"]
+
+PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
+"""Printed name of each recorded pacing."""
+
+TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
+"""Times that are measured for every block, with their printed names."""
 
 COLOURS = {"wake_up": MAIN, "execution": "#4f8f4f", "response": SECOND}
 

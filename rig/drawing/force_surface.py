@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
 from identification.response_control.levels import LevelFit
-from rig.figures.style import REJECTED, engineering, title
+from rig.drawing.style import REJECTED, engineering, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
