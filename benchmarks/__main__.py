@@ -1,6 +1,6 @@
 """All ratios against baselines of the same run, in one table.
 
-    python -m benchmarks [--minutes 1] [--page docs/benchmarks.md]
+    python -m benchmarks [--minutes 1] [--page docs/reference/benchmarks.md]
 
 Times differ from machine to machine and from hour to hour; a ratio to something that ran beside it says more. Every part runs
 in a process of its own. ``--page`` puts the table under the version and the machine into a page, in place of one that is

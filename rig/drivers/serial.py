@@ -20,7 +20,7 @@ class SerialOptions(WireOptions):
 
 
 class SerialDAQ(WireDAQ):
-    """A device that speaks the wire protocol over a serial port (``docs/wire-protocol.md``).
+    """A device that speaks the wire protocol over a serial port (``docs/reference/wire-protocol.md``).
 
     Options: `SerialOptions`. The port is held exclusively while open.
     """

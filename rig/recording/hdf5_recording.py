@@ -1,4 +1,4 @@
-"""The HDF5 layout of a recording, written and read (described for other programs in ``docs/file-format.md``)."""
+"""The HDF5 layout of a recording, written and read (described for other programs in ``docs/reference/file-format.md``)."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path

@@ -41,7 +41,7 @@ BY_RULE = re.compile(r"(off_resonance|minimum|overshoot|peak|window)_?\w*")  # f
 
 
 def section(heading: str) -> str:
-    text = (ROOT / "docs" / "file-format.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "file-format.md").read_text(encoding="utf-8")
     found = re.search(rf"^## {heading}$(.*?)(?=^## )", text, re.MULTILINE | re.DOTALL)
     assert found
     return found.group(1)

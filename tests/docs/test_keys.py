@@ -76,8 +76,8 @@ def keys_under(heading: str) -> dict[str, tuple[str, str]]:
             "dwell.md",
             "tuning.md",
             "rehearsal.md",
-            "wire-protocol.md",
-            "wire-protocol-can.md",
+            "reference/wire-protocol.md",
+            "reference/wire-protocol-can.md",
         )
     ]
     rows = re.findall(
@@ -156,7 +156,7 @@ def test_every_flag_is_on_the_page_with_its_bit():
 
 
 def test_what_goes_wrong_on_a_bus_names_every_counter_of_it_and_errors_that_there_are():
-    page = (ROOT / "docs" / "wire-protocol-can.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "wire-protocol-can.md").read_text(encoding="utf-8")
     words = set(re.findall(r"`(\w+)`", table_under("What goes wrong on the bus", page)["table"]))
     errors = {word for word in words if word.startswith("Daq")}
     assert errors <= set(rig_errors.__all__)

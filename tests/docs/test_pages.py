@@ -26,7 +26,7 @@ k2 = 6.283
 centre_frequency_hz = 24.0
 frequency_window_hz = [22.0, 27.0]
 """
-NEEDS = {"docs/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
+NEEDS = {"docs/reference/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
 LIBRARIES = {"docs/editors-and-tables.md": ("pandas", "xarray")}  # optional ones that a page uses
 NOT_RUN = {
     ("docs/editors-and-tables.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
@@ -36,9 +36,9 @@ NOT_RUN = {
     ("docs/monitor.md", "runs until Ctrl-C"),
     ("docs/monitor.md", "takes a minute by the clock and needs Chromium"),
     ("docs/user-guide.md", "a minute of wall clock"),
-    ("docs/wire-protocol-can.md", "needs a CAN interface"),
+    ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/writing-a-driver.md", "installs a package"),
-    ("docs/benchmarks.md", "takes minutes"),
+    ("docs/reference/benchmarks.md", "takes minutes"),
 }
 
 

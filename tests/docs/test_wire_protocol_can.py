@@ -16,7 +16,7 @@ from rig.wire.can.protocol import FrameKind, definition, protocol, shape_of
 from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
 from tests.docs.pages import ROOT, blocks
 
-PAGE = ROOT / "docs" / "wire-protocol-can.md"
+PAGE = ROOT / "docs" / "reference" / "wire-protocol-can.md"
 MESSAGES: dict[str, Any] = {
     kind.__name__: kind for kind in (Answer, EmergencyStop, Heartbeat, Output, Request, Samples)
 }

@@ -6,7 +6,7 @@ import struct
 
 from tests.docs.pages import ROOT, blocks
 
-PAGE = ROOT / "docs" / "wire-protocol.md"
+PAGE = ROOT / "docs" / "reference" / "wire-protocol.md"
 FORMATS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q"}
 
 

@@ -1,6 +1,6 @@
 """Every shipped plan on sound rigs, seed after seed: whether the watch on force and motion ever acts, and how near it comes.
 
-``python -m tests.reliability.false_trips`` counts; ``--write docs/fault-matrix.md`` writes the counts there.
+``python -m tests.reliability.false_trips`` counts; ``--write docs/reference/fault-matrix.md`` writes the counts there.
 """
 
 import argparse

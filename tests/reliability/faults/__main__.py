@@ -1,6 +1,6 @@
 """Carry out the whole fault matrix, say what keeps no bound, and write the tables of its page.
 
-``python -m tests.reliability.faults [--write docs/fault-matrix.md] [--jobs N] [--fault PART-OF-A-NAME]``
+``python -m tests.reliability.faults [--write docs/reference/fault-matrix.md] [--jobs N] [--fault PART-OF-A-NAME]``
 """
 
 import argparse

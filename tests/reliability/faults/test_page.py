@@ -11,7 +11,7 @@ from tests.reliability.faults.observing import observe
 from tests.reliability.faults.page import BEGIN, END, TABLES, rows_of, written
 from tests.reliability.faults.table import FAULTS
 
-PAGE = ROOT / "docs" / "fault-matrix.md"
+PAGE = ROOT / "docs" / "reference" / "fault-matrix.md"
 
 
 @pytest.mark.parametrize("heading", TABLES)

@@ -39,7 +39,7 @@ FILE_KINDS = ("recording", "recording without digest", "journal", "model", "mode
 FILE_OUTCOMES = ("refused", "identical", "told", "other numbers", "misbehaved")
 OTHERS = ("mat", "uff")
 """Formats of others, which have no checksum: other numbers cannot be told."""
-_TRAILER_BYTES = 52  # docs/file-format.md
+_TRAILER_BYTES = 52  # docs/reference/file-format.md
 _SLOW = ("recording without digest", "model without digest", "mat")
 """Read by a child process: fewer of them."""
 

@@ -13,7 +13,7 @@ from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "file-format.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "file-format.md"
 
 
 @pytest.fixture

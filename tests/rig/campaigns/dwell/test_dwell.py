@@ -40,7 +40,7 @@ def full():
 
 
 def samples_of_rows(part):
-    """The sample of every stored row, from the events alone, as docs/file-format.md says."""
+    """The sample of every stored row, from the events alone, as docs/reference/file-format.md says."""
     out, changes = [], [event for event in part.events if event["what"] == "telemetry"]
     stops = [*(event["row"] for event in changes), part.n_rows]
     out.append(np.arange(stops[0]))
