@@ -1,4 +1,4 @@
-"""Messages as bytes: a header of four bytes, a body of fixed form, all little-endian; see ``docs/reference/wire-protocol.md``."""
+"""Messages as bytes: a header of four bytes, a body of fixed form, little-endian; see ``docs/reference/wire-protocol.md``."""
 
 import struct
 
