@@ -1,7 +1,7 @@
 """The whole campaign: kills, places, spoilt files, hostile frames and a soak; its tables are written into the documentation.
 
 ``python -m tests.reliability [--write docs/reference/reliability.md] [--only kills places mutations frames soak]``; the fault
-matrix and the count of false trips have commands of their own (``tests.reliability.faults``, ``tests.reliability.false_trips``).
+matrix and the count of false trips have their own commands (``tests.reliability.faults``, ``tests.reliability.false_trips``).
 """
 
 import argparse
