@@ -126,9 +126,12 @@ def _complain(line: str, status: int) -> int:
 def _one_line(error: Exception) -> str:
     """Return the error in one line. For an error from other code, include its type."""
     from identification.errors import IdentificationError
-    from rig.errors import RigError
+    from rig.errors import DaqError, NotArmed, RigError
+    from rig.text.message_pages import where_explained
 
     text = str(error)
+    if isinstance(error, DaqError | NotArmed):
+        text = f"{text} ({where_explained([type(error).__name__])})"
     if isinstance(error, RigError | IdentificationError):
         return with_flags(text, app)
     if isinstance(error, OSError) and error.filename is not None:

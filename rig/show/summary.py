@@ -21,11 +21,15 @@ from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 from rig.rehearsal.comparison import compared
+from rig.text.message_pages import page_of
+from rig.tick.safety.layout import EndReason
 
 __all__ = ["summarise", "summarise_recording"]
 
 BULKY = {one.name for one in fields(Spectrum)}
 """Fields of a point that a summary omits."""
+
+UNEXPLAINED = {page_of(reason.name) for reason in (EndReason.NONE, EndReason.COMPLETED)}
 
 QUALITY = (
     "settled",
@@ -96,6 +100,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
         "measured_again": what_was_measured_again(points),
         "drift": drift_of(points),
+        "messages": _messages(recording),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {
@@ -104,6 +109,13 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         },
         "parts": parts,
     }
+
+
+def _messages(recording: Recording) -> list[str]:
+    """Return the names of what ended parts early or spoilt points, by which they are explained in the documentation."""
+    ends = [part.end["reason"] for part in recording.parts if part.end is not None]
+    spoilt = [str(point.quality) for point in recording.latest.values() if not point.accepted]
+    return list(dict.fromkeys(page_of(name) for name in (*ends, *spoilt) if page_of(name) not in UNEXPLAINED))
 
 
 def _about(about: Mapping[str, Any] | None) -> dict[str, Any] | None:

@@ -12,6 +12,7 @@ from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
 from rig.text.console import number, print_table
+from rig.text.message_pages import where_explained
 from rig.text.printable import printable, printable_strings
 
 __all__ = ["loop_line", "print_findings", "print_rehearsal", "print_summary", "say_how_it_ended"]
@@ -31,6 +32,7 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
             print(line)
     last = summary["parts"][-1] if summary["parts"] else {"tripped": False}
     _print_advice(last)
+    _print_where_explained(summary)
     if last["tripped"] and not summary["complete"]:
         print(
             f"what was accepted is kept; then `rig resume {path} --plan PLAN.toml` goes on by a changed plan, "
@@ -65,6 +67,7 @@ def print_findings(summary: Mapping[str, Any]) -> None:
             print(line)
     _print_drift(summary["drift"])
     _print_mode_shape(summary["drive_mode_shape"])
+    _print_where_explained(summary)
 
 
 def print_summary(summary: dict[str, Any]) -> None:
@@ -103,6 +106,12 @@ def _print_advice(part: Mapping[str, Any]) -> None:
     """After a trip, print the most likely cause and what to do first."""
     if part.get("likely_cause"):
         print(f"  likely cause: {part['likely_cause']}\n  what to do: {part['what_to_do']}")
+
+
+def _print_where_explained(summary: Mapping[str, Any]) -> None:
+    """Print the pages that explain what ended the run or spoilt points."""
+    if pages := where_explained(summary["messages"]):
+        print(f"  {pages}")
 
 
 def _print_drift(drift: dict[str, Any] | None) -> None:
