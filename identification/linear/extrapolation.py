@@ -115,7 +115,8 @@ def _model(
     std, rows = np.sqrt(np.diag(covariance)), len(low.channels)
     levels = ", ".join(f"{value:.4g}" for value in force)
     notes = [
-        f"extrapolated to zero force from {levels} N RMS, linear in force to the {' to '.join(f'{p:g}' for p in powers)}"
+        f"extrapolated to zero force from {levels} N RMS, "
+        f"taking changes as proportional to the force to the power of {' to '.join(f'{p:g}' for p in powers)}"
     ]
     for k in sorted(set(range(low.frequency_hz.size)) - set(kept)):
         notes.append(f"left out: mode at {low.frequency_hz[k]:.5g} Hz is not found at all levels")

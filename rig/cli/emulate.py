@@ -27,7 +27,9 @@ def emulate(
     seed: Annotated[int, typer.Option(help="Seed of the rig's noise.", min=0)] = 0,
     link: Annotated[Path | None, typer.Option(help="Symbolic link to the port, a name that stays.")] = None,
     bench_file: Annotated[Path | None, typer.Option(help="Bench to write that reaches it: a TOML file.")] = None,
-    as_hardware: Annotated[bool, typer.Option("--as-hardware", help="Do not say that nothing moves.")] = False,
+    as_hardware: Annotated[
+        bool, typer.Option("--as-hardware", help="Like a device that moves something: it must be armed.")
+    ] = False,
     flip: Annotated[list[str] | None, typer.Option(help="Channel whose sensor sits the wrong way round.")] = None,
     dead: Annotated[list[str] | None, typer.Option(help="Channel that is connected to nothing.")] = None,
     swap: Annotated[list[str] | None, typer.Option(metavar="A,B", help="Two channels in each other's sockets.")] = None,

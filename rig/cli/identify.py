@@ -20,7 +20,9 @@ def identify(
         str, typer.Option("--model", help="Kind of model: nonlinear-mode, linear, force-surface, exciter or pnlss.")
     ] = "nonlinear-mode",
     modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
-    estimator: Annotated[str, typer.Option(help="Of a linear model's responses: instrument, H1 or H2.")] = "instrument",
+    estimator: Annotated[
+        str, typer.Option(help="Of the responses: instrument (by the drive voltage), H1 or H2.")
+    ] = "instrument",
     band_hz: Annotated[
         tuple[float, float] | None,
         typer.Option("--band", metavar="LOW HIGH", help="Lines of a linear or exciter model, Hz."),

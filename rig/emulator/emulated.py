@@ -22,7 +22,7 @@ LOCKSTEP_S = 60.0
 """Watchdog and time-out of a bench whose device waits for the host, s."""
 
 HARDWARE_S = 1.0
-"""The same watchdog where the device does not say that nothing moves, s: drivers allow no longer one."""
+"""The same watchdog where the device does not report itself as simulated, s: drivers allow no longer one."""
 
 
 def driver_options(options: dict[str, Any], *, lockstep: bool, as_hardware: bool = False) -> dict[str, Any]:

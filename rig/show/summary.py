@@ -100,7 +100,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
         "measured_again": what_was_measured_again(points),
         "drift": drift_of(points),
-        "messages": _messages(recording),
+        "messages": _messages(ends, points),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],
         "loop": _loop(ends, recording.n_rows, bench["sample_rate_hz"]),
         "counters": {
@@ -111,11 +111,10 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _messages(recording: Recording) -> list[str]:
-    """Return the names of what ended parts early or spoilt points, by which they are explained in the documentation."""
-    ends = [part.end["reason"] for part in recording.parts if part.end is not None]
-    spoilt = [str(point.quality) for point in recording.latest.values() if not point.accepted]
-    return list(dict.fromkeys(page_of(name) for name in (*ends, *spoilt) if page_of(name) not in UNEXPLAINED))
+def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[Any]]) -> list[str]:
+    """Return the names of what ended the run early or spoilt points, by which the documentation explains them."""
+    names = [*(end["reason"] for end in ends[-1:]), *(str(point.quality) for point in points if not point.accepted)]
+    return list(dict.fromkeys(page_of(name) for name in names if page_of(name) not in UNEXPLAINED))
 
 
 def _about(about: Mapping[str, Any] | None) -> dict[str, Any] | None:

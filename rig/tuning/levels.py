@@ -55,9 +55,9 @@ PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the
 SPAN = 30.0  # highest level over lowest, where noise allows
 LEAST_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
 BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
-ALIEN = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
+NONHARMONIC = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
 NARROW = 10.0  # span below which rounding may add more, and the plan accepts more
-MORE_ALIEN, ACCEPTED_ALIEN = 0.15, 0.25
+MORE_NONHARMONIC, ACCEPTED_NONHARMONIC = 0.15, 0.25
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class LevelChoice:
     """Force of each level on the linear plant, N peak."""
     why: str
     """What bounds the levels."""
-    accepted_alien: float | None = None
+    accepted_nonharmonic: float | None = None
     """Part of the force away from its harmonics that the plan must accept, because rounding causes it; None: the usual one."""
 
 
@@ -113,7 +113,7 @@ class LowestForce:
     """The force, N peak."""
     bound: str = ""
     """What keeps it from being lower; empty if it is a part of the highest force."""
-    accepted_alien: float | None = None
+    accepted_nonharmonic: float | None = None
     """As in `LevelChoice`."""
 
 
@@ -121,14 +121,14 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     """Return the lowest useful force for a highest level.
 
     It is a part of the highest force, but at least a few bits of the input converter, and so large that rounding in both
-    converters adds no more than `ALIEN` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where that
-    leaves less than a span of `NARROW`, rounding may add `MORE_ALIEN`.
+    converters adds no more than `NONHARMONIC` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where that
+    leaves less than a span of `NARROW`, rounding may add `MORE_NONHARMONIC`.
     """
     force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
     read_n, sent_n = input_bits_n(bench), bits_force_n
     rounded_n = math.hypot(read_n, sent_n)
     few_n = max(highest_n / SPAN, BITS * force.resolution_v / abs(force.sensitivity_v_per_unit))
-    quiet_n = math.sqrt(2.0) * rounded_n / ALIEN
+    quiet_n = math.sqrt(2.0) * rounded_n / NONHARMONIC
     if max(few_n, quiet_n) == highest_n / SPAN:
         return LowestForce(few_n)
     if quiet_n <= few_n:
@@ -137,8 +137,8 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     bound = f"the last bits of the {which} converter, which add {rounded_n:.2g} N RMS at other frequencies"
     if quiet_n <= highest_n / NARROW:
         return LowestForce(quiet_n, bound)
-    more_n = max(few_n, math.sqrt(2.0) * rounded_n / MORE_ALIEN)
-    return LowestForce(min(max(more_n, highest_n / NARROW), highest_n / LEAST_SPAN), bound, ACCEPTED_ALIEN)
+    more_n = max(few_n, math.sqrt(2.0) * rounded_n / MORE_NONHARMONIC)
+    return LowestForce(min(max(more_n, highest_n / NARROW), highest_n / LEAST_SPAN), bound, ACCEPTED_NONHARMONIC)
 
 
 def choose_levels(
@@ -179,7 +179,7 @@ def choose_levels(
         tuple(needed_v(plant, level) for level in levels),
         tuple(needed_n(plant, level) for level in levels),
         why,
-        lowest.accepted_alien,
+        lowest.accepted_nonharmonic,
     )
 
 

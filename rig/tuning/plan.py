@@ -66,10 +66,10 @@ def plan_text(
         "# A level that loses the lock is left out, and those above it.",
         _line("on_lost_lock", "skip"),
     ]
-    if levels.accepted_alien is not None:
+    if levels.accepted_nonharmonic is not None:
         head += [
             "# Rounding of the output: lines away from the harmonics, which leave frequency and damping as they are.",
-            _line("accepted_alien_force", significant(levels.accepted_alien, 2)),
+            _line("accepted_nonharmonic_force", significant(levels.accepted_nonharmonic, 2)),
         ]
     controller = [
         "",
@@ -91,7 +91,7 @@ def plan_text(
         "[settle]",
         f"# Predicted for a step of 30 % in level or of half a bandwidth in frequency: {settling:.0f} periods.",
         _line("longest_periods", time_out),
-        *([] if levels.accepted_alien is None else [_line("average_periods", AVERAGED_BITS)]),
+        *([] if levels.accepted_nonharmonic is None else [_line("average_periods", AVERAGED_BITS)]),
     ]
     facts = [
         "",

@@ -70,7 +70,7 @@ def test_a_force_that_is_mostly_another_mode_is_no_point():
     lost = [point for point in points if point["asked_phase_lag_deg"] <= -130.0]
     assert lost
     assert not any(point["accepted"] for point in lost)  # the paper's force loop does not hold there
-    swinging = [point for point in points if point.get("alien_force", 0.0) > 0.3]
+    swinging = [point for point in points if point.get("nonharmonic_force", 0.0) > 0.3]
     assert swinging
     assert all("no harmonics" in point["reason"] for point in swinging)
     assert points[-1]["accepted"]

@@ -19,15 +19,15 @@ from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
-    alien_objection,
     first_of,
+    nonharmonic_objection,
     phase_objection,
     settled_point,
     std_objection,
     with_settling,
 )
-from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
@@ -111,8 +111,8 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) ->
     except (IdentificationError, ArithmeticError) as error:
         return not_evaluated(plan, target, error, settled=False)
     error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
-    alien, shape = alien_force(bench, [rows]), drive_shape(bench, plan.plant)
-    reason = _short_objection(plan, found, error_deg, alien)
+    nonharmonic, shape = nonharmonic_force(bench, [rows]), drive_shape(bench, plan.plant)
+    reason = _short_objection(plan, found, error_deg, nonharmonic)
     reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
     turned = np.unwrap(rows["theta_rad"].astype(float))
     grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
@@ -122,7 +122,7 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) ->
         reason=reason,
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows, held=False),
-        alien_force=alien,
+        nonharmonic_force=nonharmonic,
         vibration=vibration_part(vibration, rows),
         modal=Modal(
             modal_frequency_hz=found.modal_frequency_hz,
@@ -147,7 +147,7 @@ def _arrival_s(flow: SlowFlow) -> float:
     return float(flow.time_s[min(last, flow.time_s.size - 1)])
 
 
-def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, alien: float) -> str:
+def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, nonharmonic: float) -> str:
     """Return why a slow-flow point is not accepted; an empty string if it is accepted."""
     frequency = found.modal_frequency_std_hz / found.modal_frequency_hz
     damping = found.damping_ratio_std / abs(found.damping_ratio)
@@ -155,7 +155,7 @@ def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, al
         (
             phase_objection(error_deg, plan.accepted_phase_error_deg),
             std_objection(frequency, plan.accepted_frequency_std, damping, plan.accepted_damping_std),
-            alien_objection(alien, plan.accepted_alien_force),
+            nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force),
         )
     )
 

@@ -2,7 +2,7 @@
 
 from typing import Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import AliasChoices, ConfigDict, Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
@@ -41,7 +41,9 @@ class ContinuousBackbonePlan(LockedPlan):
     """Relative margin by which the ramps pass below the lowest and above the highest of ``levels_m``."""
     bandwidth: float = Field(0.08, gt=0, le=1)
     """Half width of the band of amplitudes that are evaluated together for one level, in the logarithm of the amplitude."""
-    accepted_alien_force: float = Field(0.25, gt=0, le=1)
+    accepted_nonharmonic_force: float = Field(
+        0.25, gt=0, le=1, validation_alias=AliasChoices("accepted_nonharmonic_force", "accepted_alien_force")
+    )
     """As for every plan under a phase lock, but with a wider default: oscillations while the lock is gained lie beside the
     harmonics."""
     accepted_detuning: float = Field(0.03, gt=0, le=1)

@@ -19,9 +19,9 @@ from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.continuous_backbone.ways import WAYS, Way, both_ways, rows_near
-from rig.campaigns.evaluation.acceptance import alien_objection, first_of, std_objection
-from rig.campaigns.evaluation.alien_force import alien_force
+from rig.campaigns.evaluation.acceptance import first_of, nonharmonic_objection, std_objection
 from rig.campaigns.evaluation.measured_together import Passage
+from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.plausibility import with_plausible_ways
 from rig.campaigns.evaluation.point import (
     Lock,
@@ -196,12 +196,12 @@ def _point(
     frequency_std = single * float(mode.modal_frequency_std_hz[index])
     damping_std, shape = single * float(mode.damping_ratio_std[index]), drive_shape(bench, plan.plant)
     stds = (frequency_std / frequency, damping_std / abs(damping))
-    alien = alien_force(bench, pieces)
+    nonharmonic = nonharmonic_force(bench, pieces)
     reason = first_of(
         (
             f"passed on the way {covered[0]} only ({together.missing})" if together.missing else "",
             std_objection(stds[0], plan.accepted_frequency_std, stds[1], plan.accepted_damping_std),
-            alien_objection(alien, plan.accepted_alien_force),
+            nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force),
         )
     )
     near = np.abs(np.log(together.flow.amplitude_m / target.level)) < plan.bandwidth
@@ -215,7 +215,7 @@ def _point(
         reason=reason,
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows, held=False),
-        alien_force=alien,
+        nonharmonic_force=nonharmonic,
         vibration=vibration_part(vibration, rows),
         modal=Modal(
             modal_frequency_hz=frequency,

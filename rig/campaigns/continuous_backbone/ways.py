@@ -8,8 +8,8 @@ import numpy as np
 from identification import SlowFlow
 from rig.bench import Bench
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
-from rig.campaigns.evaluation.alien_force import FEWEST_PERIODS
 from rig.campaigns.evaluation.measured_together import Passage
+from rig.campaigns.evaluation.nonharmonic_force import FEWEST_PERIODS
 from rig.campaigns.evaluation.recorded_flow import AT_VOLTAGE_LIMIT, flagged
 from rig.campaigns.evaluation.vibrations import WHY
 from rig.tick.sequencer.layout import Outcome, SegmentKind

@@ -13,7 +13,7 @@ import numpy as np
 from controller import AmplitudeLaw
 from identification import PeriodicVibration
 from rig.bench import Bench
-from rig.campaigns.evaluation.alien_force import alien_force
+from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Point, Quality, planned_point
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg, quality_warnings, vibration_part
@@ -22,12 +22,12 @@ from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target
 
 __all__ = [
-    "alien_objection",
     "drift_objection",
     "first_of",
     "hunting_objection",
     "level_error",
     "level_objection",
+    "nonharmonic_objection",
     "phase_objection",
     "settled_point",
     "std_objection",
@@ -69,20 +69,20 @@ def level_objection(law: AmplitudeLaw, error: float | None, accepted: float) -> 
     return f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
 
 
-def alien_objection(alien: float, accepted: float, output_bits: float = math.inf) -> str:
+def nonharmonic_objection(nonharmonic: float, accepted: float, output_bits: float = math.inf) -> str:
     """Object if too much of the force is neither a harmonic nor noise. If that part is unknown (NaN), there is no objection.
 
-    ``output_bits`` is the amplitude of the output in bits of its converter.
+    ``output_bits`` is the amplitude of the output in steps of its converter.
     """
-    if not alien > accepted:
+    if not nonharmonic > accepted:
         return ""
     cause = "another mode, or a loop that swings"
     if output_bits < FEW_OUTPUT_BITS:
         cause = (
-            f"the output has an amplitude of {output_bits:.3g} bits of its converter, whose rounding is amplified off "
+            f"the output has an amplitude of {output_bits:.3g} steps of its converter, whose rounding is amplified off "
             f"resonance (less gain behind the converter, or a higher level, helps); else {cause}"
         )
-    return f"{100.0 * alien:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: {cause}"
+    return f"{100.0 * nonharmonic:.1f} % of the force's RMS are no harmonics, accepted up to {100.0 * accepted:g} %: {cause}"
 
 
 def hunting_objection(scatter: float, accepted: float) -> str:
@@ -136,13 +136,15 @@ def settled_point(
 
     All campaigns that settle and record at a held lag use this function.
     """
-    scatter, alien = frequency_scatter(rows), alien_force(bench, [rows])
+    scatter, nonharmonic = frequency_scatter(rows), nonharmonic_force(bench, [rows])
     vibrating = vibration_part(vibration, rows)
     reason = first_of(
         (
             phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg),
             level,
-            alien_objection(alien, plan.accepted_alien_force, vibrating.voltage_v / bench.output_bit_v),
+            nonharmonic_objection(
+                nonharmonic, plan.accepted_nonharmonic_force, vibrating.voltage_v / bench.output_bit_v
+            ),
             hunting_objection(scatter, plan.accepted_frequency_scatter),
             drift_objection(bench, vibration, plan.accepted_drift),
         )
@@ -153,7 +155,7 @@ def settled_point(
         reason=reason,
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows),
-        alien_force=alien,
+        nonharmonic_force=nonharmonic,
         vibration=vibrating,
         lock=Lock(
             phase_error_deg=vibration.phase_error_deg,

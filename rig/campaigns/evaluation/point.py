@@ -227,7 +227,7 @@ class Point(Generic[Result]):
     """Periods from the end of the ramp until the vibration settled or the point failed."""
     amplitude_drift: float | None = None
     """Last relative drift of the amplitude that the settle rule computed."""
-    alien_force: float | None = None
+    nonharmonic_force: float | None = None
     """Part of the force's RMS that is neither a harmonic nor noise; NaN if the record is too short to determine it."""
     channel_rms: tuple[float, ...] | None = None
     """RMS of every channel without its mean, if no single frequency was evaluated."""

@@ -30,6 +30,10 @@ def as_complex(pairs: Any) -> np.ndarray:
     return np.asarray(array[..., 0] + 1j * array[..., 1])
 
 
+FORMER = {"alien_force": "nonharmonic_force"}
+"""Keys of earlier versions, with their names of today."""
+
+
 def stored(point: Point[Any]) -> dict[str, Any]:
     """Return the JSON form of a point."""
     return {**_table(point), "accepted": point.accepted}
@@ -69,6 +73,7 @@ def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Poi
     ``result`` is the class of the results that only its kind of campaign has; if None, the point has no such results. Raises
     KeyError if a key is missing that points of all versions have.
     """
+    table = {FORMER.get(key, key): value for key, value in table.items()}
     point: Point[Any] = _read(Point, {**table, "quality": _quality(table)}, result)
     return point
 

@@ -23,7 +23,7 @@ __all__ = [
 PURITY_COLUMNS = (
     Column("force_purity", "force purity", "%", ".2f", 100.0),
     Column("response_purity", "response purity", "%", ".2f", 100.0, in_line=False),
-    Column("power_indicator", "power indicator", "%", ".2f", 100.0, in_line=False),
+    Column("power_indicator", "mode indicator", "%", ".2f", 100.0, in_line=False),
 )
 """Last columns in the tables of all campaigns under a phase lock."""
 
@@ -77,7 +77,7 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: Rows, hel
         bits = vibration.force_n * abs(force.sensitivity_v_per_unit) / force.resolution_v
         out.append(
             f"the lag scatters by {scatter:.1f} deg, trusted up to {SCATTERING_DEG:g}: too little signal "
-            f"(force {vibration.force_n:.3g} N, {bits:.1f} bits), or too quick a detector"
+            f"(force {vibration.force_n:.3g} N, {bits:.1f} steps of its converter), or too quick a detector"
         )
     linear_hz = bench.specimen.linear_frequency_hz
     if math.isfinite(scatter) and abs(vibration.frequency_hz / linear_hz - 1.0) > OTHER_MODE:

@@ -190,7 +190,8 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
         bits = abs(harmonics[1] * channel.sensitivity_v_per_unit) / channel.resolution_v
         if channel.role in ("force", "drive") and bits < FEW_BITS:
             out.append(
-                f"channel {channel.name}: an amplitude of {bits:.1f} bits; quantisation is not in the error bounds"
+                f"channel {channel.name}: an amplitude of {bits:.1f} steps of its converter; "
+                "rounding is not in the error bounds"
             )
     return out
 

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import AliasChoices, Field
 
 from controller import PhaseLockedLoop
 from rig.bench import Bench
@@ -24,7 +24,9 @@ class LockedPlan(KnownPlant, Plan):
     """How many times all points are measured."""
     harmonics: int = Field(7, ge=1, le=50)
     """Highest harmonic evaluated."""
-    accepted_alien_force: float = Field(0.1, gt=0, le=1)
+    accepted_nonharmonic_force: float = Field(
+        0.1, gt=0, le=1, validation_alias=AliasChoices("accepted_nonharmonic_force", "accepted_alien_force")
+    )
     """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted. Its cause is another
     mode or an oscillating control loop."""
     on_failure: Literal["skip", "stop"] = "skip"

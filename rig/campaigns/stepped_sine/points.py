@@ -8,15 +8,15 @@ from identification import FrequencyResponse, IdentificationError
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
-    alien_objection,
     drift_objection,
     first_of,
     level_error,
     level_objection,
+    nonharmonic_objection,
     with_settling,
 )
-from rig.campaigns.evaluation.alien_force import alien_force
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
+from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Point, Quality, planned_point
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
@@ -26,7 +26,9 @@ from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 
 __all__ = ["STEPPED_SINE", "STEPPED_SINE_COLUMNS", "SteppedSineResult", "measure_stepped_sine_point"]
 
-TRUSTED_ALIEN_FORCE = 0.1  # in open loop a larger value causes a warning; plans under a phase lock reject the point
+TRUSTED_NONHARMONIC_FORCE = (
+    0.1  # in open loop a larger value causes a warning; plans under a phase lock reject the point
+)
 
 STEPPED_SINE_COLUMNS = (
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
@@ -65,18 +67,18 @@ def measure_stepped_sine_point(
             drift_objection(bench, vibration, plan.accepted_drift),
         )
     )
-    alien = alien_force(bench, [rows])
+    nonharmonic = nonharmonic_force(bench, [rows])
     point = replace(
         planned_point(plan, target),
         settled=True,
         reason=reason,
         quality=Quality.of(reason),
         warnings=quality_warnings(bench, vibration, rows),
-        alien_force=alien,
+        nonharmonic_force=nonharmonic,
         vibration=vibration_part(vibration, rows),
         result=SteppedSineResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed),
     )
-    objection = alien_objection(alien, TRUSTED_ALIEN_FORCE)
+    objection = nonharmonic_objection(nonharmonic, TRUSTED_NONHARMONIC_FORCE)
     return with_settling(point.warned(objection) if objection else point, settling)
 
 

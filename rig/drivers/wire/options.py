@@ -48,7 +48,7 @@ def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> floa
         whose = "" if options.watchdog_s else ", the shortest that the device can do"
         raise DaqRefused(
             f"driver.options.watchdog_s = {chosen_s:g}{whose}: allowed is up to {longest_s:g} s "
-            "for a device that does not say that nothing moves: so long it may hold its last output"
+            "for a device that may move something: it holds its last output for as long"
         )
     return chosen_s
 

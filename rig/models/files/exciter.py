@@ -43,7 +43,7 @@ def _summarise(exciter: Exciter) -> dict[str, Any]:
 
 def _say(summary: dict[str, Any]) -> None:
     low, high = summary["band_hz"]
-    print(f"{low:g} to {high:g} Hz; misfit over expected error {number(summary['fit_residual'], '.2f')}")
+    print(f"{low:g} to {high:g} Hz; residual {number(summary['fit_residual'], '.2f')} times that expected from noise")
     print_table(
         ("", "value", "+-", "unit"),
         [

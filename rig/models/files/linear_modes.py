@@ -33,7 +33,8 @@ def _say(summary: dict[str, Any]) -> None:
     low, high = summary["band_hz"]
     source = f"{summary['estimator']}, " if summary["estimator"] else ""
     level = f", {summary['force_rms_n']:.3g} N RMS" if summary["force_rms_n"] > 0.0 else ""
-    print(f"{source}{low:g} to {high:g} Hz{level}; misfit over expected error {number(summary['fit_residual'], '.2f')}")
+    residual = number(summary["fit_residual"], ".2f")
+    print(f"{source}{low:g} to {high:g} Hz{level}; residual {residual} times that expected from noise")
     print_table(
         ("mode", "frequency Hz", "+-", "damping %", "+-", *(f"shape {name}" for name in summary["channels"])),
         [

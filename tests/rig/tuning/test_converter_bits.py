@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rig.campaigns.evaluation.acceptance import alien_objection
+from rig.campaigns.evaluation.acceptance import nonharmonic_objection
 from rig.tuning.converter_bits import bits_force_n, periodic_beyond, rounding
 from tests.rig.rigs import bench_with
 
@@ -52,6 +52,6 @@ def test_what_repeats_above_a_line_is_told_from_noise_and_from_what_is_below():
 
 
 def test_an_objection_names_the_output_s_bits_where_they_are_few():
-    assert "12 bits of its converter" in alien_objection(0.2, 0.1, 12.0)
-    assert "bits" not in alien_objection(0.2, 0.1, 5000.0)
-    assert alien_objection(0.05, 0.1, 12.0) == ""
+    assert "12 steps of its converter" in nonharmonic_objection(0.2, 0.1, 12.0)
+    assert "steps" not in nonharmonic_objection(0.2, 0.1, 5000.0)
+    assert nonharmonic_objection(0.05, 0.1, 12.0) == ""

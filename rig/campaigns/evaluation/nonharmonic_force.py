@@ -12,7 +12,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.rows import Rows
 
-__all__ = ["FEWEST_PERIODS", "alien_force"]
+__all__ = ["FEWEST_PERIODS", "nonharmonic_force"]
 
 FEWEST_PERIODS = 14  # with fewer periods, lines between two harmonics cannot be separated from the harmonics
 LONGEST = 2**18  # samples whose spectrum is computed at once: with more, memory would grow with the record
@@ -21,7 +21,7 @@ STANDS_OUT = 15.0  # times the noise: of a million bins of noise alone, one is t
 WINDOW = (0.35875, -0.48829, 0.14128, -0.01168)  # Blackman-Harris: side lobes 92 dB down, below any converter's noise
 
 
-def alien_force(bench: Bench, pieces: Sequence[Rows]) -> float:
+def nonharmonic_force(bench: Bench, pieces: Sequence[Rows]) -> float:
     """Part of the force's RMS that is no harmonic and stands out of the noise, from whole records or pieces of one record.
 
     The spectral lines between the harmonics of the output frequency count if they exceed 15 times the noise, which is the

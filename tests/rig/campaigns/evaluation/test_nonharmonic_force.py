@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rig
-from rig.campaigns.evaluation.alien_force import FEWEST_PERIODS, alien_force
+from rig.campaigns.evaluation.nonharmonic_force import FEWEST_PERIODS, nonharmonic_force
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.plans import load_plan
@@ -39,29 +39,31 @@ def record(periods, frequency_hz=149.0, strange_hz=544.0, strange=0.0, noise=0.0
 def test_a_strange_tone_counts_with_its_share_of_the_rms(strange, frequency_hz):
     share = strange / math.sqrt(1.05 + strange**2)
     rows = record(20, frequency_hz, strange_hz=3.65 * frequency_hz, strange=strange, noise=1e-3)
-    assert alien_force(BENCH, [rows]) == pytest.approx(share, rel=0.02)
+    assert nonharmonic_force(BENCH, [rows]) == pytest.approx(share, rel=0.02)
 
 
 @pytest.mark.parametrize("noise", [1e-4, 0.03, 0.3, 1.0])
 def test_noise_is_no_stranger_however_loud(noise):
-    found = [alien_force(BENCH, [record(20, noise=noise, seed=seed)]) for seed in range(200)]
+    found = [nonharmonic_force(BENCH, [record(20, noise=noise, seed=seed)]) for seed in range(200)]
     assert max(found) < 0.1
 
 
 def test_a_tone_is_found_in_noise_as_loud_as_the_force():
-    assert alien_force(BENCH, [record(20, strange=1.0, noise=0.7)]) == pytest.approx(math.sqrt(0.5 / 1.515), abs=0.05)
+    assert nonharmonic_force(BENCH, [record(20, strange=1.0, noise=0.7)]) == pytest.approx(
+        math.sqrt(0.5 / 1.515), abs=0.05
+    )
 
 
 def test_a_force_that_grows_and_whose_frequency_moves_is_its_own():
-    assert alien_force(BENCH, [record(20, growth=1.0, chirp=0.005, noise=1e-4)]) < 0.01
+    assert nonharmonic_force(BENCH, [record(20, growth=1.0, chirp=0.005, noise=1e-4)]) < 0.01
 
 
 def test_pieces_count_together_and_short_ones_not_at_all():
     pure, strange = record(20, noise=1e-3), record(20, strange=1.0, noise=1e-3)
-    both = alien_force(BENCH, [pure, strange, record(FEWEST_PERIODS // 2)])
+    both = nonharmonic_force(BENCH, [pure, strange, record(FEWEST_PERIODS // 2)])
     assert both == pytest.approx(math.sqrt(0.5 / (0.5 + 2 * 0.525)), rel=0.03)
-    assert math.isnan(alien_force(BENCH, [record(FEWEST_PERIODS // 2)]))
-    assert math.isnan(alien_force(BENCH, [strange[:0]]))
+    assert math.isnan(nonharmonic_force(BENCH, [record(FEWEST_PERIODS // 2)]))
+    assert math.isnan(nonharmonic_force(BENCH, [strange[:0]]))
 
 
 @pytest.mark.parametrize("kind", LOCKED)
@@ -81,11 +83,11 @@ def test_every_campaign_under_a_lock_shows_purity_last(kind):
 )
 def test_every_campaign_under_a_lock_refuses_points_with_more_than_is_accepted(name, change):
     plan = load_plan(f"magnet-beam/{name}")
-    with rig.run(plan.model_copy(update=change | {"accepted_alien_force": 1e-6}), seed=2) as run:
+    with rig.run(plan.model_copy(update=change | {"accepted_nonharmonic_force": 1e-6}), seed=2) as run:
         points = list(run.recording.latest.values())
         skipped = run.recording.parts[-1].end["skipped"]
     for point in points:
-        assert 1e-6 < point["alien_force"] < 0.02
+        assert 1e-6 < point["nonharmonic_force"] < 0.02
         assert "are no harmonics, accepted up to 0.0001 %" in point["reason"]
         assert point["quality"] == "rejected"
     assert skipped.startswith(f"{len(points)} of {len(points)} points skipped: rejected")
