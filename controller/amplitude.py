@@ -75,7 +75,7 @@ class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings
     ) -> np.ndarray:
         """Return one record of `AMPLITUDE`.
 
-        ``gain`` is the detector's low-pass step; ``sees_rest`` says whether the force at rest is estimated. Raises ValueError
+        ``gain`` is the detector's low-pass step; ``sees_rest`` says whether the steady force is estimated. Raises ValueError
         if the loop that should hold the levels has no integral gain.
         """
         through = self.force_loop == "through-response"

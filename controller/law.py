@@ -89,7 +89,7 @@ class OpenLoop(DetectorSettings, AmplitudeSettings):
 
 @inner_kernel
 def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: float, by_loop: bool) -> bool:
-    """Update presence, phase error and force at rest in ``control.vibration``; called after the detector, once a sample.
+    """Update presence, phase error and steady force in ``control.vibration``; called after the detector, once a sample.
 
     ``wanted_lag`` and ``lag_of_skew`` are in rad; the latter is the phase by which the force channel is sampled later.
     ``by_loop``: the frequency law gives the frequency. Return whether the loop is closed: the frequency law gives the

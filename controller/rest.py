@@ -1,4 +1,4 @@
-"""The force at rest: estimates the force that the present vibration will need once its amplitude and phase are steady."""
+"""The steady force: estimates the force that the present vibration will need once its amplitude and phase are steady."""
 
 import math
 
@@ -24,7 +24,7 @@ REST_STATE = np.dtype([("late_force", "c16"), ("late_drive", "c16")])
 
 
 class RestSettings(Settings):
-    """Whether the laws use the force at rest instead of the measured force."""
+    """Whether the laws use the steady force instead of the measured force."""
 
     rest_low_pass_rad_s: float = Field(0.0, ge=0, le=1e4)
     """Where above 0, frequency error and force through response go by the force that is left once the response keeps still:
@@ -50,7 +50,7 @@ class RestSettings(Settings):
 
 @inner_kernel
 def take_as_measured(state: Record, vibration: Record) -> None:
-    """Without an estimate, set force, motion and phase error at rest to the measured values."""
+    """Without an estimate, set force, motion and phase error of the steady vibration to the measured values."""
     state.late_force, state.late_drive = vibration.force, vibration.drive
     vibration.rest_force_n, vibration.rest_drive_m_s2 = vibration.force_n, vibration.drive_m_s2
     vibration.rest_error_rad = vibration.error_rad
@@ -63,7 +63,7 @@ def see_rest(
     """Update the estimate with one sample, for the oscillator's frequency ``omega`` (rad/s) and ``wanted_lag`` (rad).
 
     A mode whose complex displacement X changes slowly needs ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``. The last
-    term vanishes at rest; expressed by the acceleration it is ``F = -2 i/(W phi_d^2) dA/dt``, of which ``share`` is subtracted.
+    term vanishes once the vibration is steady; expressed by the acceleration it is ``F = -2 i/(W phi_d^2) dA/dt``, of which ``share`` is subtracted.
     Force and motion pass one more low-pass, which gives the derivative. With ``gain`` 0 force and lag are those measured.
     """
     if parameters.gain == 0.0:

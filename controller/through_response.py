@@ -58,7 +58,7 @@ def begin_reference(state: Record, displacement_m: float) -> None:
 
 @kernel
 def force_at_lag(vibration: Record, held_n: float, wanted_lag: float, is_rms: bool) -> float:
-    """Return the force (N) that the present response would need at the wanted lag (rad) and at rest.
+    """Return the force (N) that the present response would need at the wanted lag (rad) once it is steady.
 
     The active part of the fundamental, ``F sin psi`` with the lag psi of the displacement, is kept. For an RMS (``is_rms``) the
     harmonics contained in ``held_n`` are kept as well. The result is negative where the force brakes the vibration.

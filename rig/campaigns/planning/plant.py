@@ -133,7 +133,7 @@ class KnownPlant(Levels):
     ) -> list[ControlLoop]:
         """Return the control loop at each lag.
 
-        The force at rest cannot be linearised. If it is used, only the inner loops are returned.
+        The steady force cannot be linearised. If it is used, only the inner loops are returned.
         """
         amplitude_law = self.amplitude_law
         if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
