@@ -63,8 +63,9 @@ def see_rest(
     """Update the estimate with one sample, for the oscillator's frequency ``omega`` (rad/s) and ``wanted_lag`` (rad).
 
     A mode whose complex displacement X changes slowly needs ``phi_d^2 F = (w^2 - W^2 + 2 i z w W) X + 2 i W dX/dt``. The last
-    term vanishes once the vibration is steady; expressed by the acceleration it is ``F = -2 i/(W phi_d^2) dA/dt``, of which ``share`` is subtracted.
-    Force and motion pass one more low-pass, which gives the derivative. With ``gain`` 0 force and lag are those measured.
+    term vanishes once the vibration is steady. Expressed by the acceleration it is ``F = -2 i/(W phi_d^2) dA/dt``, of which
+    ``share`` is subtracted. Force and motion pass one more low-pass, which gives the derivative. With ``gain`` 0 force and lag
+    are those measured.
     """
     if parameters.gain == 0.0:
         take_as_measured(state, vibration)
