@@ -77,7 +77,7 @@ def test_an_sdist_also_holds_tests_documentation_and_what_a_contributor_reads(bu
         names = {name.partition("/")[2] for name in archive.getnames()}
     files = {"pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "SECURITY.md"}
     assert files <= names
-    assert {"tests/conftest.py", "docs/user-guide.md", "benchmarks/__main__.py"} <= names
+    assert {"tests/conftest.py", "docs/tutorials/first-backbone.md", "benchmarks/__main__.py"} <= names
 
 
 @pytest.fixture(scope="module")

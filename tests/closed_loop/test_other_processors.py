@@ -2,8 +2,8 @@
 
 Two processors round differently, so a run is bit for bit the same only on one of them. Over four seeds and both specimens the
 frequency differed by 1e-15 and force and damping by 5e-11 of their value. A count of a converter that falls the other way
-costs more, so the promise of docs/user-guide.md is a hundredth of the standard deviation of these points: 1e-5 of the
-frequency and 3e-3 of the damping.
+costs more, so the promise of docs/how-to/run-a-test-and-read-it.md is a hundredth of the standard deviation of these points:
+1e-5 of the frequency and 3e-3 of the damping.
 """
 
 import json
