@@ -21,7 +21,7 @@ FOLDER: list[Path] = []
 def installed(tmp_path_factory):
     """The page's files in a folder on the import path, with its entry point as an installer would leave it."""
     folder = tmp_path_factory.mktemp("box")
-    for block in blocks(ROOT / "docs" / "writing-a-driver.md"):
+    for block in blocks(ROOT / "docs" / "tutorials" / "a-driver.md"):
         if block.file:
             write(block, folder)
     sys.path.insert(0, str(folder))

@@ -22,7 +22,7 @@ print(json.dumps([others, backbone]))
 @pytest.fixture(scope="module")
 def found():
     """Packages that the page's loop has imported beside the controller, and its backbone: displacement, frequency, force."""
-    (page,) = (block for block in blocks(ROOT / "docs" / "controller.md") if block.language == "python")
+    (page,) = (block for block in blocks(ROOT / "docs" / "how-to" / "use-the-controller-in-my-own-loop.md") if block.language == "python")
     done = subprocess.run(
         [sys.executable, "-c", page.text + REPORT], cwd=ROOT, capture_output=True, text=True, check=True
     )
