@@ -26,7 +26,10 @@ k2 = 6.283
 centre_frequency_hz = 24.0
 frequency_window_hz = [22.0, 27.0]
 """
-NEEDS = {"docs/reference/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
+NEEDS = {  # pages that speak of a recording without making one
+    "docs/how-to/replay-a-recording.md": "backbone.h5",
+    "docs/reference/file-format.md": "OUT.h5",
+}
 LIBRARIES = {"docs/editors-and-tables.md": ("pandas", "xarray")}  # optional ones that a page uses
 NOT_RUN = {
     ("docs/editors-and-tables.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
