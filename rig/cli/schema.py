@@ -43,7 +43,7 @@ def new(
 
     if what == "driver":
         new_driver(output, overwrite)
-        print(f"{output}: take it apart and put your device in its place (docs/writing-a-driver.md)")
+        print(f"{output}: take it apart and put your device in its place (docs/tutorials/a-driver.md)")
         return
     if what not in ("bench", "plan", "rig"):
         raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig or driver")

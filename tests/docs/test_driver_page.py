@@ -1,6 +1,8 @@
 """The driver that is printed on the page for driver authors passes the contract, and its own promises."""
 
 import importlib
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -21,7 +23,7 @@ FOLDER: list[Path] = []
 def installed(tmp_path_factory):
     """The page's files in a folder on the import path, with its entry point as an installer would leave it."""
     folder = tmp_path_factory.mktemp("box")
-    for block in blocks(ROOT / "docs" / "writing-a-driver.md"):
+    for block in blocks(ROOT / "docs" / "tutorials" / "a-driver.md"):
         if block.file:
             write(block, folder)
     sys.path.insert(0, str(folder))
@@ -45,6 +47,15 @@ class TestBoxOfThePage(DriverContract):
 def test_the_driver_of_the_page_is_found_by_its_entry_point():
     assert "box" in driver_names()
     assert type(make_daq(bench())).__name__ == "BoxDAQ"
+
+
+def test_the_tests_of_the_page_pass_and_pull_the_cable():
+    command = [sys.executable, "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "test_box.py"]
+    path = os.pathsep.join([str(FOLDER[0]), str(ROOT)])
+    env = {**os.environ, "PYTHONPATH": path, "PYTEST_ADDOPTS": ""}
+    done = subprocess.run(command, cwd=FOLDER[0], env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "unplug" not in done.stdout
 
 
 def test_an_unplugged_box_is_disconnected_and_still_closes():

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from tests.docs.pages import ROOT, blocks
 
+PAGE = ROOT / "docs" / "how-to" / "use-the-controller-in-my-own-loop.md"
 M, C, K, K3 = 1.0, 2.5, 15800.0, 1e9  # of the page
 REPORT = """
 import json, sys
@@ -22,7 +23,7 @@ print(json.dumps([others, backbone]))
 @pytest.fixture(scope="module")
 def found():
     """Packages that the page's loop has imported beside the controller, and its backbone: displacement, frequency, force."""
-    (page,) = (block for block in blocks(ROOT / "docs" / "controller.md") if block.language == "python")
+    (page,) = (block for block in blocks(PAGE) if block.language == "python")
     done = subprocess.run(
         [sys.executable, "-c", page.text + REPORT], cwd=ROOT, capture_output=True, text=True, check=True
     )

@@ -26,17 +26,24 @@ k2 = 6.283
 centre_frequency_hz = 24.0
 frequency_window_hz = [22.0, 27.0]
 """
-NEEDS = {"docs/reference/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
+NEEDS = {  # pages that speak of a recording without making one
+    "docs/how-to/replay-a-recording.md": "backbone.h5",
+    "docs/reference/file-format.md": "OUT.h5",
+}
 LIBRARIES = {"docs/editors-and-tables.md": ("pandas", "xarray")}  # optional ones that a page uses
 NOT_RUN = {
     ("docs/editors-and-tables.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
     ("README.md", "needs the device"),
-    ("docs/emulator.md", "runs until Ctrl-C"),
-    ("docs/hardware-in-the-loop.md", "takes half a minute each; tests/hardware runs the same"),
-    ("docs/monitor.md", "runs until Ctrl-C"),
-    ("docs/monitor.md", "takes a minute by the clock and needs Chromium"),
+    ("docs/how-to/replay-a-recording.md", "runs until Ctrl-C"),
+    ("docs/how-to/swap-in-a-driver.md", "needs the device"),
+    ("docs/how-to/test-my-bench-with-pytest.md", "takes half a minute each; tests/hardware runs the same"),
+    ("docs/how-to/try-without-hardware.md", "runs until Ctrl-C"),
+    ("docs/how-to/watch-a-run-in-a-terminal.md", "runs until Ctrl-C"),
+    ("docs/how-to/watch-a-run.md", "runs until Ctrl-C"),
+    ("docs/how-to/watch-from-another-machine.md", "runs until Ctrl-C"),
+    ("docs/reference/run-page.md", "takes a minute by the clock and needs Chromium"),
+    ("docs/tutorials/a-driver.md", "installs a package"),
     ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
-    ("docs/writing-a-driver.md", "installs a package"),
     ("docs/reference/benchmarks.md", "takes minutes"),
 }
 

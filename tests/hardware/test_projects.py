@@ -38,7 +38,7 @@ def test_c_goes_on(armed_rig):
 
 
 def test_the_example_of_the_page_and_a_strict_project_of_ones_own(tmp_path):
-    page = ROOT / "docs" / "hardware-in-the-loop.md"
+    page = ROOT / "docs" / "how-to" / "test-my-bench-with-pytest.md"
     (example,) = (block for block in blocks(page) if block.file == "test_bench.py")
     (tmp_path / "test_bench.py").write_text(example.text)
     (tmp_path / "test_own.py").write_text(OWN)
