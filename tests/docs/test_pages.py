@@ -9,7 +9,7 @@ import rig
 from rig.campaigns.kinds import KINDS
 from tests.docs.output import assert_shows
 from tests.docs.pages import ROOT, blocks, pages
-from tests.docs.taken import TAKES, follower
+from tests.docs.taken import follower
 
 QUICK = """
 kind = "backbone"
