@@ -43,17 +43,17 @@ TAKES: dict[str, dict[str, tuple[str, ...]]] = {
 }
 
 
-def follower(new_folder: Callable[[str], Path], ready: dict[str, Path]) -> Callable[[str], Path]:
+def follower(new_folder: Callable[[str], Path], recording: Path, needs: dict[str, str]) -> Callable[[str], Path]:
     """A function that follows a page, named as in TAKES, once, and returns the folder in which that was done.
 
-    ``ready`` has a further file for some pages.
+    A page of ``needs`` finds the recording there, by the name that it uses.
     """
 
     @functools.cache
     def followed(page: str) -> Path:
         folder = new_folder(Path(page).stem)
-        if page in ready:
-            copy(ready[page], folder)
+        if page in needs:
+            shutil.copy(recording, folder / needs[page])
         for source, names in TAKES.get(page, {}).items():
             for name in names:
                 copy(followed(source) / name, folder)

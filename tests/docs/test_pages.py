@@ -58,7 +58,7 @@ def followed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ready")
     (folder / "quick.toml").write_text(QUICK)
     rig.run(str(folder / "quick.toml"), output=str(folder / "OUT.h5")).close()
-    return follower(tmp_path_factory.mktemp, {page: folder / name for page, name in NEEDS.items()})
+    return follower(tmp_path_factory.mktemp, folder / "OUT.h5", NEEDS)
 
 
 @pytest.mark.parametrize("page", pages(), ids=name_of)
