@@ -1,8 +1,9 @@
-"""A rig of one's own from its page alone: files taken from it, commands typed in a terminal, an independent truth."""
+"""A rig of one's own from its pages alone: files taken from it, commands typed in a terminal, an independent truth."""
 
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +14,13 @@ import pytest
 from rig.bench import load_bench
 from rig.drivers import make_daq
 from rig.models.files.files import load
+from rig.tick.layout import DEVICE_SHIFT
 from simulators.analysis import phase_resonance_backbone
+from simulators.layout import Flag
 from tests.docs.pages import ROOT, blocks, write
 
+TUTORIAL, FORCE_LAW = ROOT / "docs/tutorials/a-rig-of-your-own.md", ROOT / "docs/how-to/write-a-force-law.md"
+PARTS = ROOT / "docs" / "reference" / "virtual-rig-parts.md"
 STIFFNESS_N_M, GAP_M = 2000.0, 0.0005
 CLAMPED = 1.8751040687119611  # first root of cosh(x) cos(x) = -1
 PRESS_FIT = """
@@ -31,11 +36,12 @@ slip = [1e-5]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
-    """The files of the page, as a reader would copy them."""
+    """The files of the pages, as a reader would copy them."""
     path = tmp_path_factory.mktemp("laboratory")
-    for block in blocks(ROOT / "docs" / "virtual-rigs.md"):
-        if block.file:
-            write(block, path)
+    for page in (TUTORIAL, FORCE_LAW):
+        for block in blocks(page):
+            if block.file:
+                write(block, path)
     return path
 
 
@@ -78,7 +84,7 @@ def model(folder):
 
 
 def test_the_commands_of_the_page_are_those_typed_here():
-    text = (ROOT / "docs" / "virtual-rigs.md").read_text(encoding="utf-8")
+    text = TUTORIAL.read_text(encoding="utf-8")
     assert "rig run end-stop-plan.toml -o" in text
     assert "rig identify end-stop.h5 -o" in text
 
@@ -170,3 +176,10 @@ def test_a_joint_that_is_stiffer_than_the_beam_is_refused(folder):
     done = typed("rig run plate-plan.toml --bench press-fit.toml -o no.h5", folder)
     assert done.returncode == 1
     assert "friction: stiffness 100000 in all, allowed is less than the structure has there" in done.stderr
+
+
+def test_every_flag_is_on_the_page_of_parts_with_its_bit():
+    shown = re.findall(r"^\| `(\w+)` \| (\d+) \|", PARTS.read_text(encoding="utf-8"), re.MULTILINE)
+    assert [(name, 1 << (int(bit) - DEVICE_SHIFT)) for name, bit in shown] == [
+        (str(flag.name).lower(), int(flag)) for flag in Flag
+    ]

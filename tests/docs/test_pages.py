@@ -1,17 +1,15 @@
 """Whoever follows a page of the documentation gets what it says: its commands, its examples, its output."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 import rig
 from rig.campaigns.kinds import KINDS
 from tests.docs.output import assert_shows
 from tests.docs.pages import ROOT, blocks, pages
-from tests.docs.reader import Reader
+from tests.docs.taken import follower
 
 QUICK = """
 kind = "backbone"
@@ -30,9 +28,9 @@ NEEDS = {  # pages that speak of a recording without making one
     "docs/how-to/replay-a-recording.md": "backbone.h5",
     "docs/reference/file-format.md": "OUT.h5",
 }
-LIBRARIES = {"docs/editors-and-tables.md": ("pandas", "xarray")}  # optional ones that a page uses
+LIBRARIES = {"docs/how-to/use-pandas-and-xarray.md": ("pandas", "xarray")}  # optional ones that a page uses
 NOT_RUN = {
-    ("docs/editors-and-tables.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
+    ("docs/how-to/complete-files-in-an-editor.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
     ("README.md", "needs the device"),
     ("docs/how-to/replay-a-recording.md", "runs until Ctrl-C"),
     ("docs/how-to/swap-in-a-driver.md", "needs the device"),
@@ -43,6 +41,7 @@ NOT_RUN = {
     ("docs/how-to/watch-from-another-machine.md", "runs until Ctrl-C"),
     ("docs/reference/run-page.md", "takes a minute by the clock and needs Chromium"),
     ("docs/tutorials/a-driver.md", "installs a package"),
+    ("docs/how-to/reproduce-the-paper.md", "takes a quarter of an hour"),
     ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/reference/benchmarks.md", "takes minutes"),
 }
@@ -59,28 +58,20 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.fixture(autouse=True)
-def nothing_of_a_page_stays(tmp_path):
-    """Neither its modules nor worker processes, which would keep its folder and import path."""
-    get_reusable_executor().shutdown()
-    before = set(sys.modules)
-    yield
-    get_reusable_executor().shutdown()
-    for name in set(sys.modules) - before:
-        if str(getattr(sys.modules[name], "__file__", None)).startswith(str(tmp_path)):
-            del sys.modules[name]
+@pytest.fixture(scope="session")
+def followed(tmp_path_factory):
+    """Follows a page once a session, with the files that it goes on with."""
+    folder = tmp_path_factory.mktemp("ready")
+    (folder / "quick.toml").write_text(QUICK)
+    rig.run(str(folder / "quick.toml"), output=str(folder / "OUT.h5")).close()
+    return follower(tmp_path_factory.mktemp, folder / "OUT.h5", NEEDS)
 
 
 @pytest.mark.parametrize("page", pages(), ids=name_of)
-def test_a_page_does_what_it_says(page, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
+def test_a_page_does_what_it_says(page, followed):
     for library in LIBRARIES.get(name_of(page), ()):
         pytest.importorskip(library, reason=f"{library} is not installed (pip install 'vibrolock[tables]')")
-    if name_of(page) in NEEDS:
-        Path("quick.toml").write_text(QUICK)
-        rig.run("quick.toml", output=NEEDS[name_of(page)]).close()
-    Reader(page).follow()
+    followed(name_of(page))
 
 
 PRINTED = "one 1.00\ntwo 2.00 words\nthree"

@@ -1,0 +1,89 @@
+"""Pages that go on with files of other pages: which files, and of which page.
+
+The other page is followed once a session, in a folder of its own, and its files are copied.
+"""
+
+import contextlib
+import functools
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from joblib.externals.loky import get_reusable_executor
+
+from tests.docs.pages import ROOT
+from tests.docs.reader import Reader
+
+RECORDINGS = "docs/tutorials/recordings-to-prediction.md"
+EXCITER, SWEEP, PNLSS = (
+    f"docs/how-to/{name}.md" for name in ("identify-an-exciter", "predict-a-sweep", "identify-a-pnlss-model")
+)
+TAKES: dict[str, dict[str, tuple[str, ...]]] = {
+    "docs/how-to/identify-a-linear-model.md": {RECORDINGS: ("modal.h5",)},
+    "docs/how-to/identify-a-nonlinear-mode.md": {RECORDINGS: ("backbone.h5", "linear.h5")},
+    "docs/how-to/combine-several-backbones.md": {RECORDINGS: ("linear.h5",)},
+    "docs/how-to/predict-a-frequency-response.md": {RECORDINGS: ("mode.h5", "linear.h5", "sine.h5")},
+    SWEEP: {RECORDINGS: ("mode.h5", "linear.h5"), EXCITER: ("exciter.h5",)},
+    PNLSS: {RECORDINGS: ("backbone.h5",)},
+    "docs/how-to/predict-with-a-pnlss-model.md": {
+        PNLSS: ("low.h5", "pnlss.h5", "lines.h5"),
+        SWEEP: ("sweep-test.toml", "sweep.h5"),
+        EXCITER: ("exciter.h5",),
+    },
+    "docs/how-to/export-to-other-programs.md": {RECORDINGS: ("backbone.h5", "mode.h5")},
+    "docs/how-to/write-a-report.md": {
+        RECORDINGS: ("backbone.h5", "mode.h5"),
+        "docs/how-to/reproduce-the-paper.md": ("look",),
+    },
+    "docs/how-to/run-a-parameter-study.md": {
+        "docs/tutorials/a-rig-of-your-own.md": ("end-stop.toml",),
+        "docs/how-to/make-a-specimen-scatter-or-wear.md": ("scatter.toml",),
+    },
+}
+
+
+def follower(new_folder: Callable[[str], Path], recording: Path, needs: dict[str, str]) -> Callable[[str], Path]:
+    """A function that follows a page, named as in TAKES, once, and returns the folder in which that was done.
+
+    A page of ``needs`` finds the recording there, by the name that it uses.
+    """
+
+    @functools.cache
+    def followed(page: str) -> Path:
+        folder = new_folder(Path(page).stem)
+        if page in needs:
+            shutil.copy(recording, folder / needs[page])
+        for source, names in TAKES.get(page, {}).items():
+            for name in names:
+                copy(followed(source) / name, folder)
+        with alone_in(folder):
+            Reader(ROOT / page).follow()
+        return folder
+
+    return followed
+
+
+def copy(source: Path, folder: Path) -> None:
+    """Copy a file or a folder into a folder."""
+    if source.is_dir():
+        shutil.copytree(source, folder / source.name)
+    else:
+        shutil.copy(source, folder)
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """The folder is the present one and on the import path; neither its modules nor worker processes stay."""
+    get_reusable_executor().shutdown()
+    before = set(sys.modules)
+    sys.path.insert(0, str(folder))
+    try:
+        with contextlib.chdir(folder):
+            yield
+    finally:
+        sys.path.remove(str(folder))
+        get_reusable_executor().shutdown()
+        for name in set(sys.modules) - before:
+            if str(getattr(sys.modules[name], "__file__", None)).startswith(str(folder)):
+                del sys.modules[name]
