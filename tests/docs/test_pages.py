@@ -122,3 +122,21 @@ def test_decisions_are_numbered_without_gaps_and_say_context_decision_consequenc
     assert sorted(re.findall(r"^- \[(\d{4})\]\(([^)]+)\)", index, re.MULTILINE)) == [
         (path.name[:4], path.name) for path in records
     ]
+
+
+@pytest.mark.parametrize("section", ["tutorials", "how-to", "explanation", "reference"])
+def test_every_page_of_a_section_is_in_its_index(section):
+    folder = ROOT / "docs" / section
+    lists = re.findall(r"^```\{toctree\}\n(.*?)^```", (folder / "index.md").read_text(encoding="utf-8"), re.M | re.S)
+    listed = [line for one in lists for line in one.splitlines() if line and not line.startswith(":")]
+    below = {f"{index.parent.name}/index" for index in folder.glob("*/index.md")}
+    assert sorted(listed) == sorted({page.stem for page in folder.glob("*.md")} - {"index"} | below)
+
+
+LONGEST = {"tutorials": 1500, "how-to": 2500, "explanation": 2500}  # words
+
+
+@pytest.mark.parametrize("section", LONGEST)
+def test_pages_are_short(section):
+    for page in (ROOT / "docs" / section).glob("*.md"):
+        assert len(page.read_text(encoding="utf-8").split()) <= LONGEST[section], name_of(page)
