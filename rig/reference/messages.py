@@ -1,0 +1,56 @@
+"""The messages that end or spoil a run: reasons for the end of a run, qualities of points, errors.
+
+Each has a name in small letters with hyphens, such as ``lost-lock`` or ``daq-timeout``, which is that of its page.
+"""
+
+import re
+from collections.abc import Iterator
+
+from rig.reference.entry import Entry
+
+__all__ = ["PAGES", "message_entries"]
+
+PAGES = "reference/messages"
+"""Folder of their pages on the site."""
+
+
+def message_entries() -> Iterator[Entry]:
+    """Yield an entry for every message; a name that is both a reason and a quality has one entry."""
+    lines: dict[str, list[str]] = {}
+    for name, line in (*_end_reasons(), *_qualities(), *_errors()):
+        lines.setdefault(name, []).append(line)
+    for name, texts in lines.items():
+        words = (name, name.replace("-", "_"), name.replace("-", " "))
+        yield Entry("message", name, tuple(dict.fromkeys(words)), "; ".join(dict.fromkeys(texts)), f"{PAGES}/{name}")
+
+
+def _end_reasons() -> Iterator[tuple[str, str]]:
+    from rig.tick.safety.layout import TEXT, EndReason
+
+    for reason, text in TEXT.items():
+        if reason not in (EndReason.NONE, EndReason.COMPLETED):
+            yield _name(reason.name), f"end of a run: {text}"
+
+
+def _qualities() -> Iterator[tuple[str, str]]:
+    from rig.campaigns.evaluation.point import Quality
+    from vibrolock.described import attribute_docstrings
+
+    texts = attribute_docstrings(Quality.__module__)["Quality"]
+    for quality in Quality:
+        if quality is not Quality.GOOD:
+            yield quality.value, f"quality of a point: {texts[quality.name]}"
+
+
+def _errors() -> Iterator[tuple[str, str]]:
+    from rig import errors
+
+    for name in errors.__all__:
+        error = getattr(errors, name)
+        if isinstance(error, type):
+            line = " ".join(str(error.__doc__).partition("\n\n")[0].split())
+            yield re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower(), f"error: {line}"
+
+
+def _name(name: str) -> str:
+    return name.lower().replace("_", "-")
