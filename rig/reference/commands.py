@@ -31,7 +31,7 @@ class Command:
 
 
 def commands_of(group: Any, name: str = "rig") -> Iterator[Command]:
-    """Yield the commands of a group, those of the groups in it included; ``group`` is what ``typer.main.get_command`` returns."""
+    """Yield the commands of a group, and those of the groups in it; ``typer.main.get_command`` returns a group."""
     for word, command in group.commands.items():
         full = f"{name} {word}"
         yield _command(command, full)

@@ -3,13 +3,16 @@
 The meaning of a key is the docstring under its field; default and allowed values come from the model's JSON schema.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, get_args
 
 from pydantic import BaseModel
 
-__all__ = ["Key", "keys_of", "parts_of", "roots", "tables"]
+from rig.reference.entry import Entry
+
+__all__ = ["Key", "key_entries", "keys_of", "parts_of", "roots", "tables"]
 
 Schema = dict[str, Any]
 
@@ -164,7 +167,7 @@ def _default(value: Any) -> str:
         return ""
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+    return f"`{_number(value)}`" if isinstance(value, float) else f"`{value}`"
 
 
 def _allowed(field: Schema) -> str:
@@ -198,10 +201,34 @@ def _list(field: Schema) -> str:
 
 def _bounds(field: Schema) -> str:
     """Return ``above 0 to 1``, ``0 to below 1``, ``from 0``; empty without bounds."""
-    low = f"above {field['exclusiveMinimum']:g}" if "exclusiveMinimum" in field else ""
-    low = f"{field['minimum']:g}" if "minimum" in field else low
-    high = f"below {field['exclusiveMaximum']:g}" if "exclusiveMaximum" in field else ""
-    high = f"{field['maximum']:g}" if "maximum" in field else high
+    low = f"above {_number(field['exclusiveMinimum'])}" if "exclusiveMinimum" in field else ""
+    low = f"{_number(field['minimum'])}" if "minimum" in field else low
+    high = f"below {_number(field['exclusiveMaximum'])}" if "exclusiveMaximum" in field else ""
+    high = f"{_number(field['maximum'])}" if "maximum" in field else high
     if high:
         return f"{low} to {high}" if low else f"up to {high}"
     return low if low.startswith("above") else f"from {low}" if low else ""
+
+
+def key_entries() -> Iterator[Entry]:
+    """Yield an entry for every table and every key.
+
+    A key that holds the table of its own name is found by its full name alone, as the word means the table.
+    """
+    for name, model in tables().items():
+        line = " ".join(str(model.__doc__).partition("\n\n")[0].split()).replace("``", "`")
+        yield Entry("table", name, tuple(dict.fromkeys((name, name.replace("-", "_")))), line, f"keys-{name}")
+        for key in keys_of(name):
+            full = f"{name}.{key.name}"
+            words = (full,) if key.name in key.holds else (key.name, full)
+            facts = ", ".join(text for text in (_said(key.default), f"allowed: {key.allowed}") if text)
+            yield Entry("key", full, words, key.meaning, key.anchor, facts)
+
+
+def _said(default: str) -> str:
+    return f"default {default}" if default.startswith("`") else default
+
+
+def _number(value: float) -> str:
+    """Return a number in full where it is whole and not very large."""
+    return str(int(value)) if value == int(value) and abs(value) < 1e8 else f"{value:g}"
