@@ -41,6 +41,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"vibrolock {release}"
 html_theme_options = {
     "show_nav_level": 2,
+    "show_toc_level": 2,
     "navigation_with_keys": False,
     "show_prev_next": True,
     "navbar_align": "left",

@@ -18,10 +18,10 @@ from sphinx.util.docutils import SphinxDirective
 from typer.main import get_command
 
 from rig.cli.app import app as command_line
-from rig.reference.commands import command_entries, commands_of
+from rig.reference.commands import command_entries, commands_of, option_names
 from rig.reference.entry import Entry
 from rig.reference.keys import key_entries, keys_of, tables
-from rig.reference.messages import PAGES, message_entries
+from rig.reference.messages import PAGES, message_entries, slug
 from rig.reference.names import first_line, name_entries
 from rig.reference.words import words_of, write_words
 
@@ -44,7 +44,8 @@ class Generated(SphinxDirective):
         """Return the place where a thing stands, which the search, the inventory and links then know."""
         node = nodes.target("", "", ids=[anchor])
         standard = self.env.domains.standard_domain
-        standard.note_object(kind, name, anchor, location=node)
+        if kind != "option":
+            standard.note_object(kind, name, anchor, location=node)
         standard.anonlabels[anchor] = (self.env.docname, anchor)
         standard.labels[anchor] = (self.env.docname, anchor, name)
         return node
@@ -83,11 +84,14 @@ class CommandHelp(Generated):
         if command is None:
             raise self.error(f"there is no command rig {self.arguments[0]}")
         lines = [command.text, "", "```text", command.usage, "```", ""]
-        for rows in (command.arguments, command.options):
-            for names, text in rows:
-                lines += [f"`{names}`", f": {text or '–'}", ""]
-        place = self.target("command", command.name, f"command-{command.anchor}")
-        return [place, *self.parsed(lines)]
+        for names, text in (*command.arguments, *command.options):
+            lines += [f"`{names}`", f": {text or '–'}", ""]
+        out = self.parsed(lines)
+        terms = [term for part in out for term in part.findall(nodes.term)]
+        for (names, _), term in zip((*command.arguments, *command.options), terms, strict=True):
+            for option in option_names(names):
+                term.insert(0, self.target("option", f"{command.name} {option}", f"{command.anchor}{option}"))
+        return [self.target("command", command.name, f"command-{command.anchor}"), *out]
 
 
 class Names(Generated):
@@ -114,7 +118,9 @@ class ErrorTree(Generated):
         return self.parsed(self._branch(getattr(import_module(module), name), ""))
 
     def _branch(self, error: type, indent: str) -> Iterator[str]:
-        yield f"{indent}- {{py:exc}}`{error.__name__} <{error.__module__}.{error.__name__}>`: {first_line(error)}"
+        page = f"{PAGES}/{slug(error.__name__)}"
+        more = f" ([what to do](/{page}.md))" if page in self.env.found_docs else ""
+        yield f"{indent}- {{py:exc}}`{error.__name__} <{error.__module__}.{error.__name__}>`: {first_line(error)}{more}"
         for one in error.__subclasses__():
             if one.__module__ == error.__module__:
                 yield from self._branch(one, f"{indent}  ")
@@ -163,13 +169,15 @@ def _site_entries(app: Sphinx) -> Iterator[tuple[Entry, str]]:
         elif entry.what == "message":
             yield entry, ""
     known = {entry.target for entry in entries}
+    words = {word for entry in entries for word in entry.words}
     for page in sorted(app.env.found_docs - known):
         title = app.env.titles[page].astext()
         what = "message" if page.startswith(PAGES) else "page"
-        yield Entry(what, page, (title.lower(), page.rpartition("/")[2]), title, page), address(page)
+        stem = page.rpartition("/")[2]
+        yield Entry(what, page, (title, *({stem} - words - {"index"})), title, page), address(page)
     for name, _, kind, page, anchor, _ in app.env.domains.standard_domain.get_objects():
         if kind == "term":
-            yield Entry("term", name, (name.lower(),), f"{name}, in the glossary", anchor), f"{address(page)}#{anchor}"
+            yield Entry("term", name, (name,), f"{name}, in the glossary", anchor), f"{address(page)}#{anchor}"
 
 
 def _write_words(app: Sphinx, error: Exception | None) -> None:

@@ -28,11 +28,12 @@ def docs(
     from rig.errors import ConfigurationError
     from rig.reference.words import closest, found, known_words, read_words, site
 
-    asked, folder = " ".join(word or ()).removeprefix("rig ").strip(), site()
+    asked, folder = " ".join(word or ()).strip(), site()
     if not asked:
         if folder is None:
             raise ConfigurationError(BUILD)
-        _open(folder / "index.html")
+        print(_address(folder, "index.html"))
+        _open(folder, "index.html")
         return
     words = read_words(folder) if folder else known_words(_command_line())
     hits = found(words, asked)
@@ -40,40 +41,31 @@ def docs(
         near = ", ".join(closest(words, asked))
         raise ConfigurationError(f"WORD = {asked!r}: nothing of this name" + (f"; closest: {near}" if near else ""))
     for hit in hits:
-        _print(hit)
+        _print(hit, folder)
     if folder is None:
         print(BUILD, file=sys.stderr)
-    elif len(hits) == 1 and hits[0].url:
+    elif len(hits) > 1:
+        print(f"rig docs {hits[0].title} opens the first")
+    elif hits[0].url:
         _open(folder, hits[0].url)
-    else:
-        _say_pages(folder, hits)
 
 
-def _print(hit: "Hit") -> None:
+def _print(hit: "Hit", folder: Path | None) -> None:
     print(f"{hit.title} ({hit.what}): {hit.line}")
-    if hit.facts:
-        print(f"    {hit.facts}")
+    for more in (hit.facts, _address(folder, hit.url) if folder and hit.url else ""):
+        if more:
+            print(f"    {more}")
 
 
-def _say_pages(folder: Path, hits: "list[Hit]") -> None:
-    """Print the addresses of several hits; a full name opens one of them."""
-    for url in dict.fromkeys(hit.url for hit in hits if hit.url):
-        print(_address(folder, url))
-    if len(hits) > 1:
-        print(f"rig docs {hits[0].title} opens one")
-
-
-def _open(folder: Path, url: str = "") -> None:
-    """Print an address, and open it in a browser where there is one on this screen."""
+def _open(folder: Path, url: str) -> None:
+    """Open a page in a browser, where there is a screen for one."""
     import webbrowser
 
-    address = _address(folder, url)
-    print(address)
     here = "SSH_CONNECTION" not in os.environ and (
         sys.platform in ("win32", "darwin") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     )
     if here:
-        webbrowser.open(address)
+        webbrowser.open(_address(folder, url))
 
 
 def _address(folder: Path, url: str) -> str:

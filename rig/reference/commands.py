@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.reference.entry import Entry
 
-__all__ = ["Command", "command_entries", "commands_of"]
+__all__ = ["Command", "command_entries", "commands_of", "option_names"]
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,16 @@ def command_entries(group: Any) -> Iterator[Entry]:
             command.name,
             (command.name, short),
             line,
-            command.anchor,
-            f"{command.name} --help has its options",
+            f"command-{command.anchor}",
+            command.usage,
         )
         for names, text in command.options:
-            words = [word.strip(",") for word in names.split() if word.startswith("--")]
-            for word in words:
-                titles = (f"{command.name} {word}", word, word.removeprefix("--"))
-                yield Entry("option", titles[0], titles, text, command.anchor)
+            for option in option_names(names):
+                full = f"{command.name} {option}"
+                words = (full, full.removeprefix("rig "), option)
+                yield Entry("option", full, words, text, f"{command.anchor}{option}")
+
+
+def option_names(names: str) -> list[str]:
+    """Return the long names of an option, from the text that its help begins with."""
+    return [word.strip(",") for word in names.split() if word.startswith("--")]

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from rig.reference.entry import Entry
 
-__all__ = ["PAGES", "message_entries"]
+__all__ = ["PAGES", "message_entries", "slug"]
 
 PAGES = "reference/messages"
 """Folder of their pages on the site."""
@@ -29,7 +29,7 @@ def _end_reasons() -> Iterator[tuple[str, str]]:
 
     for reason, text in TEXT.items():
         if reason not in (EndReason.NONE, EndReason.COMPLETED):
-            yield _name(reason.name), f"end of a run: {text}"
+            yield slug(reason.name), f"end of a run: {text}"
 
 
 def _qualities() -> Iterator[tuple[str, str]]:
@@ -47,10 +47,11 @@ def _errors() -> Iterator[tuple[str, str]]:
 
     for name in errors.__all__:
         error = getattr(errors, name)
-        if isinstance(error, type):
+        if isinstance(error, type) and error not in (errors.RigError, errors.DaqError):
             line = " ".join(str(error.__doc__).partition("\n\n")[0].split())
-            yield re.sub(r"(?<=[a-z])(?=[A-Z])", "-", name).lower(), f"error: {line}"
+            yield slug(name), f"error: {line}"
 
 
-def _name(name: str) -> str:
-    return name.lower().replace("_", "-")
+def slug(name: str) -> str:
+    """Return the name of a message in small letters with hyphens: ``daq-timeout`` for ``DaqTimeout``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])|_", "-", name).lower()

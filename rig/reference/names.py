@@ -32,4 +32,4 @@ def name_entries() -> Iterator[Entry]:
 def first_line(thing: object) -> str:
     """Return the first paragraph of a docstring in one line; empty for a value without a docstring of its own."""
     text = getattr(thing, "__doc__", None) if isinstance(thing, type) or callable(thing) else None
-    return " ".join((text or "").partition("\n\n")[0].split())
+    return " ".join((text or "").partition("\n\n")[0].replace("``", "`").split())
