@@ -14,7 +14,6 @@ version = release = __version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "reference",
     "sphinx_copybutton",
@@ -32,7 +31,6 @@ napoleon_use_rtype = False
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
-autosummary_generate = False
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
 toc_object_entries = False

@@ -6,9 +6,11 @@
 - ``{error-tree} rig.errors.RigError``: an error and those derived from it
 """
 
+import inspect
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 from docutils import nodes
@@ -22,7 +24,7 @@ from rig.reference.commands import command_entries, commands_of, option_names
 from rig.reference.entry import Entry
 from rig.reference.keys import key_entries, keys_of, tables
 from rig.reference.messages import PAGES, message_entries, slug
-from rig.reference.names import first_line, name_entries
+from rig.reference.names import documentation, first_line, name_entries
 from rig.reference.words import words_of, write_words
 
 COMMANDS = {command.name: command for command in commands_of(get_command(command_line))}
@@ -103,9 +105,12 @@ class Names(Generated):
         """Return what autodoc makes of the names."""
         module, names = self.arguments[0], [line.strip() for line in self.content if line.strip()]
         lines = ["````{eval-rst}", f".. currentmodule:: {module}", ""]
-        lines += [".. autosummary::", "   :nosignatures:", "", *(f"   {name}" for name in names), ""]
+        lines += [".. list-table::", "   :widths: 30 70", ""]
         for name in names:
-            lines += _documented(f"{module}.{name}", getattr(import_module(module), name))
+            lines += [f"   * - :py:obj:`{name} <{module}.{name}>`", f"     - {first_line(module, name)}"]
+        lines += [""]
+        for name in names:
+            lines += _documented(module, name)
         return self.parsed([*lines, "````"])
 
 
@@ -120,18 +125,24 @@ class ErrorTree(Generated):
     def _branch(self, error: type, indent: str) -> Iterator[str]:
         page = f"{PAGES}/{slug(error.__name__)}"
         more = f" ([what to do](/{page}.md))" if page in self.env.found_docs else ""
-        yield f"{indent}- {{py:exc}}`{error.__name__} <{error.__module__}.{error.__name__}>`: {first_line(error)}{more}"
+        name, module = error.__name__, error.__module__
+        yield f"{indent}- {{py:exc}}`{name} <{module}.{name}>`: {first_line(module, name)}{more}"
         for one in error.__subclasses__():
             if one.__module__ == error.__module__:
                 yield from self._branch(one, f"{indent}  ")
 
 
-def _documented(name: str, thing: object) -> list[str]:
+def _documented(module: str, name: str) -> list[str]:
+    thing = getattr(import_module(module), name)
+    full = f"{module}.{name}"
     if isinstance(thing, type) and issubclass(thing, Exception):
-        return [f".. autoexception:: {name}", "   :show-inheritance:", ""]
+        return [f".. autoexception:: {full}", "   :show-inheritance:", ""]
     if isinstance(thing, type):
-        return [f".. autoclass:: {name}", "   :members:", "   :exclude-members: model_config, model_post_init", ""]
-    return [f".. auto{'function' if callable(thing) else 'data'}:: {name}", ""]
+        return [f".. autoclass:: {full}", "   :members:", "   :exclude-members: model_config, model_post_init", ""]
+    if inspect.isroutine(thing):
+        return [f".. autofunction:: {full}", ""]
+    value = [f"   :value: {thing!r}"] if isinstance(thing, int | str) else []
+    return [f".. py:data:: {name}", *value, "", *indent(documentation(module, name), "   ").splitlines(), ""]
 
 
 def _without_fields(app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str, returns: str) -> Any:

@@ -78,9 +78,9 @@ class Plan(Configured):
     kind: str
     """Kind of campaign."""
     description: str = ""
-    """Purpose of the plan."""
+    """Purpose of the plan, shown by ``rig list``."""
     bench: str = Field(min_length=1)
-    """Name of a shipped bench or a TOML file."""
+    """Name of a shipped bench, or a TOML file, which is looked for beside the plan."""
     retries: int = Field(2, ge=0, le=20)
     """How often a point is measured again, at most, that was refused for something that passes: held outputs, lost samples, a
     disturbance of the vibration."""
@@ -173,7 +173,8 @@ class OpenLoopPlan(Plan):
     """Base of the plans without phase feedback: the plan prescribes the frequency."""
 
     controller: OpenLoop = Field(OpenLoop(), validation_alias=AliasChoices("controller", "demodulation"))
-    """Demodulation of force and response, and the loops that hold levels in newtons or metres."""
+    """Demodulation of force and response, and the loops that hold levels in newtons or metres. It may also be called
+    ``demodulation``."""
 
     @property
     def law(self) -> Law:
