@@ -76,7 +76,7 @@ app.command()(show)
 app.command("plot")(plot_)
 app.command("report")(report_)
 app.command()(doctor)
-app.command()(docs)
+app.command(context_settings={"ignore_unknown_options": True})(docs)  # an option may be the word
 app.command("watch")(watch_)
 app.command("replay")(replay_)
 app.command()(stop)

@@ -19,6 +19,7 @@ BUILD = (
 
 
 def docs(
+    context: typer.Context,
     word: Annotated[
         list[str] | None,
         typer.Argument(help="Command, key, message, public name or title of a page; default: the home page."),
@@ -35,7 +36,7 @@ def docs(
         print(_address(folder, "index.html"))
         _open(folder, "index.html")
         return
-    words = read_words(folder) if folder else known_words(_command_line())
+    words = read_words(folder) if folder else known_words(context.find_root().command)
     hits = found(words, asked)
     if not hits:
         near = ", ".join(closest(words, asked))
@@ -71,11 +72,3 @@ def _open(folder: Path, url: str) -> None:
 def _address(folder: Path, url: str) -> str:
     page, hash_, place = url.partition("#")
     return f"{(folder / page).as_uri()}{hash_}{place}"
-
-
-def _command_line() -> object:
-    from typer.main import get_command
-
-    from rig.cli.app import app
-
-    return get_command(app)

@@ -95,10 +95,11 @@ def found(words: Words, word: str) -> list[Hit]:
 
 
 def closest(words: Words, word: str, count: int = 5) -> list[str]:
-    """Return the known words nearest to one that is not known: those that contain it, then those that are spelled alike."""
+    """Return full names of what is nearest to a word that is not known: it contains the word, or is spelled alike."""
     wanted = _plain(word)
     inside = sorted((known for known in words if wanted in known and "." not in known), key=len)
-    return list(dict.fromkeys([*inside, *get_close_matches(wanted, words, count)]))[:count]
+    near = dict.fromkeys([*inside, *get_close_matches(wanted, words, count)])
+    return list(dict.fromkeys(words[known][0].title for known in near))[:count]
 
 
 def _plain(word: str) -> str:

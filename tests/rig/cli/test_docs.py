@@ -80,7 +80,7 @@ def test_alone_it_opens_the_home_page(folder, opened, monkeypatch, capsys):
 def test_an_unknown_word_is_one_line_with_the_closest(folder, opened, monkeypatch, capsys):
     status, _, err = run(monkeypatch, capsys, "phse_deg")
     assert (status, opened) == (1, [])
-    assert err == "rig: WORD = 'phse_deg': nothing of this name; closest: phase-deg, settle.phase-deg\n"
+    assert err == "rig: WORD = 'phse_deg': nothing of this name; closest: settle.phase_deg\n"
 
 
 @pytest.mark.parametrize("setting", [("SSH_CONNECTION", "10.0.0.1"), ("DISPLAY", "")])
@@ -98,6 +98,7 @@ def test_without_a_screen_the_address_is_printed_and_nothing_opened(folder, open
     [
         ("settle.average_periods", "default `10`, allowed: 1 to 64"),
         ("rig stop", "Ramp runs down"),
+        ("--override-rehearsal", "rig run --override-rehearsal (option)"),
         ("identification.linear_modes", "Identify linear modes"),
         ("force-limit", "force above its limit"),
     ],
