@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from textwrap import indent
-from typing import Any
+from typing import Any, ClassVar
 
 from docutils import nodes
+from docutils.parsers.rst import directives
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -100,15 +101,17 @@ class Names(Generated):
     """Public names of a module: a table with a line each, then each in full."""
 
     has_content = True
+    option_spec: ClassVar = {"no-summary": directives.flag}
 
     def run(self) -> list[nodes.Node]:
         """Return what autodoc makes of the names."""
         module, names = self.arguments[0], [line.strip() for line in self.content if line.strip()]
         lines = ["````{eval-rst}", f".. currentmodule:: {module}", ""]
-        lines += [".. list-table::", "   :widths: 30 70", ""]
-        for name in names:
-            lines += [f"   * - :py:obj:`{name} <{module}.{name}>`", f"     - {first_line(module, name)}"]
-        lines += [""]
+        if "no-summary" not in self.options:
+            lines += [".. list-table::", "   :widths: 30 70", ""]
+            for name in names:
+                lines += [f"   * - :py:obj:`{name} <{module}.{name}>`", f"     - {first_line(module, name)}"]
+            lines += [""]
         for name in names:
             lines += _documented(module, name)
         return self.parsed([*lines, "````"])

@@ -47,6 +47,7 @@ CAN = {
     "msgpack",
     "packaging",
     "asyncio",
+    "yaml",  # loaded by python-can where it is installed
 }
 DRIVERS = {"numpy", "pydantic", "simulators", "serial", "cobs"} | CAN | NUMBA  # whose options a schema describes
 
