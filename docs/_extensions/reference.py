@@ -8,6 +8,7 @@
 
 import inspect
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from textwrap import indent
@@ -179,7 +180,8 @@ def _site_entries(app: Sphinx) -> Iterator[tuple[Entry, str]]:
         elif entry.target in python:
             yield entry, f"{address(python[entry.target].docname)}#{python[entry.target].node_id}"
         elif entry.target in app.env.found_docs:
-            yield entry, address(entry.target)
+            title = app.env.titles[entry.target].astext()
+            yield replace(entry, words=(*entry.words, title)), address(entry.target)
         elif entry.what == "message":
             yield entry, ""
     known = {entry.target for entry in entries}
@@ -204,6 +206,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Add directives, kinds of objects and the list of words."""
     for kind in ("key", "table", "command"):
         app.add_object_type(kind, kind, objname=kind)
+    app.registry.domain_object_types["std"]["table"].attrs["searchprio"] = 0  # before the keys that hold the table
     app.add_directive("keys", Keys)
     app.add_directive("command-help", CommandHelp)
     app.add_directive("names", Names)

@@ -97,7 +97,7 @@ class Arming(Configured):
     """Who may arm a bench on which something physical moves."""
 
     automated: bool = False
-    """Whether the bench arms itself: one that nobody stands beside, made for it."""
+    """Whether the bench arms itself; only for a bench that was made to run without a person beside it."""
     check_valid_h: float = Field(24.0, gt=0, le=8760)
     """Age up to which a check counts, h."""
     require_check: bool = True

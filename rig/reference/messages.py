@@ -15,41 +15,42 @@ PAGES = "reference/messages"
 
 
 def message_entries() -> Iterator[Entry]:
-    """Yield an entry for every message; a name that is both a reason and a quality has one entry."""
-    lines: dict[str, list[str]] = {}
-    for name, line in (*_end_reasons(), *_qualities(), *_errors()):
-        lines.setdefault(name, []).append(line)
+    """Yield an entry for every message, found by its name and its text; a reason that is also a quality has one entry."""
+    lines: dict[str, list[tuple[str, str]]] = {}
+    for name, what, text in (*_end_reasons(), *_qualities(), *_errors()):
+        lines.setdefault(name, []).append((what, text))
     for name, texts in lines.items():
-        words = (name, name.replace("-", "_"), name.replace("-", " "))
-        yield Entry("message", name, tuple(dict.fromkeys(words)), "; ".join(dict.fromkeys(texts)), f"{PAGES}/{name}")
+        words = (name, *(text.rstrip(".") for _, text in texts))
+        line = "; ".join(f"{what}: {text}" for what, text in texts)
+        yield Entry("message", name, tuple(dict.fromkeys(words)), line, f"{PAGES}/{name}")
 
 
-def _end_reasons() -> Iterator[tuple[str, str]]:
+def _end_reasons() -> Iterator[tuple[str, str, str]]:
     from rig.tick.safety.layout import TEXT, EndReason
 
     for reason, text in TEXT.items():
         if reason not in (EndReason.NONE, EndReason.COMPLETED):
-            yield slug(reason.name), f"end of a run: {text}"
+            yield slug(reason.name), "end of a run", text
 
 
-def _qualities() -> Iterator[tuple[str, str]]:
+def _qualities() -> Iterator[tuple[str, str, str]]:
     from rig.campaigns.evaluation.point import Quality
     from vibrolock.described import attribute_docstrings
 
     texts = attribute_docstrings(Quality.__module__)["Quality"]
     for quality in Quality:
         if quality is not Quality.GOOD:
-            yield quality.value, f"quality of a point: {texts[quality.name]}"
+            yield quality.value, "quality of a point", texts[quality.name]
 
 
-def _errors() -> Iterator[tuple[str, str]]:
+def _errors() -> Iterator[tuple[str, str, str]]:
     from rig import errors
 
     for name in errors.__all__:
         error = getattr(errors, name)
         if isinstance(error, type) and error not in (errors.RigError, errors.DaqError):
             line = " ".join(str(error.__doc__).partition("\n\n")[0].split())
-            yield slug(name), f"error: {line}"
+            yield slug(name), "error", line
 
 
 def slug(name: str) -> str:

@@ -12,7 +12,7 @@ __all__ = ["MODULES", "documentation", "first_line", "name_entries", "public_nam
 
 MODULES = (
     "rig", "rig.bench", "rig.conformance", "rig.daq", "rig.drivers", "rig.errors", "rig.measurements",
-    "controller", "simulators", "simulators.analysis", "simulators.ensemble", "identification", "vibrolock",
+    "controller", "simulators", "simulators.analysis", "simulators.ensemble", "identification",
 )  # fmt: skip
 """Packages and modules whose names are public."""
 

@@ -62,6 +62,7 @@ def test_the_code_knows_commands_options_keys_messages_and_names():
         "not-settled": "message",
         "daq-timeout": "message",
         "force limit": "message",
+        "phase lock lost": "message",
         "identification.linear_modes": "name",
     }.items():
         assert what in {hit.what for hit in found(words, word)}, word
