@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, get_args
 
-from pydantic import BaseModel
+from pydantic import AliasChoices, BaseModel
 
 from rig.reference.entry import Entry
 
@@ -220,9 +220,15 @@ def key_entries() -> Iterator[Entry]:
         yield Entry("table", name, tuple(dict.fromkeys((name, name.replace("-", "_")))), line, f"keys-{name}")
         for key in keys_of(name):
             full = f"{name}.{key.name}"
-            words = (full,) if key.name in key.holds else (key.name, full)
+            words = (full,) if key.name in key.holds else (key.name, full, *_other_names(model, key.name))
             facts = ", ".join(text for text in (_said(key.default), f"allowed: {key.allowed}") if text)
             yield Entry("key", full, words, key.meaning, key.anchor, facts)
+
+
+def _other_names(model: type[BaseModel], name: str) -> list[str]:
+    """Return further names that a key may have in a file."""
+    choices = model.model_fields[name].validation_alias
+    return [str(one) for one in choices.choices if one != name] if isinstance(choices, AliasChoices) else []
 
 
 def _said(default: str) -> str:

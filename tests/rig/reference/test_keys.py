@@ -86,3 +86,7 @@ def test_a_default_is_one_that_the_model_takes():
 def test_a_word_means_the_table_and_not_the_key_that_holds_it():
     found = [entry for entry in key_entries() if "settle" in entry.words]
     assert [entry.what for entry in found] == ["table"]
+
+
+def test_a_key_is_found_by_the_other_name_that_it_may_have_in_a_file():
+    assert "stepped-sine.controller" in {entry.title for entry in key_entries() if "demodulation" in entry.words}
