@@ -1,4 +1,22 @@
-"""The control law of a phase-locked vibration test: numbers in, numbers out. The names below are imported on first use."""
+"""The control law of a phase-locked vibration test: numbers in, numbers out, no files and no clock.
+
+First::
+
+    from controller import preset
+
+    loop = preset("magnet-beam")
+    print(loop.detector, loop.k1, loop.k2)
+
+Names, of which ``help(controller.Law)`` and so on say more:
+
+    PhaseLockedLoop, OpenLoop   the tables `[controller]` of plans
+    LockRule, preset            when a lock counts as gained or lost; gains of the paper
+    Law, control_state          all parameters of the law in one record, and its state in another
+    Detector, FrequencyLaw, AmplitudeLaw, ForceLoop, LockState    its parts
+
+The kernels that step the law stand in the modules of its parts: ``controller.detector.detect``, ``controller.frequency.follow``
+and so on.
+"""
 
 from typing import TYPE_CHECKING
 

@@ -73,13 +73,13 @@ class DetectorSettings(Settings):
 
     detector: Literal["two-phase", "sign", "adaptive"] = "two-phase"
     """``two-phase`` (reading B of the paper's controller), ``sign`` (reading A) or ``adaptive``: an adaptive filter, which
-    takes harmonics and mean out and so may be ten times as quick."""
+    removes harmonics and mean and can therefore be ten times as fast."""
     low_pass_rad_s: float = Field(2.0 * math.pi, gt=0, le=1e4)
     """a, w_LP: corner of the demodulation's first-order low-pass, rad/s."""
     harmonics_followed: int = Field(5, ge=1, le=MOST_HARMONICS)
-    """Harmonics of the adaptive filter; what is above makes ripple."""
+    """Harmonics that the adaptive filter follows; higher ones appear as ripple of the phase."""
     mean_corner_hz: float = Field(0.3, gt=0, le=100)
-    """Corner of the high-pass that takes the mean out of every input before it is demodulated, Hz."""
+    """Corner of the high-pass that removes the mean from every input before it is demodulated, Hz."""
 
     def build_detector(self, sample_rate_hz: float) -> np.ndarray:
         """One record of `DETECTOR`; ValueError where the filter is too quick for the sample rate."""

@@ -59,7 +59,7 @@ class ForceSettings(Settings):
     k3: float = Field(0.0, ge=0, le=1e4)
     """K3 of the paper: proportional gain of the linear force loop, V/N."""
     k4: float = Field(0.0, ge=0, le=1e4)
-    """K4 of the paper: integral gain of the linear force loop, V/(N s)."""
+    """K4 of the paper: integral gain of the linear force loop, V/(N s); above 0 where the loop holds a level."""
     force_proportional: float = Field(0.3, ge=0, le=100)
     """Proportional gain of the logarithmic force loop, ln V per ln N."""
     force_integral_per_s: float = Field(2.0, gt=0, le=1e4)

@@ -67,22 +67,26 @@ class FrequencySettings(Settings):
     frequency_law: Literal["phase", "frequency-error"] = "phase"
     """What the frequency follows: the phase error, or the frequency error computed from it."""
     k1: float = Field(0.0, ge=0, le=1e4)
-    """K1 of the paper: proportional gain in 1/s (two-phase, adaptive), corner of the PI law in rad/s (sign)."""
+    """K1 of the paper: proportional gain in 1/s (two-phase, adaptive), corner of the PI law in rad/s (sign). Must be given
+    with the law ``phase``."""
     k2: float = Field(0.0, ge=0, le=1e6)
-    """K2 of the paper: integral gain in 1/s^2 (two-phase, adaptive), gain of the low-pass in rad/s (sign)."""
+    """K2 of the paper: integral gain in 1/s^2 (two-phase, adaptive), gain of the low-pass in rad/s (sign). Must be given with
+    the law ``phase``."""
     frequency_proportional: float = Field(0.0, ge=0, le=100)
     """Proportional gain of the frequency error, 1."""
     frequency_integral_per_s: float = Field(0.0, ge=0, le=1e4)
-    """Integral gain of the frequency error, 1/s; w_LP/12 to w_LP/8 are good values."""
+    """Integral gain of the frequency error, 1/s, above 0 with ``frequency-error``; w_LP/12 to w_LP/8 are good values."""
     drive_mode_shape: float | None = Field(None, gt=0)
-    """Mass-normalised mode shape at the drive point for the frequency error, kg^-1/2; the bench's if not given. It may be wrong
-    by a factor of 1.5."""
+    """Mass-normalised mode shape at the drive point for the frequency error, kg^-1/2; by default that of the plan's
+    ``[plant]``, else the bench's. It may be wrong by a factor of 1.5."""
     centre_frequency_hz: float = Field(gt=0, le=1e5)
-    """omega_m / 2 pi: frequency at which the loop starts, Hz."""
+    """omega_m / 2 pi: frequency at which the loop starts, Hz, inside the window."""
     frequency_window_hz: tuple[float, float]
-    """Lowest and highest frequency the loop may take, Hz."""
+    """Lowest and highest frequency the loop may take, Hz. It keeps the loop off other modes, which look the same to a phase
+    detector."""
     phase_lag_deg: float = Field(-90.0, ge=-180, le=180)
-    """Wanted lag of the drive-point acceleration behind the force, deg; -90 is phase resonance."""
+    """Wanted lag of the drive-point acceleration behind the force, deg; -90 is phase resonance. The ``sign`` detector knows
+    -90 only; the frequency error stays 5 deg off 0 and 180."""
     period_mean: bool = False
     """Whether the frequency follows the mean of the phase error over the last whole period, instead of every sample of it:
     the detector's ripple then no longer modulates the output, whose harmonics change those of the force."""

@@ -42,10 +42,10 @@ class ResponseSettings(Settings):
     response_loop: Literal["complex", "amplitude"] = "complex"
     """Whether the response's loop holds amplitude and phase (``complex``) or the amplitude alone."""
     response_integral_per_s: float = Field(0.0, ge=0, le=1e4)
-    """K: integral gain of the response's loop, 1/s; 0 where there is none."""
+    """K: integral gain of the response's loop, 1/s; above 0 where the loop holds a level."""
     plant_pole_rad_s: tuple[float, float] | None = None
     """p: real and imaginary part of the plant's pole (voltage to response) less i times the locked frequency, rad/s. It sets
-    the proportional gain K/(-p), which cancels it; without, the loop is integral alone."""
+    the proportional gain K/(-p), which cancels the pole; without it the loop has integral gain alone."""
     plant_gain_per_v: tuple[float, float] | None = None
     """Real and imaginary part of the drive point's acceleration over the output, m/s^2 per V, at the lock at which
     `plant_pole_rad_s` holds. With it the proportional gain follows the pole as this ratio changes with the level."""

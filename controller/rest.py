@@ -27,12 +27,12 @@ class RestSettings(Settings):
     """Whether the laws use the steady force instead of the measured force."""
 
     rest_low_pass_rad_s: float = Field(0.0, ge=0, le=1e4)
-    """Where above 0, frequency error and force through response go by the force that is left once the response keeps still:
-    the part that changes it is taken out, with this corner for its rate of change, rad/s; w_LP is a good value. Neither then
-    waits for the structure."""
+    """Above 0: the part of the force that changes the response is computed from the response's rate of change and subtracted.
+    Frequency error and force through response then use the force of the steady vibration and need not wait for the structure.
+    This is the corner of the low-pass for the rate of change, rad/s; w_LP is a good value."""
     rest_share: float = Field(0.8, ge=0, le=1)
-    """Part of that force which is taken out; what is left is room for a mode shape that is too small, with which the level
-    runs away. Too large a mode shape only slows the loops down."""
+    """Share of that part which is subtracted. With a mode shape that is too small too much would be subtracted, and the level
+    would run away; what is left out is the margin. A mode shape that is too large only slows the loops down."""
 
     def build_rest(self, sample_rate_hz: float, drive_mode_shape: float | None) -> np.ndarray:
         """Return one record of `REST`; raise ValueError if the mode shape (kg^-1/2) is needed and missing."""

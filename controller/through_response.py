@@ -40,7 +40,8 @@ class ThroughResponseSettings(Settings):
     """How a force is held through the response."""
 
     reference_integral_per_s: float = Field(0.0, ge=0, le=1e4)
-    """Gain from the logarithm of the active force ratio to that of the response's level, 1/s."""
+    """r: gain from the logarithm of the active force ratio to that of the response's level, 1/s; above 0 with
+    ``through-response``."""
 
     def build_reference(self, dt_s: float, follows_slope: bool) -> np.ndarray:
         """Return one record of `REFERENCE`."""

@@ -1,10 +1,12 @@
 """How the documentation site is built: ``sphinx-build -W --keep-going docs rig/site``. Needs the extra ``docs``, no network."""
 
+import sys
 from pathlib import Path
 
 from vibrolock import __version__
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_extensions"))
 
 project = "vibrolock"
 author = "The vibrolock developers"
@@ -12,24 +14,32 @@ version = release = __version__
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "reference",
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["driver-template", "_build"]
+exclude_patterns = ["driver-template", "_build", "_extensions"]
 
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_block", "substitution"]
 myst_heading_anchors = 5
 
 nitpicky = False
-autodoc_typehints = "description"
+default_role = "py:obj"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
+python_maximum_signature_line_length = 88
+python_use_unqualified_type_names = True
+toc_object_entries = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"vibrolock {release}"
-html_static_path = ["_static"]
 html_theme_options = {
     "show_nav_level": 2,
+    "show_toc_level": 2,
     "navigation_with_keys": False,
     "show_prev_next": True,
     "navbar_align": "left",

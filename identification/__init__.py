@@ -1,6 +1,48 @@
-"""Identify models of nonlinear modes from measurements, predict responses with them and score the predictions.
+"""Measurements in memory become models, and models become predictions. No files, no figures.
 
-The names below are imported on first use, so that importing the package costs nothing.
+First::
+
+    import identification
+    import rig
+
+    backbone = rig.run("magnet-beam/backbone").backbone()
+    mode = identification.nonlinear_mode(backbone)
+    curve = identification.frequency_response(mode, force_n=0.1)
+
+Names by topic; ``help(identification.linear_modes)`` says more of one, ``rig docs linear_modes`` opens its page:
+
+Measurements
+    PeriodicVibration, Channel, Backbone, FrequencyResponse, pack_frequency_responses, unpack_frequency_responses,
+    IdentificationError
+Signals
+    periodic_vibration, demodulate, Transient, zero_crossings, HalfPeriods, decimated, force_drop_out, ForceDropOut
+Multisine
+    MultisineDesign, periodic_spectra, PeriodicSpectra, InstrumentResponse, best_linear_approximation, coherence,
+    distortion_levels, DistortionLevels
+Linear modes
+    linear_modes, LinearModes, ModalAnalysis, FrequencyResponseMatrix, stabilisation, StabilisationDiagram,
+    extrapolated_to_zero, fit_state_space, StateSpaceFit, subspace, StateSpace, ModeShapes, mac, mac_matrix
+Nonlinear modes
+    nonlinear_mode, NonlinearMode, single_point_mode, stepped_sine_mode, repeatability, Repeatability, combined
+Short points and continuous backbones
+    slow_flow, SlowFlow, short_point, ShortPoint, continuous_backbone, ContinuousBackbone
+Response-controlled tests
+    force_surface, ForceSurface, ConstantForceCurve
+Prediction with nonlinear modes
+    frequency_response, steady_predictions, SteadyPrediction, Predictions, ModalProperties, ExtrapolationError,
+    response_band, ResponseBand, identify_exciter, Exciter, VoltagePath, predict_sweep, VoltageSweep,
+    SweepPrediction, compare_sweep, compare, Comparison, PredictionError, error_table, recorded_force_response
+Nonlinear state-space models (PNLSS)
+    identify_pnlss, PnlssModel, Experiment, FitSettings, FitProgress, Features, linear_pnlss, best_linear_responses,
+    fit_pnlss, PnlssFit, FitHistory, Simulation
+Responses and errors of PNLSS models
+    pnlss_frequency_response, pnlss_response, pnlss_steady_state, PnlssResponse, SteadyStates, pnlss_coupled_run,
+    CoupledRun, simulated_run, SimulatedRun, estimated_initial_state, pnlss_errors, PnlssErrors, error_spectra,
+    ErrorSpectra, ErrorTable, identify_many, ModelJob, IdentifiedModel, realisation_combinations
+Measurements of others
+    map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
+    MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
+    ResponseMatrixMapping
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,23 @@
-"""The bench: drivers, the loop, campaigns, recordings, figures and the command line.
+"""The bench: carry out vibration tests, read their recordings, draw them.
 
-`run` carries out a plan, `resume` finishes an interrupted one, `Recording` opens a file. The names are imported on
-first use, so that the command line starts at once.
+First::
+
+    import identification
+    import rig
+
+    run = rig.run("magnet-beam/backbone")    # a shipped plan on a virtual rig
+    mode = identification.nonlinear_mode(run.backbone())
+    print(mode.modal_frequency_hz, mode.damping_ratio)
+
+Names, of which ``help(rig.run)`` and so on say more:
+
+    run, resume             carry out a plan; finish one that was interrupted
+    Run, Recording          a run with its points and measurements; a file, opened
+    load_plan, load_bench   a plan, a bench from its name or TOML file
+    Bench                   driver, channels, limits and specimen
+
+Further on: `rig.measurements` (recordings as measurements), `rig.daq` and `rig.conformance` (drivers), `rig.errors`.
+The command line is `rig`; ``rig docs NAME`` opens the page of a name, a key or a command.
 """
 
 from typing import TYPE_CHECKING

@@ -47,7 +47,8 @@ class Exciter(Part):
     droop_per_m: Annotated[float, Field(ge=-1e4, le=1e4)] = 0.0
     """Slope b_1 of the force factor over the armature's position (1/m)."""
     droop_per_m2: Annotated[float, Field(ge=-1e8, le=1e8)] = 0.0
-    """Curvature b_2 of it (1/m^2); negative where the coil leaves the gap on either side."""
+    """Curvature b_2 of the force factor over the armature's position (1/m^2); negative where the coil leaves the gap on
+    either side."""
     resistance_ohm: NotNegative
     """Resistance R of coil, cable and amplifier together."""
     inductance_h: Positive

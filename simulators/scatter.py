@@ -46,19 +46,19 @@ class Scatter(Part):
     """Relative standard deviations; what scatters is multiplied by ``exp(s z)`` with a standard normal z each."""
 
     frequency: Relative = 0.0
-    """Of each natural frequency of the structure, from run to run."""
+    """Relative standard deviation of each natural frequency of the structure, from run to run."""
     damping: Relative = 0.0
-    """Of each modal damping ratio, from run to run."""
+    """Relative standard deviation of each modal damping ratio, from run to run."""
     assembly: Annotated[int, Field(ge=0)] = 0
     """Which assembly of the specimen this is; 0 is the nominal one."""
     joint_stiffness: Relative = 0.0
-    """Of the stiffness of each friction joint, from assembly to assembly."""
+    """Relative standard deviation of the stiffness of each friction joint, from assembly to assembly."""
     joint_slip: Relative = 0.0
-    """Of the slip deflections of each friction joint, from assembly to assembly."""
+    """Relative standard deviation of the slip deflections of each friction joint, from assembly to assembly."""
     magnet_strength: Relative = 0.0
-    """Of the constant of each magnet, from assembly to assembly."""
+    """Relative standard deviation of the constant of each magnet, from assembly to assembly."""
     magnet_gap: Relative = 0.0
-    """Of the gap of each magnet, from assembly to assembly."""
+    """Relative standard deviation of the gap of each magnet, from assembly to assembly."""
 
     @property
     def run_scatters(self) -> bool:

@@ -37,7 +37,7 @@ class VirtualRig(Part):
     specimen: str | None = None
     """Shipped specimen that the other tables change: magnet-beam, magnet-beam-symmetric or friction-beam."""
     provenance: dict[str, str] = Field(default_factory=dict)
-    """Which of the numbers are published, calibrated, chosen, unverified; carried along, not used."""
+    """Which of the numbers are published, calibrated, chosen or unverified; for the record."""
     structure: Structure
     """The vibrating structure."""
     elements: Several[Element] = ()
@@ -59,7 +59,7 @@ class VirtualRig(Part):
     wear: Wear = Wear()
     """How the modes of the specimen change within a run; nothing does by default."""
     noise_scale: Annotated[float, Field(ge=0.0)] = 1.0
-    """Multiplies the noise of every sensor; 0 for none, 10 for a bad day."""
+    """Factor on the noise of every sensor; 0 for none."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of noise and scatter."""
 

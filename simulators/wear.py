@@ -34,9 +34,9 @@ class Wear(Part):
     damping_per_s: Several[Rate] = ()
     """Relative change of each modal damping ratio per second (1/s); one value per mode, one for all, or empty for none."""
     until_s: Positive | None = None
-    """When it ends; from then on everything stays as it is. Required where a rate is below 0."""
+    """Time at which the wear ends; the modes then stay as they are. Required where a rate is below 0."""
     every_s: Positive = 1.0
-    """How long the plant is held before that of a later time takes its place, rounded to whole samples."""
+    """Interval at which the plant is updated, rounded to whole samples."""
 
     @model_validator(mode="after")
     def _something_is_left(self) -> "Wear":

@@ -120,7 +120,7 @@ def test_new_files_and_shipped_ones_come_from_the_wheel(empty, tmp_path):
     assert (tmp_path / "box" / "vibrolock_box" / "driver.py").exists()
     _in(empty, tmp_path, "rig", "new", "rig", "-o", "mine.toml")
     schema = json.loads((tmp_path / "bench.schema.json").read_text(encoding="utf-8"))
-    assert schema["properties"]["name"]["description"] == "Name, used in plan names and files."
+    assert schema["properties"]["name"]["description"] == "Name, used in messages and files."
 
 
 def test_the_version_and_the_licence_are_those_of_the_citation():

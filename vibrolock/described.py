@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, GetJsonSchemaHandler
 
-__all__ = ["Described"]
+__all__ = ["Described", "attribute_docstrings"]
 
 
 class Described(BaseModel):
@@ -25,15 +25,15 @@ class Described(BaseModel):
         made = handler(core_schema)
         fields = handler.resolve_ref_schema(made).get("properties", {})
         for base in cls.__mro__[: cls.__mro__.index(BaseModel)]:
-            for name, text in _docstrings(base.__module__).get(base.__qualname__, {}).items():
+            for name, text in attribute_docstrings(base.__module__).get(base.__qualname__, {}).items():
                 if name in fields:
                     fields[name].setdefault("description", text)
         return made
 
 
 @cache
-def _docstrings(module: str) -> dict[str, dict[str, str]]:
-    """Return the docstrings under the annotated names of each class of a module; none if there is no source."""
+def attribute_docstrings(module: str) -> dict[str, dict[str, str]]:
+    """Return the docstrings under the names that each class of a module binds, by class and name; none without source."""
     try:
         tree = ast.parse(inspect.getsource(import_module(module)))
     except (ImportError, OSError, TypeError):
@@ -45,6 +45,9 @@ def _described(body: list[ast.stmt]) -> list[tuple[str, str]]:
     found = []
     for pair in pairwise(body):
         match pair:
-            case (ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(text)))):
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)) | ast.Assign(targets=[ast.Name(id=name)]),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
                 found.append((name, inspect.cleandoc(text)))
     return found

@@ -18,6 +18,9 @@ def on_use(package: str, module_of: Mapping[str, str]) -> tuple[Callable[[str], 
             from controller.law import Law
         else:
             __getattr__, __dir__ = on_use(__name__, {"Law": "law"})
+
+    ``help`` of such a package prints its docstring, which is therefore where the names are introduced. `pydoc` finds what it
+    prints by `inspect.getmembers`, which would import every name; all classes in full are 8500 lines for ``identification``.
     """
 
     def get(name: str) -> Any:
@@ -28,6 +31,8 @@ def on_use(package: str, module_of: Mapping[str, str]) -> tuple[Callable[[str], 
         return value
 
     def names() -> list[str]:
-        return sorted({*vars(sys.modules[package]), *module_of})
+        own = vars(sys.modules[package]).keys() - module_of.keys()
+        for_inspect = sys._getframe(1).f_globals.get("__name__") == "inspect"
+        return sorted(own if for_inspect else {*own, *module_of})
 
     return get, names

@@ -31,6 +31,7 @@ __all__ = ["Estimator", "chosen", "estimated_responses"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 Estimator = Literal["instrument", "H1", "H2"]
+"""How a frequency response is estimated: with the generator's signal as instrument, or as H1 or H2."""
 
 _DEPENDENT = 1e-9  # smallest singular value of S_UZ, scaled to a unit diagonal, below which only rounding is left
 _SILENT = 1e-12  # amplitude against the strongest line

@@ -76,9 +76,12 @@ class NonlinearMode:
         float[n], MAC of the fundamental of the deflection shape against the linear one.
     force_purity, response_purity
         float[n], ``|Y_1| / sqrt(sum_{h>=1} |Y_h|^2)`` of the force and of the drive-point displacement.
-    force_std_n, amplitude_std_m, phase_lag_std_deg, damping_ratio_total_power_std, modal_amplitude_std,
-    apparent_mass_std_kg, mac_std, force_purity_std, response_purity_std
+    force_std_n, amplitude_std_m, phase_lag_std_deg
         float[n], standard errors of the quantities of these names, from all known sources of error.
+    damping_ratio_total_power_std, modal_amplitude_std, apparent_mass_std_kg
+        float[n], likewise.
+    mac_std, force_purity_std, response_purity_std
+        float[n], likewise.
     systematic_std
         float[n, n_quantities], the part of the standard errors that is common to all points (shapes, calibration), in the
         order of `QUANTITIES`; more points do not reduce it. See `systematic`.

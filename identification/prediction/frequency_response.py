@@ -43,7 +43,7 @@ def frequency_response(
     force_n
         Held force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``.
     force
-        Quantity that is constant. ``fundamental``: |F_1| is held, and the force has the harmonics that the exciter caused
+        Quantity that is constant. ``fundamental``: ``|F_1|`` is held, and the force has the harmonics that the exciter caused
         when the mode was identified; their power is included in the damping. ``rms``: the RMS of such a force is held; the
         ratio of fundamental to RMS recorded at phase resonance is interpolated over q, and a note states this. ``pure-sine``:
         a force without harmonics, with the damping from the total power.

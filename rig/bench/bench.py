@@ -30,26 +30,29 @@ class DriverChoice(Configured):
     """Which driver stands between the loop and the rig."""
 
     name: str = Field(min_length=1)
-    """Name of the driver's entry point, for instance ``virtual``."""
+    """Name of the driver, for instance ``virtual``; ``rig list`` shows those that are installed."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """What this driver wants to know; the driver checks it."""
+    """What this driver needs to know; the driver checks it."""
 
 
 class Limits(Configured):
     """What the bench may be asked for. A voltage is clamped to its limit; anything else beyond its limit trips."""
 
     voltage_v: float = Field(gt=0, le=100)
-    """Largest output amplitude, V."""
+    """Largest output amplitude, V, at most ``output_range_v``. The output is clamped to it, which is no trip."""
     force_n: float = Field(gt=0)
-    """Largest instantaneous force, N."""
+    """Largest instantaneous force, N, at most what the channel can read. Beyond 1.25 times this, during the ramp of a trip,
+    the output drops to 0 V at once."""
     acceleration_m_s2: float = Field(gt=0)
-    """Largest instantaneous acceleration of any drive or response channel, m/s^2."""
+    """Largest instantaneous acceleration of any drive or response channel, m/s^2; as ``force_n``."""
     displacement_m: float = Field(gt=0)
     """Largest displacement of any drive or response channel, m; by integrating its acceleration twice, without its mean."""
     frequency_hz: tuple[float, float] = Field(json_schema_extra={"items": {"exclusiveMinimum": 0}})
-    """Lowest and highest frequency of the oscillator, Hz."""
+    """Lowest and highest frequency that may be put out, Hz; up to 0.45 of the sample rate. Displacements are integrated from
+    a fifth of the lowest on."""
     slew_v_per_s: float = Field(100.0, gt=0)
-    """Largest rate of change of the output amplitude, V/s."""
+    """Largest rate of change of the complex output amplitude (size and angle together), V/s. A faster change is clamped to
+    it."""
     overload_fraction: float = Field(0.98, gt=0, le=1)
     """Part of a channel's range from which on a reading counts as overload."""
     overload_s: float = Field(0.002, ge=0, le=10)
@@ -57,9 +60,10 @@ class Limits(Configured):
     stuck_s: float = Field(0.5, gt=0, le=3600)
     """Time without any change of a reading, at a held level, that trips, s."""
     lost_s: float = Field(0.05, gt=0, le=10)
-    """Time without any sample from the device, as samples lost on their way, that trips, s."""
+    """Time of lost samples that trips, s. Each sample that arrives makes up for one that was lost."""
     ramp_down_s: float = Field(0.5, gt=0, le=60)
-    """Time of the ramp to 0 V that ends every run, s."""
+    """Time of the ramp to 0 V that ends every run, s; at least one period of ``linear_frequency_hz``, as a shorter ramp is a
+    step that excites the specimen."""
 
     @field_validator("frequency_hz")
     @classmethod
@@ -75,9 +79,11 @@ class SpecimenFacts(Configured):
     name: str
     """Name, for files and figures."""
     linear_frequency_hz: float = Field(gt=0)
-    """Frequency of the mode under test at low level, Hz."""
+    """Frequency of the mode under test at low level, Hz; inside the plan's ``frequency_window_hz``. The loop starts at the
+    plan's ``centre_frequency_hz``."""
     drive_mode_shape: float | None = Field(None, json_schema_extra={"not": {"const": 0}})
-    """Mass-normalised shape of this mode at the drive channel, kg^-1/2; from a modal test. Damping needs it."""
+    """Mass-normalised shape of this mode at the drive channel, kg^-1/2, from a modal test. Damping needs it: 1 % of error in
+    it is 2 % in the damping. A plan with ``[plant]`` uses the shape measured there instead."""
 
     @field_validator("drive_mode_shape")
     @classmethod
@@ -91,19 +97,20 @@ class Arming(Configured):
     """Who may arm a bench on which something physical moves."""
 
     automated: bool = False
-    """Whether the bench arms itself: one that nobody stands beside, made for it."""
+    """Whether the bench arms itself; only for a bench that was made to run without a person beside it."""
     check_valid_h: float = Field(24.0, gt=0, le=8760)
     """Age up to which a check counts, h."""
     require_check: bool = True
     """Whether an automated bench needs a check that passed, of the same channels and driver."""
     largest_trip_probability: float | None = Field(None, gt=0, le=1)
-    """Largest probability of a trip with which a plan is armed; it then needs a rehearsal (`rig rehearse`) whose 95 % interval
-    stays below. None asks for no rehearsal."""
+    """Largest probability of a trip with which a plan is armed. The plan then needs a rehearsal (``rig rehearse``) whose 95 %
+    interval stays below it. Without this key no rehearsal is needed."""
     rehearsal_valid_h: float = Field(168.0, gt=0, le=8760)
     """Age up to which such a rehearsal counts, h."""
     hardware_emergency_stop: bool = False
-    """Whether there is an emergency stop that cuts the amplifier without the computer, and a person has tested it; wanted by
-    drivers that are not `rig.daq.Capabilities.safe_without_host`."""
+    """Whether there is an emergency stop that cuts the amplifier without the computer, and a person has tested it. Without
+    it, a device that does not bring its output to 0 V by itself is armed by a person only
+    (`rig.daq.Capabilities.safe_without_host`)."""
 
 
 class EmergencyStop(Configured):
@@ -112,11 +119,12 @@ class EmergencyStop(Configured):
     model_config = ConfigDict(json_schema_extra={"oneOf": [{"required": ["above_v"]}, {"required": ["below_v"]}]})
 
     channel: str = Field(min_length=1)
-    """Name of a channel with role ``monitor``."""
+    """Name of the channel, of role ``monitor``, that the switch is connected to."""
     above_v: float | None = Field(None, ge=-100, le=100)
-    """Pressed where the channel reads more than this, V."""
+    """The switch counts as pressed where the channel reads more than this, V. Either this or ``below_v`` is given."""
     below_v: float | None = Field(None, ge=-100, le=100)
-    """Pressed where the channel reads less than this, V: a switch that opens, or a cable that breaks, stops too."""
+    """The switch counts as pressed where the channel reads less than this, V: a switch that opens, or a cable that breaks,
+    stops too."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -129,28 +137,30 @@ class Bench(Configured):
     """A rig as a laboratory has it."""
 
     name: str = Field(min_length=1)
-    """Name, used in plan names and files."""
+    """Name, used in messages and files."""
     description: str = ""
     """What it is, and where its numbers come from."""
     driver: DriverChoice
     """The driver and its options."""
     sample_rate_hz: float = Field(gt=0, le=1e6)
-    """Rate of the loop, Hz."""
+    """Sample rate of the loop, Hz."""
     block: int = Field(1, ge=1, le=65536)
-    """Samples swapped a call."""
+    """Samples that are exchanged with the device in one call, at most 0.2 s. A longer block is easier for the computer, but
+    delays the loop, and limits act up to a block late. A block longer than ``lost_s`` trips where one block is lost."""
     output_range_v: float = Field(10.0, gt=0, le=100)
     """Range of the output converter, V."""
     output_resolution_v: float | None = Field(None, gt=0, le=1)
-    """Voltage of the output converter's least bit, V; if None, that of 16 bit over its range."""
+    """Voltage of the output converter's least bit, V; by default that of 16 bit over its range. ``rig tune`` chooses levels
+    at which these steps do not matter in the force."""
     channels: tuple[Channel, ...] = Field(
         min_length=2,
         json_schema_extra={
             "allOf": [{"contains": {"properties": {"role": {"const": role}}}} for role in ("force", "drive")]
         },
     )
-    """The input channels, in the device's order."""
+    """The input channels, in the device's order: two or more, one of them with role ``force`` and one with role ``drive``."""
     limits: Limits
-    """What the bench may be asked for."""
+    """Limits of what the bench may do."""
     specimen: SpecimenFacts
     """What is known of the specimen."""
     arming: Arming = Field(default_factory=Arming)

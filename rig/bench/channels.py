@@ -53,7 +53,8 @@ class Channel(Configured):
         pattern="^(force|drive|response|monitor)$",
         json_schema_extra={"enum": ["force", "drive", "response", "monitor"]},
     )
-    """``force``, ``drive``, ``response`` or ``monitor``; see `Role`."""
+    """What it measures: the force at the drive point (``force``), the acceleration there (``drive``) or elsewhere
+    (``response``), or anything else (``monitor``)."""
     unit: str
     """Physical unit: N for a force, m/s^2 for drive and response."""
     sensitivity_v_per_unit: float = Field(json_schema_extra={"not": {"const": 0}})
@@ -77,8 +78,9 @@ class Channel(Configured):
     loopback: bool = False
     """Whether the output itself is connected to this channel, of role ``monitor``: a check then measures the latency."""
     mode_shape: float | None = None
-    """Mass-normalised shape of the mode under test at this channel, kg^-1/2, of the sign of `SpecimenFacts.drive_mode_shape`
-    where it moves with the drive point: a check then tells its polarity, and whether it has been swapped with another."""
+    """Mass-normalised shape of the mode under test at this channel, kg^-1/2; of the sign of ``specimen.drive_mode_shape``
+    where it moves with the drive point. A check then tells its polarity, and whether it has been swapped with another; levels
+    in metres are checked at this channel too."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

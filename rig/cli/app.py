@@ -12,6 +12,7 @@ from rig.cli.analyse import app as analyse_app
 from rig.cli.check import check_
 from rig.cli.compiling import say_what_is_compiled
 from rig.cli.conformance import conformance
+from rig.cli.docs import docs
 from rig.cli.doctor import doctor
 from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
@@ -75,6 +76,7 @@ app.command()(show)
 app.command("plot")(plot_)
 app.command("report")(report_)
 app.command()(doctor)
+app.command(context_settings={"ignore_unknown_options": True})(docs)  # an option may be the word
 app.command("watch")(watch_)
 app.command("replay")(replay_)
 app.command()(stop)

@@ -13,6 +13,7 @@ from rig.errors import ConfigurationError, RigError, as_daq_error
 __all__ = ["GROUP", "driver_names", "make_daq"]
 
 GROUP = "vibrolock.drivers"
+"""Group of entry points under which drivers are installed."""
 
 
 def _found() -> dict[str, EntryPoint]:

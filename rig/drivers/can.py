@@ -26,17 +26,17 @@ class CanOptions(WireOptions):
     fd: bool = True
     """CAN FD, or classical CAN."""
     bitrate: int = Field(1_000_000, ge=10_000, le=1_000_000)
-    """Bit rate of the bus, bit/s."""
+    """Bit rate of the bus, bit/s; ``slcan`` has 10000, 20000, 50000, 100000, 125000, 250000, 500000, 750000 and 1000000."""
     data_bitrate: int = Field(DATA_BIT_RATE_HZ, ge=1_000_000, le=8_000_000)
-    """CAN FD: bit rate within the data, bit/s."""
+    """CAN FD: bit rate within the data, bit/s; ``slcan`` has 1000000, 2000000, 4000000, 5000000 and 8000000."""
     node: int = Field(1, ge=0, le=15)
-    """Node of the device."""
+    """Number of the device on the bus."""
     dbc: str | None = None
     """A definition with other identifiers; by default the shipped one for the bench's number of channels."""
     baud: int = Field(3_000_000, ge=9600)
     """``slcan``: baud rate of the serial line."""
     backend: dict[str, Any] = Field(default_factory=dict)
-    """Further keyword arguments of python-can's backend, such as its bit timing."""
+    """Further keyword arguments of python-can's backend, such as its bit timing; they override the keys above."""
 
     @property
     def timing(self) -> BusTiming:

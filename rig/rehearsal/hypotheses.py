@@ -24,35 +24,35 @@ class Hypotheses(Configured):
     shift: tuple[float, float] = (0.002, 0.08)
     """Relative shift of the modal frequency at the highest level, by either spring."""
     damping_growth: tuple[float, float] = (1.0, 3.0)
-    """Damping ratio at the highest level over that at a low one, by drag; every twin has some."""
+    """Damping ratio at the highest level over that at a low one, by drag; every twin has some drag."""
     joint: float = Field(0.2, ge=0.0, le=1.0)
     """Probability of a joint that slips, beside the springs."""
     joint_shift: tuple[float, float] = (0.002, 0.05)
     """Relative fall of the modal frequency when the joint slips altogether."""
     joint_slip: tuple[float, float] = (0.3, 3.0)
-    """Displacement at which it slips altogether, over that of the highest level."""
+    """Displacement at which the joint slips altogether, over that of the highest level."""
     stop: float = Field(0.1, ge=0.0, le=1.0)
     """Probability of a stop that is met."""
     stop_gap: tuple[float, float] = (0.3, 1.0)
-    """Its clearance, over the displacement of the highest level."""
+    """Clearance of the stop, over the displacement of the highest level."""
     stop_stiffness: tuple[float, float] = (0.03, 1.0)
-    """Its stiffness, over the modal stiffness of the specimen there."""
+    """Stiffness of the stop, over the modal stiffness of the specimen at its place."""
     second_mode: float = Field(0.1, ge=0.0, le=1.0)
     """Probability of a mode nearby that no measurement has shown."""
     second_mode_at: tuple[float, float] = (0.7, 1.5)
-    """Its frequency over that of the tested mode; within 5 % of it there is none."""
+    """Frequency of the mode nearby over that of the tested mode; it keeps at least 5 % away."""
     second_mode_shape: tuple[float, float] = (0.003, 0.03)
-    """Its drive-point shape over that of the tested mode: what a fit hides."""
+    """Drive-point shape of the mode nearby over that of the tested mode; a mode so weak does not show in a fit."""
     mode_shape: float = Field(1.5, ge=1.0, le=10.0)
     """Factor, either way, by which the bench's mode shape may be wrong where it was not measured (two standard deviations)."""
     gain: float = Field(0.03, ge=0.0, le=1.0)
     """Probability that the amplifier's gain is not that of the measurement."""
     gain_factor: tuple[float, float] = (0.5, 2.0)
-    """That gain over the measured one."""
+    """Gain of the amplifier over the measured one, where it differs."""
     frequency_drift: float = Field(0.002, ge=0.0, le=0.1)
     """Standard deviation of the relative change of the modal frequency since the measurement, as temperature makes it."""
     damping_drift: float = Field(0.05, ge=0.0, le=1.0)
-    """Standard deviation of the logarithm of the change of damping since then."""
+    """Standard deviation of the logarithm of the change of damping since the measurement."""
     held_per_s: float = Field(0.0, ge=0.0, le=1000.0)
     """Rate of blocks whose output comes late and is held, 1/s, as `rig doctor` counts them."""
     lost_per_s: float = Field(0.0, ge=0.0, le=1000.0)

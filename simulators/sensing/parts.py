@@ -32,7 +32,7 @@ class Sensor(Part):
     kind: Literal["force", "acceleration"]
     """Stinger force (N), or acceleration of a point (m/s^2)."""
     at: str | None = None
-    """Name of the point whose acceleration it reads; a force sensor reads the stinger."""
+    """Name of the point whose acceleration is measured; a force sensor measures the force of the stinger."""
     sensitivity_v_per_unit: Annotated[float, Field(gt=0.0)]
     """Sensitivity, V/N or V/(m/s^2)."""
     range_v: Positive
@@ -67,15 +67,16 @@ class Converter(Part):
     substeps: Annotated[int, Field(ge=1, le=1024)] = 2
     """Integration steps per sample; a multiple of ``oversampling``."""
     oversampling: Annotated[int, Field(ge=1, le=256)] = 1
-    """Internal instants per sample, at which sensors and filters run."""
+    """Internal steps per sample, at which sensors and filters run."""
     anti_alias_hz: NotNegative = 0.0
     """Corner of the anti-alias filter of every input, a Butterworth low-pass; 0 for none."""
     anti_alias_order: Order = 6
-    """Its order; with a corner at 0.4 of the rate, 6 leaves 0.05 % of the images of the output's stairs, 4 leaves 0.25 %."""
+    """Order of the anti-alias filter. With a corner at 0.4 of the rate, 6 leaves 0.05 % of the images of the output's steps,
+    4 leaves 0.25 %."""
     reconstruction_hz: NotNegative = 0.0
-    """Corner of the filter that smooths the stairs of the output, a Butterworth low-pass; 0 for none."""
+    """Corner of the filter that smooths the steps of the output, a Butterworth low-pass; 0 for none."""
     reconstruction_order: Order = 2
-    """Its order."""
+    """Order of the filter that smooths the output."""
     adc_bits: Bits = 16
     """Bits of the inputs; 0 for no quantisation."""
     adc_range_v: Positive = 10.0

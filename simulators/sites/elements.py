@@ -144,7 +144,8 @@ class User(LocalElement):
     of: Literal["deflection", "velocity"] = "deflection"
     """Whether z is the deflection (m) or the velocity (m/s)."""
     linear_n_m: float = 0.0
-    """Slope ``-df/dz`` at rest, which the linear plant then holds; any value is right, the true one integrates best."""
+    """Slope ``-df/dz`` at rest, which becomes part of the linear plant. Any value gives the same motion; the true one
+    integrates most accurately."""
     largest_slope_n_m: Annotated[float, Field(ge=0.0)] = 0.0
     """Largest slope of the force to be expected (N/m, or N s/m); a step too long for it is refused. 0: not checked."""
 

@@ -24,7 +24,7 @@ class LumpedMass(Part):
     at: str
     """Name of the point it sits on."""
     mass_kg: NotNegative
-    """Mass."""
+    """Mass at the point."""
     inertia_kg_m2: NotNegative = 0.0
     """Rotary inertia about its point, for rotation in the plane of vibration."""
 
@@ -69,7 +69,7 @@ class MeshedBeam(Part):
     youngs_modulus_pa: Positive
     """Young's modulus."""
     density_kg_m3: Positive
-    """Density."""
+    """Density of the material."""
     damping_ratio: Annotated[Several[Annotated[float, Field(ge=0.0, lt=1.0)]], Field(min_length=1)]
     """Viscous modal damping ratios, lowest mode first; their number is the number of modes kept."""
     frequency_hz: Several[Positive] | None = None

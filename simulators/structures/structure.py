@@ -65,9 +65,9 @@ class LapJointedBeam(MeshedBeam):
     normal_stiffness_n_m: NotNegative
     """Stiffness of the interface against opening, all of it."""
     bolts_m: Annotated[Several[float], Field(min_length=1)]
-    """Positions of the bolts along the beam, around which the stiffness is gathered."""
+    """Positions of the bolts along the beam, around which the stiffness is concentrated."""
     bolt_width_m: Positive
-    """Standard deviation of the bell of stiffness around each bolt."""
+    """Standard deviation of the bell-shaped stiffness around each bolt."""
     stiffness_floor: NotNegative = 0.0
     """Stiffness density far from the bolts, as a fraction of that at a bolt."""
     n_arm_element: Annotated[int, Field(ge=2, le=200)] = 10

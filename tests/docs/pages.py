@@ -49,11 +49,8 @@ class Block:
 
 def pages() -> list[Path]:
     """Every page whose commands and examples must work."""
-    made = {ROOT / "docs" / "gallery", ROOT / "docs" / "reference" / "api"}  # by Sphinx
-    return [
-        ROOT / "README.md",
-        *(page for page in sorted((ROOT / "docs").rglob("*.md")) if made.isdisjoint(page.parents)),
-    ]
+    made = ROOT / "docs" / "gallery"  # by Sphinx
+    return [ROOT / "README.md", *(page for page in sorted((ROOT / "docs").rglob("*.md")) if made not in page.parents)]
 
 
 def blocks(page: Path) -> Iterator[Block]:
@@ -105,3 +102,12 @@ def write(block: Block, folder: Path) -> None:
 def entries(group: str, names: dict[str, str]) -> list[str]:
     """A group of entry points in the form in which they are installed."""
     return [f"[{group}]", *(f"{name} = {target}" for name, target in names.items())]
+
+
+def table_under(heading: str, text: str) -> re.Match[str]:
+    """The first table below a heading."""
+    found = re.search(
+        rf"^#+ {re.escape(heading)}$(?:(?!^#).)*?(?P<table>(?:^\|[^\n]*\n)+)", text, re.MULTILINE | re.DOTALL
+    )
+    assert found, f"no table under {heading!r}"
+    return found

@@ -7,6 +7,7 @@ import pytest
 
 import rig
 from rig.campaigns.kinds import KINDS
+from rig.reference.keys import keys_of
 from tests.docs.output import assert_shows
 from tests.docs.pages import ROOT, blocks, pages
 from tests.docs.taken import follower
@@ -52,10 +53,12 @@ def name_of(page: Path) -> str:
 
 
 def anchors(page: Path) -> set[str]:
-    """What links may end in: headings in small letters, hyphens for spaces, without any other sign."""
+    """What links may end in: headings in small letters, hyphens for spaces, without any other sign; keys of a table."""
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    tables = [block.language.split()[1] for block in blocks(page) if block.language.startswith("{keys} ")]
+    keys = {key.anchor for table in tables for key in keys_of(table)}
+    return keys | {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.fixture(scope="session")

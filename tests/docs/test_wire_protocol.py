@@ -7,7 +7,7 @@ import pytest
 
 from rig import errors
 from rig.bench import DriverChoice
-from rig.drivers.serial import SerialDAQ, SerialOptions
+from rig.drivers.serial import SerialDAQ
 from rig.drivers.wire.connection import Connection
 from rig.wire.messages import (
     ARM_KEY,
@@ -29,8 +29,7 @@ from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
 from rig.wire.serial.frames import FrameReader, frame
 from rig.wire.serial.link import line_load
 from tests.docs import wire
-from tests.docs.tables import table_under
-from tests.docs.test_keys import shown_default, shown_range
+from tests.docs.pages import table_under
 from tests.rig.rigs import bench_with
 from tests.rig.wire.serial.strategies import same
 
@@ -84,17 +83,6 @@ def test_the_version_and_the_key_that_arms_are_those_in_force():
     assert re.findall(r"Version of the protocol: \*\*(\d+)\*\*", page) == [str(VERSION)]
     assert f"0x{ARM_KEY:08X}" in wire.sections()["Commands"]
     assert re.findall(r"longer than (\d+) bytes", wire.sections()["Frames"]) == [str(LARGEST_PAYLOAD)]
-
-
-def test_the_keys_of_the_driver_are_those_of_its_options():
-    heading = "Keys of `[driver.options]` of the serial driver"
-    table = table_under(heading, wire.PAGE.read_text(encoding="utf-8"))["table"]
-    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|", table, re.MULTILINE)
-    fields = SerialOptions.model_fields
-    assert {key for key, _, _ in rows} == set(fields)
-    for key, default, allowed in rows:
-        assert default.strip() == shown_default(fields[key]), key
-        assert allowed.strip().startswith(shown_range(fields[key])), key
 
 
 def test_its_words_on_cobs_and_crc_hold_for_its_own_examples():

@@ -25,14 +25,14 @@ class BackbonePlan(SettledPlan):
     kind: Literal["backbone"] = "backbone"
     """Kind of campaign."""
     direction: Literal["up", "down", "up-down"] = "up"
-    """Order of the levels."""
+    """Order of the levels; ``up-down`` measures the highest level once."""
     repeat_first: bool = False
     """Whether the first point is measured again at the end to reveal a drift of the specimen. The repeated point enters no
     result."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)
-    """Length of the ramp between two levels, periods."""
+    """Length of the half-cosine ramp between two levels, periods."""
     record_periods: int = Field(50, ge=4, le=1_000_000)
-    """Periods that are recorded and evaluated at each level."""
+    """Periods that are evaluated at each level; one more is recorded."""
     evaluation: Literal["settled", "slow-flow"] = "settled"
     """How a point is evaluated. ``settled``: wait until the vibration has settled, then record. ``slow-flow``: evaluate the
     ramp to the point and the time at the point by the slow flow, without waiting for a steady state."""

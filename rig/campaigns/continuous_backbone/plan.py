@@ -40,12 +40,13 @@ class ContinuousBackbonePlan(LockedPlan):
     margin: float = Field(0.05, gt=0, le=1)
     """Relative margin by which the ramps pass below the lowest and above the highest of ``levels_m``."""
     bandwidth: float = Field(0.08, gt=0, le=1)
-    """Half width of the band of amplitudes that are evaluated together for one level, in the logarithm of the amplitude."""
+    """Half width of the band of amplitudes that are evaluated together for one level, in the logarithm of the amplitude. A
+    bend within the band is smoothed."""
     accepted_nonharmonic_force: float = Field(
         0.25, gt=0, le=1, validation_alias=AliasChoices("accepted_nonharmonic_force", "accepted_alien_force")
     )
-    """As for every plan under a phase lock, but with a wider default: oscillations while the lock is gained lie beside the
-    harmonics."""
+    """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted. The default is
+    wider than elsewhere, as oscillations while the lock is gained count too."""
     accepted_detuning: float = Field(0.03, gt=0, le=1)
     """Largest relative distance of the instantaneous frequency from the identified resonance; beyond it the lock counts as
     lost."""

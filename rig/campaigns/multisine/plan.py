@@ -27,7 +27,8 @@ class MultisinePlan(OpenLoopPlan):
     kind: Literal["multisine"] = "multisine"
     """Kind of campaign."""
     levels_rms_v: tuple[float, ...] = Field(min_length=1)
-    """RMS of the output voltage, V. The levels are measured one after the other."""
+    """RMS of the output voltage, V. The levels are measured one after the other; the largest peak is at most the bench's
+    ``voltage_v``."""
     lowest_hz: float = Field(gt=0)
     """Lowest excited frequency, Hz."""
     highest_hz: float = Field(gt=0)
@@ -41,7 +42,7 @@ class MultisinePlan(OpenLoopPlan):
     detection_group: int = Field(4, ge=2, le=1000)
     """Number of odd lines in a group. ``odd-random`` leaves out one line of each group, chosen by ``phase_seed``."""
     realisations: int = Field(5, ge=1, le=1000)
-    """Number of realisations at each level."""
+    """Number of realisations at each level; all of them have at most 1e8 samples."""
     periods: int = Field(4, ge=1, le=100_000)
     """Periods recorded of each realisation."""
     transient_periods: int = Field(2, ge=0, le=10_000)
@@ -51,7 +52,7 @@ class MultisinePlan(OpenLoopPlan):
     silent_s: float = Field(0.0, ge=0, le=3600)
     """Time at 0 V that is recorded before the first realisation to measure the noise, s."""
     ramp_s: float = Field(0.5, gt=0, le=60)
-    """Length of the ramps to the level and down from it, s."""
+    """Length of the ramps to the level and down from it, s; longer where the bench's ``slew_v_per_s`` requires it."""
     accepted_change: float = Field(0.05, gt=0, le=1)
     """Largest relative difference of force or drive between the first recorded period and the mean of the others with which a
     realisation is accepted (RMS in the band). A larger difference indicates a transient or a disturbance."""

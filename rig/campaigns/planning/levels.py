@@ -44,13 +44,13 @@ class Levels(Configured):
     model_config = ConfigDict(json_schema_extra={"allOf": [ONE_LEVEL_KEY]})
 
     levels_v: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
-    """Levels as amplitude of the output voltage, V peak."""
+    """Levels as amplitude of the output voltage, V peak, up to the bench's ``voltage_v``. Give one kind of level."""
     levels_n: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
-    """Levels as amplitude of the fundamental force, N peak."""
+    """Levels as amplitude of the fundamental force, N peak, up to the bench's ``force_n``."""
     levels_rms_n: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
-    """Levels as root mean square of the force, all harmonics together, N."""
+    """Levels as root mean square of the force, all harmonics together, N, up to the bench's ``force_n``."""
     levels_m: tuple[float, ...] | None = Field(None, json_schema_extra=ABOVE_ZERO)
-    """Levels as amplitude of the drive point's fundamental displacement, m peak."""
+    """Levels as amplitude of the drive point's fundamental displacement, m peak, up to the bench's ``displacement_m``."""
     start_v: float | None = Field(None, gt=0)
     """Voltage with which the rig is set in motion before a loop takes over and goes to a level in newtons or metres, V peak."""
     start_periods: float = Field(40.0, ge=1, le=1e5)

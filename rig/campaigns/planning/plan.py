@@ -78,15 +78,15 @@ class Plan(Configured):
     kind: str
     """Kind of campaign."""
     description: str = ""
-    """Purpose of the plan."""
+    """Purpose of the plan, shown by ``rig list``."""
     bench: str = Field(min_length=1)
-    """Name of a shipped bench or a TOML file."""
+    """Name of a shipped bench, or a TOML file, which is looked for beside the plan."""
     retries: int = Field(2, ge=0, le=20)
-    """How often a point is measured again, at most, that was refused for something that passes: held outputs, lost samples, a
-    disturbance of the vibration."""
+    """How many times, at most, a point is measured again that was rejected for a cause that passes: held outputs, lost
+    samples, a disturbance of the vibration."""
 
     rows: Literal["all", "records"] = "all"
-    """Rows that are stored: all, or all of the records that are evaluated and few of what lies between."""
+    """Which rows are stored: all of them, or all rows of the records that are evaluated and few of those between."""
     telemetry_s: float = Field(0.1, gt=0, le=60)
     """Time between stored rows where not all rows are stored, s."""
 
@@ -173,7 +173,8 @@ class OpenLoopPlan(Plan):
     """Base of the plans without phase feedback: the plan prescribes the frequency."""
 
     controller: OpenLoop = Field(OpenLoop(), validation_alias=AliasChoices("controller", "demodulation"))
-    """Demodulation of force and response, and the loops that hold levels in newtons or metres."""
+    """Demodulation of force and response, and the loops that hold levels in newtons or metres. It may also be called
+    ``demodulation``."""
 
     @property
     def law(self) -> Law:

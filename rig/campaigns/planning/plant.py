@@ -57,11 +57,11 @@ class PlantFacts(Configured):
     latency_samples: float = Field(ge=0)
     """Samples between an output and the input that responds to it."""
     frequency_std_rad_s: float | None = Field(None, ge=0)
-    """Standard error of the frequency, rad/s; None if unknown."""
+    """Standard error of the frequency, rad/s; left out if unknown."""
     damping_ratio_std: float | None = Field(None, ge=0)
-    """Standard error of the damping ratio; None if unknown."""
+    """Standard error of the damping ratio; left out if unknown."""
     drive_shape_std: float | None = Field(None, ge=0)
-    """Standard error of the mode shape, kg^-1/2, which is in that of every damping of the test; None if unknown."""
+    """Standard error of the mode shape, kg^-1/2, which is in that of every damping of the test; left out if unknown."""
     response_ratios: dict[str, PositiveFloat] = Field(default_factory=dict)
     """Motion of each response channel per metre at the drive point, at resonance, by channel name. These ratios replace the
     bench's mode shapes when levels and channels are checked."""

@@ -33,7 +33,7 @@ class SteppedSinePlan(TonePlan):
     kind: Literal["stepped-sine"] = "stepped-sine"
     """Kind of campaign."""
     frequencies_hz: tuple[float, ...] | None = None
-    """Frequencies, in the order of measurement, Hz."""
+    """Frequencies, in the order of measurement, Hz. Give either these or ``start_hz`` and ``stop_hz``."""
     start_hz: float | None = Field(None, gt=0)
     """First frequency, instead of ``frequencies_hz``, Hz."""
     stop_hz: float | None = Field(None, gt=0)

@@ -37,7 +37,8 @@ class SweepPlan(TonePlan):
     stop_hz: float = Field(gt=0)
     """Last frequency, Hz; below ``start_hz`` to sweep down."""
     rate_hz_per_s: float | None = Field(None, gt=0, le=1e5)
-    """Rate of a linear sweep, up or down, Hz/s."""
+    """Rate of a linear sweep, up or down, Hz/s. Give either this or ``rate_octaves_per_min``. The sweep has at least 10
+    periods."""
     rate_octaves_per_min: float | None = Field(None, gt=0, le=1e4)
     """Rate of a logarithmic sweep, instead of ``rate_hz_per_s``, octaves/min."""
     ramp_periods: float = Field(20.0, ge=1, le=1e5)

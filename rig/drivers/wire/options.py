@@ -17,7 +17,8 @@ class WireOptions(Configured):
     queue_blocks: int = Field(1, ge=1, le=64)
     """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop."""
     watchdog_s: float | None = Field(None, gt=0, le=LONGEST_S)
-    """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s, or 4 blocks if longer."""
+    """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s or 4 blocks, or the shortest
+    that the device can do, whichever is longest. Where something moves, at most 1 s, or 10 blocks if longer."""
     ramp_s: float = Field(0.05, ge=0, le=LONGEST_S)
     """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
     timeout_s: float | None = Field(None, gt=0, le=LONGEST_S)

@@ -84,8 +84,8 @@ def test_comments_explain_every_key_of_a_file_and_name_the_units(what, kind, tmp
         assert words[:40] in " ".join(text.replace("\n# ", " ").split()), key
     assert all(len(line) < 128 for line in text.splitlines() if line.startswith("# "))
     if what != "plan":
-        assert "# Largest output amplitude, V. [above 0 to 100]\nvoltage_v = " in text
-        assert "# Rate of the loop, Hz. [above 0 to 1e+06]\nsample_rate_hz = 5000.0" in text
+        assert "# Range of the output converter, V. [above 0 to 100]\noutput_range_v = " in text
+        assert "# Sample rate of the loop, Hz. [above 0 to 1e+06]\nsample_rate_hz = 5000.0" in text
 
 
 @pytest.mark.parametrize("what", ["bench", "rig"])

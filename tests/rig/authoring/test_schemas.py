@@ -87,7 +87,7 @@ def test_titles_have_units_and_keys_their_defaults_and_ranges():
     assert limits["slew_v_per_s"]["title"] == "slew (V/s)"
     assert (limits["voltage_v"]["exclusiveMinimum"], limits["voltage_v"]["maximum"]) == (0, 100)
     assert limits["slew_v_per_s"]["default"] == 100.0
-    assert limits["voltage_v"]["description"] == "Largest output amplitude, V."
+    assert limits["overload_s"]["description"] == "Time of uninterrupted overload that trips, s."
 
 
 @pytest.mark.parametrize("name", shipped_benches())

@@ -1,0 +1,240 @@
+"""Every table that a plan, a bench or a virtual rig can hold, with its keys as the models have them.
+
+The meaning of a key is the docstring under its field; default and allowed values come from the model's JSON schema.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, get_args
+
+from pydantic import AliasChoices, BaseModel
+
+from rig.reference.entry import Entry
+
+__all__ = ["Key", "key_entries", "keys_of", "parts_of", "roots", "tables"]
+
+Schema = dict[str, Any]
+
+WORDS = {"string": "text", "boolean": "true, false", "number": "number", "integer": "whole number", "object": "table"}
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table, in Markdown's marks for code."""
+
+    table: str
+    """Name of the table that has the key."""
+    name: str
+    """The key."""
+    default: str
+    """Default as TOML has it; ``required``; empty if the key may be left out and has no default."""
+    allowed: str
+    """Range, choices or type."""
+    meaning: str
+    """What it does, in one line."""
+    holds: tuple[str, ...]
+    """Names of the tables that may stand under the key."""
+
+    @property
+    def anchor(self) -> str:
+        """Where the key stands on its page."""
+        return f"key-{self.table}-{self.name}"
+
+
+@cache
+def tables() -> dict[str, type[BaseModel]]:
+    """Return the model of every table by the name under which the reference has it."""
+    from controller import LockRule, OpenLoop, PhaseLockedLoop
+    from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
+    from rig.campaigns.dwell.plan import DriftLimits
+    from rig.campaigns.kinds import KINDS
+    from rig.campaigns.planning.plant import PlantFacts
+    from rig.daq import Channel
+    from rig.drivers.can import CanOptions
+    from rig.drivers.serial import SerialOptions
+    from rig.drivers.virtual.driver import Queue
+    from rig.drivers.virtual.faults import PassingFaults
+    from rig.rehearsal.hypotheses import Hypotheses
+    from rig.tick.sequencer.segments import SettleRule
+
+    return {
+        **{kind: campaign.plan for kind, campaign in KINDS.items()},
+        "drift-limits": DriftLimits,
+        "controller": PhaseLockedLoop,
+        "open-loop": OpenLoop,
+        "lock": LockRule,
+        "settle": SettleRule,
+        "plant": PlantFacts,
+        "hypotheses": Hypotheses,
+        "bench": Bench,
+        "driver": DriverChoice,
+        "specimen": SpecimenFacts,
+        "limits": Limits,
+        "arming": Arming,
+        "emergency_stop": EmergencyStop,
+        "channels": Channel,
+        "virtual": Queue,
+        "serial": SerialOptions,
+        "can": CanOptions,
+        "faults": PassingFaults,
+        **_parts_of_a_virtual_rig(),
+    }
+
+
+def _parts_of_a_virtual_rig() -> dict[str, type[BaseModel]]:
+    from simulators.exciter import Exciter, Stinger
+    from simulators.scatter import Deviation, Scatter
+    from simulators.sensing.parts import Converter, Sensor
+    from simulators.sites.elements import Clearance, Cubic, Magnet, User
+    from simulators.sites.friction import IwanSite, JenkinsSite
+    from simulators.structures.meshed import LumpedMass, Support
+    from simulators.structures.structure import BeamStructure, LapJointedBeam, ModalStructure
+    from simulators.virtual_rig import VirtualRig
+    from simulators.wear import Wear
+
+    return {
+        "virtual-rig": VirtualRig,
+        "beam": BeamStructure,
+        "lap-jointed-beam": LapJointedBeam,
+        "lumped-mass": LumpedMass,
+        "support": Support,
+        "modal": ModalStructure,
+        "magnet": Magnet,
+        "cubic": Cubic,
+        "clearance": Clearance,
+        "user": User,
+        "jenkins": JenkinsSite,
+        "iwan": IwanSite,
+        "exciter": Exciter,
+        "stinger": Stinger,
+        "sensor": Sensor,
+        "converter": Converter,
+        "scatter": Scatter,
+        "deviation": Deviation,
+        "wear": Wear,
+    }
+
+
+def roots() -> tuple[type[BaseModel], ...]:
+    """Return the models of what stands in files: plans, benches, options of drivers, virtual rigs, hypotheses."""
+    from rig.campaigns.kinds import KINDS
+
+    others = ("bench", "virtual", "serial", "can", "virtual-rig", "hypotheses")
+    return (*(campaign.plan for campaign in KINDS.values()), *(tables()[name] for name in others))
+
+
+def parts_of(kind: Any) -> set[type[BaseModel]]:
+    """Return a model and all models that its fields may hold, at any depth."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return {kind}.union(*(parts_of(field.annotation) for field in kind.model_fields.values()))
+    return set[type[BaseModel]]().union(*(parts_of(one) for one in get_args(kind)))
+
+
+@cache
+def keys_of(table: str) -> tuple[Key, ...]:
+    """Return the keys of a table; the one that tells its kind first, the others in the model's order."""
+    model = tables()[table]
+    schema = model.model_json_schema()
+    required = {*schema.get("required", ()), *(("kind",) if "kind" in schema["properties"] else ())}
+    return tuple(
+        Key(
+            table=table,
+            name=name,
+            default="required" if name in required else _default(field.get("default")),
+            allowed=_allowed(field),
+            meaning=_in_one_line(field.get("description", "")),
+            holds=_tables_in(model.model_fields[name].annotation),
+        )
+        for name, field in sorted(schema["properties"].items(), key=lambda item: item[0] != "kind")
+    )
+
+
+def _tables_in(kind: Any) -> tuple[str, ...]:
+    """Return the names of the tables that a field holds itself, not those inside them."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return tuple(name for name, model in tables().items() if model is kind)
+    return tuple(dict.fromkeys(name for one in get_args(kind) for name in _tables_in(one)))
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split()).replace("``", "`")
+
+
+def _default(value: Any) -> str:
+    """Return a default as TOML has it; empty for what is absent or a table of its own."""
+    if value is None or isinstance(value, dict) or value in ("", []):
+        return ""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    return f"`{_number(value)}`" if isinstance(value, float) else f"`{value}`"
+
+
+def _allowed(field: Schema) -> str:
+    """Return range, choices or type of a value."""
+    options = [option for option in field.get("anyOf", [field]) if option.get("type") != "null"]
+    field = _merged(field, options[0]) if options else field
+    if "const" in field:
+        return f"`{field['const']}`"
+    if "enum" in field:
+        return ", ".join(f"`{choice}`" for choice in field["enum"])
+    if field.get("type") == "array":
+        return _list(field)
+    if "$ref" in field or "oneOf" in field:
+        return "table"
+    return _bounds(field) or WORDS.get(field.get("type", "string"), "")
+
+
+def _merged(field: Schema, option: Schema) -> Schema:
+    """Return a field with what its only possible type says; of items both may say something."""
+    items = {**option.get("items", {}), **field.get("items", {})}
+    return {**field, **option, **({"items": items} if items else {})}
+
+
+def _list(field: Schema) -> str:
+    inner = _allowed((field.get("prefixItems") or [field.get("items", {})])[0])
+    if inner == "table":
+        return "list of tables"
+    count = field.get("maxItems") if field.get("maxItems") == field.get("minItems") else None
+    return f"list of {count}: {inner}" if count else f"list: {inner}"
+
+
+def _bounds(field: Schema) -> str:
+    """Return ``above 0 to 1``, ``0 to below 1``, ``from 0``; empty without bounds."""
+    low = f"above {_number(field['exclusiveMinimum'])}" if "exclusiveMinimum" in field else ""
+    low = f"{_number(field['minimum'])}" if "minimum" in field else low
+    high = f"below {_number(field['exclusiveMaximum'])}" if "exclusiveMaximum" in field else ""
+    high = f"{_number(field['maximum'])}" if "maximum" in field else high
+    if high:
+        return f"{low} to {high}" if low else f"up to {high}"
+    return low if low.startswith("above") else f"from {low}" if low else ""
+
+
+def key_entries() -> Iterator[Entry]:
+    """Yield an entry for every table and every key.
+
+    A key that holds the table of its own name is found by its full name alone, as the word means the table.
+    """
+    for name, model in tables().items():
+        line = " ".join(str(model.__doc__).partition("\n\n")[0].split()).replace("``", "`")
+        yield Entry("table", name, tuple(dict.fromkeys((name, name.replace("-", "_")))), line, f"keys-{name}")
+        for key in keys_of(name):
+            full = f"{name}.{key.name}"
+            words = (full,) if key.name in key.holds else (key.name, full, *_other_names(model, key.name))
+            facts = ", ".join(text for text in (_said(key.default), f"allowed: {key.allowed}") if text)
+            yield Entry("key", full, words, key.meaning, key.anchor, facts)
+
+
+def _other_names(model: type[BaseModel], name: str) -> list[str]:
+    """Return further names that a key may have in a file."""
+    choices = model.model_fields[name].validation_alias
+    return [str(one) for one in choices.choices if one != name] if isinstance(choices, AliasChoices) else []
+
+
+def _said(default: str) -> str:
+    return f"default {default}" if default.startswith("`") else default
+
+
+def _number(value: float) -> str:
+    """Return a number in full where it is whole and not very large."""
+    return str(int(value)) if value == int(value) and abs(value) < 1e8 else f"{value:g}"

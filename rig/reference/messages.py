@@ -1,0 +1,58 @@
+"""The messages that end or spoil a run: reasons for the end of a run, qualities of points, errors.
+
+Each has a name in small letters with hyphens, such as ``lost-lock`` or ``daq-timeout``, which is that of its page.
+"""
+
+import re
+from collections.abc import Iterator
+
+from rig.reference.entry import Entry
+
+__all__ = ["PAGES", "message_entries", "slug"]
+
+PAGES = "reference/messages"
+"""Folder of their pages on the site."""
+
+
+def message_entries() -> Iterator[Entry]:
+    """Yield an entry for every message, found by its name and its text; a reason that is also a quality has one entry."""
+    lines: dict[str, list[tuple[str, str]]] = {}
+    for name, what, text in (*_end_reasons(), *_qualities(), *_errors()):
+        lines.setdefault(name, []).append((what, text))
+    for name, texts in lines.items():
+        words = (name, *(text.rstrip(".") for _, text in texts))
+        line = "; ".join(f"{what}: {text}" for what, text in texts)
+        yield Entry("message", name, tuple(dict.fromkeys(words)), line, f"{PAGES}/{name}")
+
+
+def _end_reasons() -> Iterator[tuple[str, str, str]]:
+    from rig.tick.safety.layout import TEXT, EndReason
+
+    for reason, text in TEXT.items():
+        if reason not in (EndReason.NONE, EndReason.COMPLETED):
+            yield slug(reason.name), "end of a run", text
+
+
+def _qualities() -> Iterator[tuple[str, str, str]]:
+    from rig.campaigns.evaluation.point import Quality
+    from vibrolock.described import attribute_docstrings
+
+    texts = attribute_docstrings(Quality.__module__)["Quality"]
+    for quality in Quality:
+        if quality is not Quality.GOOD:
+            yield quality.value, "quality of a point", texts[quality.name]
+
+
+def _errors() -> Iterator[tuple[str, str, str]]:
+    from rig import errors
+
+    for name in errors.__all__:
+        error = getattr(errors, name)
+        if isinstance(error, type) and error not in (errors.RigError, errors.DaqError):
+            line = " ".join(str(error.__doc__).partition("\n\n")[0].split())
+            yield slug(name), "error", line
+
+
+def slug(name: str) -> str:
+    """Return the name of a message in small letters with hyphens: ``daq-timeout`` for ``DaqTimeout``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])|_", "-", name).lower()
