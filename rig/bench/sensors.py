@@ -116,9 +116,9 @@ def _completed(channel: Any, index: int, sensors: dict[str, Sensor], path: Path)
         if "sensitivity" in channel or "sensitivity_v_per_unit" in channel:
             return channel
         close = get_close_matches(number, sensors, n=1)
-        hint = f"did you mean {close[0]!r}? " if close else ""
+        hint = f", did you mean {close[0]!r}?" if close else ""
         raise ConfigurationError(
-            f"{field}: {path.name} has no such sensor; {hint}Allowed are its serial numbers, or a sensitivity here"
+            f"{field}: {path.name} has no such sensor{hint}; allowed is one of its serial numbers, or a sensitivity here"
         )
     facts = sensors[number].of_channel()
     twice = [key for key in (*facts, "sensitivity_v_per_unit") if channel.get(key)]
