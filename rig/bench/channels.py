@@ -118,7 +118,9 @@ class Channel(Configured):
             raise ValueError(f"{key} = {shown(value)}: allowed is a text with number and unit, such as '100 mV/g'")
         volts, of = volts_per_unit(sheet, gain or "")
         if unit and of != unit:
-            raise ValueError(f"sensitivity = {sheet!r}: is per {of}, the channel is in {unit}: allowed is one per {unit}")
+            raise ValueError(
+                f"sensitivity = {sheet!r}: is per {of}, the channel is in {unit}: allowed is one per {unit}"
+            )
         volts = -volts if inverted is True else volts
         given = table.get("sensitivity_v_per_unit", volts)
         if isinstance(given, float) and not math.isclose(given, volts, rel_tol=SAME):
@@ -132,7 +134,9 @@ class Channel(Configured):
         if self.sensitivity_v_per_unit == 0.0:
             raise ValueError("sensitivity_v_per_unit = 0: allowed is any number but 0")
         if not self.unit:
-            raise ValueError("unit: is missing, which a channel with role 'monitor' needs: allowed is its physical unit")
+            raise ValueError(
+                "unit: is missing, which a channel with role 'monitor' needs: allowed is its physical unit"
+            )
         if self.loopback and self.role != "monitor":
             raise ValueError(f"loopback: allowed is a channel with role 'monitor', {self.name!r} has {self.role!r}")
         if self.mode_shape is not None and self.role != "response":

@@ -40,7 +40,9 @@ def export_(
         list[int] | None, typer.Option(help="Point whose samples are wanted, from 1; may be repeated.", min=1)
     ] = None,
     item: Annotated[int, typer.Option(help="Which object, where the file holds several.", min=0)] = 0,
-    encoding: Annotated[str, typer.Option(help="UFF: ascii or binary; else time data are binary, all else ASCII.")] = "",
+    encoding: Annotated[
+        str, typer.Option(help="UFF: ascii or binary; else time data are binary, all else ASCII.")
+    ] = "",
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:

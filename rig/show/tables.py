@@ -103,7 +103,12 @@ def print_summary(summary: dict[str, Any]) -> None:
 
 def _sensor_line(sensor: Mapping[str, Any]) -> str:
     """Return make and model, serial number, sensitivity and calibration of a sensor in one line."""
-    told = {"serial_number": "no. ", "calibrated": "calibrated ", "calibration_due": "due ", "certificate": "certificate "}
+    told = {
+        "serial_number": "no. ",
+        "calibrated": "calibrated ",
+        "calibration_due": "due ",
+        "certificate": "certificate ",
+    }
     keys = ("sensor", "serial_number", "sensitivity", "amplifier_gain", "calibrated", "calibration_due", "certificate")
     line = ", ".join(f"{told.get(key, '')}{sensor[key]}" for key in keys if sensor[key])
     return line + (" (overdue)" if sensor["overdue"] else "")

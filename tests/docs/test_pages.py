@@ -27,9 +27,17 @@ centre_frequency_hz = 24.0
 frequency_window_hz = [22.0, 27.0]
 """
 NEEDS = {"docs/file-format.md": "OUT.h5"}  # pages that speak of a recording without making one
-LIBRARIES = {"docs/editors-and-tables.md": ("pandas", "xarray")}  # optional ones that a page uses
+LIBRARIES = {  # optional ones that a page uses
+    "docs/editors-and-tables.md": ("pandas", "xarray"),
+    "docs/how-to/pyema.md": ("sdypy.EMA",),
+}
 NOT_RUN = {
     ("docs/editors-and-tables.md", "Taplo and Tombi are other programs; tests/rig/authoring runs both"),
+    (
+        "docs/how-to/other-programs.md",
+        "fetches all dependencies, some 500 MB; tests/test_distribution.py runs it where uv is installed",
+    ),
+    ("docs/how-to/sdynpy.md", "SDynPy brings Qt and VTK; run by hand with SDynPy 0.23.0"),
     ("README.md", "needs the device"),
     ("docs/emulator.md", "runs until Ctrl-C"),
     ("docs/hardware-in-the-loop.md", "takes half a minute each; tests/hardware runs the same"),
@@ -70,7 +78,7 @@ def test_a_page_does_what_it_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     for library in LIBRARIES.get(name_of(page), ()):
-        pytest.importorskip(library, reason=f"{library} is not installed (pip install 'vibrolock[tables]')")
+        pytest.importorskip(library, reason=f"{library} is not installed (pip install 'vibrolock[dev]')")
     if name_of(page) in NEEDS:
         Path("quick.toml").write_text(QUICK)
         rig.run("quick.toml", output=NEEDS[name_of(page)]).close()

@@ -28,7 +28,9 @@ def test_a_shaker_has_every_number_that_an_exciter_needs_and_says_where_they_com
 
 
 def test_a_shaker_replaces_that_of_a_specimen_and_single_keys_change_it():
-    rig = VirtualRig.shipped("magnet-beam", exciter={"shaker": "lds-v203", "amplifier_gain": 5.0, "resistance_ohm": 2.0})
+    rig = VirtualRig.shipped(
+        "magnet-beam", exciter={"shaker": "lds-v203", "amplifier_gain": 5.0, "resistance_ohm": 2.0}
+    )
     told = shaker_values("lds-v203") | {"amplifier_gain": 5.0, "resistance_ohm": 2.0}
     assert {key: getattr(rig.exciter, key) for key in told} == told
     assert VirtualRig.model_validate(rig.model_dump()).exciter == rig.exciter
@@ -66,7 +68,10 @@ def test_the_geometry_that_the_paper_gives_is_the_stiffness_of_the_shipped_speci
         ({"material": "steel", "length_m": 0.1}, "diameter_m: is missing"),
         ({"material": "wood", "diameter_m": 1e-3, "length_m": 0.1}, "Input should be 'steel'"),
         ({"material": "steel", "diameter_m": -1e-3, "length_m": 0.1}, "greater than 0"),
-        ({"material": "steel", "youngs_modulus_pa": 1e9, "diameter_m": 1e-3, "length_m": 0.1}, "allowed is this or material"),
+        (
+            {"material": "steel", "youngs_modulus_pa": 1e9, "diameter_m": 1e-3, "length_m": 0.1},
+            "allowed is this or material",
+        ),
         ({}, "stiffness_n_m"),
     ],
 )

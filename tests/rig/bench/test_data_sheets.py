@@ -136,8 +136,16 @@ def test_a_bench_may_start_from_one_with_sensors_in_another_folder(tmp_path):
     [
         ('"A1"', '"A11"', "serial_number = 'A11': sensors.toml has no such sensor, did you mean 'A1'?; allowed is one"),
         ('"F1",', '"F1", calibrated = "2026-01-01",', "channels[0].calibrated = '2026-01-01': sensors.toml says it"),
-        ('"A1",', '"A1", sensitivity_v_per_unit = 0.01,', "channels[1].sensitivity_v_per_unit = 0.01: sensors.toml says"),
-        ('"A1",', '"A1", sensitivity = "1 mV/g",', "channels[1].sensitivity = '1 mV/g': sensors.toml says it of sensor"),
+        (
+            '"A1",',
+            '"A1", sensitivity_v_per_unit = 0.01,',
+            "channels[1].sensitivity_v_per_unit = 0.01: sensors.toml says",
+        ),
+        (
+            '"A1",',
+            '"A1", sensitivity = "1 mV/g",',
+            "channels[1].sensitivity = '1 mV/g': sensors.toml says it of sensor",
+        ),
     ],
 )
 def test_nothing_is_said_twice_and_no_sensor_is_unknown(old, new, fault, tmp_path):
@@ -194,6 +202,8 @@ def test_a_bench_that_asks_for_it_is_not_armed_while_a_calibration_is_overdue(tm
     path = written(tmp_path)
     assert armed(load_bench(path), Physical, "backbone", True)["how"] == "switch"
     path.write_text(path.read_text() + "[arming]\nrequire_calibration = true\n")
-    with pytest.raises(NotArmed, match=r"channel force: calibration was due on 2025-02-28 \(sensor F1\), and \[arming\]"):
+    with pytest.raises(
+        NotArmed, match=r"channel force: calibration was due on 2025-02-28 \(sensor F1\), and \[arming\]"
+    ):
         armed(load_bench(path), Physical, "backbone", True)
     assert armed(load_bench(path), Physical, "check", True)["how"] == "switch"
