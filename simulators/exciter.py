@@ -149,19 +149,17 @@ class Stinger(Part):
     def _from_geometry(cls, table: Any) -> Any:
         if not isinstance(table, dict) or "stiffness_n_m" in table or not any(table.get(key) for key in GEOMETRY):
             return table
-        material = table.get("material")
+        material, diameter, length = (table.get(key) for key in ("material", "diameter_m", "length_m"))
         modulus = table.get("youngs_modulus_pa") or YOUNGS_MODULUS_PA.get(str(material))
-        if modulus is None and material is not None:
-            return table  # its own choices say what is wrong
-        sizes = [table.get(key) for key in ("diameter_m", "length_m")]
-        missing = [key for key, value in zip(GEOMETRY[2:], sizes, strict=True) if value is None]
-        if modulus is None or missing:
-            what = missing[0] if missing else "material"
-            raise ValueError(f"{what}: is missing; allowed is stiffness_n_m, or diameter_m, length_m and a material")
-        if not all(isinstance(value, int | float) and value > 0.0 for value in (modulus, *sizes)):
-            return table  # their own bounds say what is wrong
-        diameter, length = sizes
-        return {**table, "stiffness_n_m": float(modulus) * math.pi * diameter**2 / 4.0 / length}
+        given = {"diameter_m": diameter, "length_m": length, "material": material or modulus}
+        if missing := [key for key, value in given.items() if value is None]:
+            raise ValueError(
+                f"{missing[0]}: is missing; allowed is stiffness_n_m, or diameter_m, length_m and a material"
+            )
+        numbers = [value for value in (modulus, diameter, length) if isinstance(value, int | float) and value > 0.0]
+        if len(numbers) < 3:
+            return table  # the field's own bounds say what is wrong
+        return {**table, "stiffness_n_m": numbers[0] * math.pi * numbers[1] ** 2 / 4.0 / numbers[2]}
 
     @model_validator(mode="after")
     def _one_material(self) -> "Stinger":

@@ -1,4 +1,4 @@
-"""New files to begin with: bench, plan, bench with a virtual rig, sensors, driver; each with the schema that an editor checks it by."""
+"""New files to begin with: bench, plan, bench with a virtual rig, sensors, driver; each with its schema for the editor."""
 
 import json
 import os

@@ -25,7 +25,7 @@ def schema_names() -> tuple[str, ...]:
 
 
 def schema_of(name: str) -> Schema:
-    """Return the schema ``bench``, ``plan``, ``rig``, ``sensors`` or that of a kind of plan; `ConfigurationError` for another name."""
+    """Return the schema of that name (`schema_names`); raise `ConfigurationError` for another name."""
     if name not in schema_names():
         raise ConfigurationError(f"WHAT = {shown(name)}: allowed is {', '.join(schema_names())}")
     named = {"bench": bench_schema, "rig": rig_schema, "plan": plan_schema, "sensors": sensors_schema}

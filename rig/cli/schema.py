@@ -11,9 +11,7 @@ __all__ = ["new", "schema"]
 
 
 def schema(
-    what: Annotated[
-        str, typer.Argument(help="bench, plan, rig (the parts of a virtual rig), sensors or a kind of plan.")
-    ],
+    what: Annotated[str, typer.Argument(help="bench, plan, rig (parts of a virtual rig), sensors or a kind of plan.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write; default: print it.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -30,7 +28,7 @@ def schema(
 
 def new(
     what: Annotated[
-        str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig), sensors or driver (a folder).")
+        str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig), sensors or driver (folder).")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write; of a driver, the folder.")],
     plan_kind: Annotated[str, typer.Option("--kind", help="Kind of a plan.")] = "backbone",

@@ -1,5 +1,7 @@
 """Sensitivities as data sheets have them, and sensors by serial number."""
 
+from typing import ClassVar
+
 import pytest
 
 from rig.arming.arming import armed
@@ -175,10 +177,10 @@ def test_what_is_wrong_in_a_file_of_sensors_is_said_with_its_name(old, new, faul
 
 def test_a_file_of_sensors_that_is_none_is_refused(tmp_path):
     (tmp_path / "b.toml").write_text('base = "magnet-beam"\nsensors = 3\n')
-    with pytest.raises(ConfigurationError, match="sensors = 3: allowed is the path of a .toml file"):
+    with pytest.raises(ConfigurationError, match=r"sensors = 3: allowed is the path of a \.toml file"):
         load_bench(tmp_path / "b.toml")
     (tmp_path / "b.toml").write_text('base = "magnet-beam"\nsensors = "none.toml"\n')
-    with pytest.raises(ConfigurationError, match="none.toml"):
+    with pytest.raises(ConfigurationError, match=r"none\.toml"):
         load_bench(tmp_path / "b.toml")
 
 
@@ -193,7 +195,7 @@ class Physical:
     class capabilities:  # noqa: N801
         virtual, safe_without_host = False, True
 
-    identity: dict[str, str] = {}
+    identity: ClassVar[dict[str, str]] = {}
     latched = ""
 
 

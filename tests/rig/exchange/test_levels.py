@@ -110,7 +110,7 @@ def test_load_cases_of_another_program_are_taken_apart_where_a_response_is_there
     for number, value in enumerate(values, 1):
         np.testing.assert_allclose(import_file(path, item=number).value[:, 0, 0], value)
     path = written(tmp_path / "b.uff", units(), *(response(v) for v in values))
-    with pytest.raises(ImportFailed, match="a second response of .* in load case 0; wanted is one"):
+    with pytest.raises(ImportFailed, match=r"a second response of .* in load case 0; wanted is one"):
         import_file(path)
 
 
