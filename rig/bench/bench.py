@@ -231,8 +231,8 @@ def load_bench(name_or_path: str | Path) -> Bench:
 
     ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file in the same folder. The
     other entries of the file change the base key by key. If ``driver.name`` differs from the base's, the base's
-    ``driver.options`` are dropped. ``sensors = "sensors.toml"`` names a file of sensors (`rig.bench.sensors`), by a path from the
-    file's folder, to which channels refer by ``serial_number``.
+    ``driver.options`` are dropped. ``sensors = "sensors.toml"`` names a file of sensors (`rig.bench.sensors`) by a path
+    from the file's folder; channels refer to it by ``serial_number``.
 
     Raises `ConfigurationError` if the file is not a valid bench, or if the bench must not run (`rig.bench.cross_checks`).
     """

@@ -15,7 +15,7 @@ def schema(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write; default: print it.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """The JSON Schema of benches, plans, virtual rigs or files of sensors, by which an editor completes and checks their files."""
+    """The JSON Schema of benches, plans, virtual rigs or sensors, by which an editor completes and checks their files."""
     from rig.authoring.new_files import schema_text, written
     from rig.authoring.schemas import schema_of
 

@@ -212,7 +212,8 @@ def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
     if modes and options["item"] in (0, 1):
         return modes_in(datasets, units, options["drive"])
     if (58, 4) in kinds:
-        return _chosen([None] * modes + responses_in(datasets, units), path, options["item"])
+        before = [None] if modes else []  # the modes are item 1
+        return _chosen([*before, *responses_in(datasets, units)], path, options["item"])
     if modes:
         raise ImportFailed(f"{path}: holds modes alone; choose by `item` 1")
     if (58, 1) in kinds:
