@@ -33,7 +33,7 @@ MATPLOTLIB = {
     *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
     *("pyparsing", "six"),
 }
-NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser"}  # the last two are loaded by numba where they are installed
+NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser", "yaml"}  # numba loads the last three where they are installed
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
 FILES = {"numpy", "pydantic", "h5py"}
 CAN = {
