@@ -33,7 +33,8 @@ MATPLOTLIB = {
     *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
     *("pyparsing", "six"),
 }
-NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser", "yaml"}  # numba loads the last three where they are installed
+WHERE_INSTALLED = {"cffi", "pycparser", "yaml", "charset_normalizer"}  # by numba, and by numpy for scipy
+NUMBA = {"numba", "llvmlite", "scipy", *WHERE_INSTALLED}
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
 FILES = {"numpy", "pydantic", "h5py"}
 CAN = {
