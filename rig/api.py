@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from identification import (
     Backbone,
@@ -24,6 +24,7 @@ from rig.campaigns.running.runner import carry_out, take_up
 from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
 from rig.measurements.experiments import experiments
 from rig.measurements.experiments.periods import Periods
+from rig.measurements.sep005 import time_series
 from rig.measurements.tables import points_table, telemetry
 from rig.recording.reader import Recording
 
@@ -117,6 +118,22 @@ class Run:
         (`rig.measurements.tables.telemetry`).
         """
         return telemetry(self.recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every)
+
+    def to_sep005(
+        self,
+        *,
+        columns: Sequence[str] | None = None,
+        part: int | None = None,
+        point: int | None = None,
+        from_s: float | None = None,
+        to_s: float | None = None,
+    ) -> list[dict[str, Any]]:
+        """Return channels and output voltage as time series of SEP005 (SDyPy), one dictionary a signal.
+
+        By default all rows of the last part. ``columns``, ``part``, ``point``, ``from_s`` and ``to_s`` select
+        (`rig.measurements.sep005.time_series`).
+        """
+        return time_series(self.recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s)
 
     def close(self) -> None:
         """Close the file. A temporary file is deleted."""

@@ -1,15 +1,38 @@
 """Electrodynamic exciter and the stinger that joins it to the structure."""
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from simulators.part import Part, Positive
+from simulators.shipped import GEOMETRY, shaker_values
 
 __all__ = ["Exciter", "Stinger"]
 
 NotNegative = Annotated[float, Field(ge=0.0)]
+
+YOUNGS_MODULUS_PA = {"steel": 200e9, "piano-wire": 190e9, "aluminium": 68.9e9, "nylon": 2.76e9}
+"""Young's modulus by material: steel (A36), aluminium (6061-T6) and nylon (6-6) of a textbook's table, 29, 10 and 0.4 million
+psi (Multimedia Engineering Mechanics, ecoursesbook.com, appendix Material Properties); piano wire (ASTM A228) 190 GPa
+(makeitfrom.com). Both looked up in November 2026. Nylon softens with humidity and temperature."""
+
+
+def _one_of(schema: dict[str, Any], key: str, instead: tuple[str, ...]) -> None:
+    """Ask in a schema for ``key`` or else for the keys ``instead``."""
+    schema["required"] = [name for name in schema.get("required", ()) if name not in (key, *instead)]
+    schema["oneOf"] = [{"required": [key]}, {"required": [*instead], "not": {"required": [key]}}]
+
+
+_VALUES = (
+    "armature_mass_kg",
+    "suspension_stiffness_n_m",
+    "suspension_damping_n_s_m",
+    "force_factor_n_a",
+    "resistance_ohm",
+    "inductance_h",
+)
 
 
 class Exciter(Part):
@@ -24,6 +47,11 @@ class Exciter(Part):
     amplifier, inductance that changes with position, eddy currents, heating.
     """
 
+    model_config = ConfigDict(json_schema_extra=lambda schema: _one_of(schema, "shaker", _VALUES))
+
+    shaker: str = ""
+    """A shaker by its name (`rig list`), whose values the other keys change. Without one, moving mass, suspension, force
+    factor, resistance and inductance are given."""
     amplifier: Literal["voltage", "current"] = "voltage"
     """What the amplifier holds at the coil."""
     amplifier_gain: Positive = 1.0
@@ -53,6 +81,13 @@ class Exciter(Part):
     """Resistance R of coil, cable and amplifier together."""
     inductance_h: Positive
     """Coil inductance L."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_shaker(cls, table: Any) -> Any:
+        if isinstance(table, dict) and isinstance(name := table.get("shaker"), str) and name:
+            return {**shaker_values(name), **table}
+        return table
 
     @model_validator(mode="after")
     def _limit_is_the_amplifiers(self) -> "Exciter":
@@ -86,11 +121,49 @@ class Exciter(Part):
 
 
 class Stinger(Part):
-    """The rod between exciter and structure; its force is the measured one: ``F = k_s (x_a - x_d) + c_s (v_a - v_d)``."""
+    """The rod between exciter and structure; its force is the measured one: ``F = k_s (x_a - x_d) + c_s (v_a - v_d)``.
+
+    Not modelled: mass, bending and buckling of the rod.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra=lambda schema: _one_of(schema, "stiffness_n_m", ("diameter_m", "length_m"))
+    )
 
     at: str
     """Name of the drive point."""
     stiffness_n_m: Positive
-    """Axial stiffness k_s = EA/L."""
+    """Axial stiffness k_s. If left out it is EA/L of a round rod of the given material, diameter and length."""
+    material: Literal["steel", "piano-wire", "aluminium", "nylon"] | None = None
+    """Material of the rod: E = 200 GPa for steel, 190 for piano-wire, 68.9 for aluminium, 2.76 for nylon."""
+    youngs_modulus_pa: Positive | None = None
+    """Young's modulus E of a rod of another material."""
+    diameter_m: Positive | None = None
+    """Diameter of the rod."""
+    length_m: Positive | None = None
+    """Free length L of the rod, between its nuts or chucks."""
     damping_n_s_m: NotNegative
     """Axial damping c_s."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_geometry(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or "stiffness_n_m" in table or not any(table.get(key) for key in GEOMETRY):
+            return table
+        material, diameter, length = (table.get(key) for key in ("material", "diameter_m", "length_m"))
+        modulus = table.get("youngs_modulus_pa") or YOUNGS_MODULUS_PA.get(str(material))
+        given = {"diameter_m": diameter, "length_m": length, "material": material or modulus}
+        if missing := [key for key, value in given.items() if value is None]:
+            raise ValueError(
+                f"{missing[0]}: is missing; allowed is stiffness_n_m, or diameter_m, length_m and a material"
+            )
+        numbers = [value for value in (modulus, diameter, length) if isinstance(value, int | float) and value > 0.0]
+        if len(numbers) < 3:
+            return table  # the field's own bounds say what is wrong
+        return {**table, "stiffness_n_m": numbers[0] * math.pi * numbers[1] ** 2 / 4.0 / numbers[2]}
+
+    @model_validator(mode="after")
+    def _one_material(self) -> "Stinger":
+        if self.material is not None and self.youngs_modulus_pa is not None:
+            raise ValueError(f"youngs_modulus_pa = {self.youngs_modulus_pa:g}: allowed is this or material")
+        return self

@@ -1,10 +1,11 @@
-"""The shipped specimens: tables in TOML beside this package, every number labelled with where it comes from."""
+"""Shipped specimens and shakers: tables in TOML beside this package, every number labelled with where it comes from."""
 
 import tomllib
+from functools import cache
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["merged", "shipped_specimens", "specimen_table"]
+__all__ = ["merged", "shaker_descriptions", "shaker_values", "shipped_specimens", "specimen_table", "with_parts_of"]
 
 
 def shipped_specimens() -> tuple[str, ...]:
@@ -18,6 +19,38 @@ def specimen_table(name: str) -> dict[str, Any]:
     if name not in shipped_specimens():
         raise ValueError(f"specimen = {name!r}: allowed is one of {', '.join(shipped_specimens())}")
     return tomllib.loads((files("simulators") / "specimens" / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+@cache
+def _shakers() -> dict[str, dict[str, Any]]:
+    return tomllib.loads((files("simulators") / "shakers.toml").read_text(encoding="utf-8"))
+
+
+def shaker_descriptions() -> dict[str, str]:
+    """What every shaker is and where its numbers come from, by name."""
+    return {name: f"{table['description']}; {table['source']}" for name, table in _shakers().items()}
+
+
+def shaker_values(name: str) -> dict[str, Any]:
+    """The keys of an exciter that a shaker has; `ValueError` names the shakers there are."""
+    if name not in _shakers():
+        raise ValueError(f"shaker = {name!r}: allowed is one of {', '.join(_shakers())}")
+    return {key: value for key, value in _shakers()[name].items() if key not in ("description", "source")}
+
+
+GEOMETRY = ("material", "youngs_modulus_pa", "diameter_m", "length_m")
+"""Keys of a stinger from which its stiffness follows."""
+
+
+def with_parts_of(specimen: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """A specimen with ``changes``; another shaker, or another stinger by geometry, replaces the specimen's values."""
+    base = dict(specimen)
+    exciter, stinger = changes.get("exciter"), changes.get("stinger")
+    if isinstance(exciter, dict) and "shaker" in exciter:
+        base.pop("exciter", None)
+    if isinstance(stinger, dict) and any(key in stinger for key in GEOMETRY) and isinstance(base.get("stinger"), dict):
+        base["stinger"] = {key: value for key, value in base["stinger"].items() if key != "stiffness_n_m"}
+    return merged(base, changes)
 
 
 def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

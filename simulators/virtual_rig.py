@@ -17,7 +17,7 @@ from simulators.plant.compilation import at_rest, rediscretised, rig_arrays
 from simulators.scatter import Deviation, Scatter, deviated
 from simulators.sensing.filters import channel_delays, filter_delay
 from simulators.sensing.parts import Converter, Sensor
-from simulators.shipped import merged, specimen_table
+from simulators.shipped import specimen_table, with_parts_of
 from simulators.sites.elements import Element, Magnet
 from simulators.sites.friction import FrictionSite
 from simulators.structures.structure import ModalStructure, Structure
@@ -72,7 +72,7 @@ class VirtualRig(Part):
     @classmethod
     def _from_specimen(cls, table: Any) -> Any:
         if isinstance(table, dict) and isinstance(table.get("specimen"), str):
-            return merged(specimen_table(table["specimen"]), table)
+            return with_parts_of(specimen_table(table["specimen"]), table)
         return table
 
     @model_validator(mode="after")

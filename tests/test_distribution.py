@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -130,3 +131,18 @@ def test_the_version_and_the_licence_are_those_of_the_citation():
     assert f"\nlicense: {project['license']}\n" in citation
     assert f"\n  - name: {project['authors'][0]['name']}\n" in citation
     assert f"\n## [{project['version']}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_uvx_runs_the_command_from_a_clone(tmp_path):
+    """Into an environment of its own, from a registry; only where uv is installed, which no extra brings."""
+    beside = Path(sys.executable).with_name("uvx")
+    found = str(beside) if beside.exists() else shutil.which("uvx")
+    if found is None:
+        pytest.skip("uvx is not installed (pip install uv)")
+    ready = [found, "--quiet", "--from", str(ROOT), "--python", sys.executable]
+    out = subprocess.run([*ready, "rig", "--help"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    if out.returncode and any(word in out.stderr for word in ("Failed to fetch", "error sending request", "dns error")):
+        pytest.skip("no package registry can be reached")
+    assert out.returncode == 0, out.stderr
+    assert "Usage: rig" in out.stdout

@@ -49,6 +49,8 @@ class MultisineMapping(MappingTable):
     """Name of the noise-free channel, the voltage; if left out, the force is used, which gives the H1 estimate."""
     realisations: Path | None = None
     """Path of a list with one structure per realisation; the other paths are relative to these structures."""
+    records: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
+    """Numbers of the records (columns, or structures) that are read, from 1: those of one level; by default all."""
     channels: Annotated[tuple[SignalMapping, ...], Field(min_length=2)]
     """The channels, one of role ``force``."""
 
@@ -71,6 +73,10 @@ def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
                     f"channels: have {record.shape[1]} samples, needs one period, {design.period_samples} at least"
                 )
             records.append(record[:, :whole] * factors[:, None])
+    if mapping.records is not None:
+        if unknown := [number for number in mapping.records if number > len(records)]:
+            raise IdentificationError(f"records: {unknown[0]}, the data has 1 to {len(records)}")
+        records = [records[number - 1] for number in mapping.records]
     return periodic_spectra(records, channels, design, transient_periods=mapping.transient_periods)
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from rig.arming.bench_memory import BenchMemory, fingerprint, memory_of, now, remember
-from rig.arming.run_facts import user_name
+from rig.arming.run_facts import calibration_remarks, user_name
 from rig.bench import Bench
 from rig.bench.cross_checks import cautions as cautions_of_limits
 from rig.daq import Capabilities
@@ -71,11 +71,15 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
 
     A virtual rig needs no arming. ``[arming] automated`` arms a bench if there are no reasons against it. ``arm`` True arms it
     unless a trip is remembered or the device has latched, because no person has seen these. Neither suffices if the output
-    would continue after the host dies and no hardware emergency stop is declared. Raises `NotArmed`, which says how to arm,
+    would continue after the host dies and no hardware emergency stop is declared, or if a calibration is overdue and
+    ``[arming] require_calibration`` is true. Raises `NotArmed`, which says how to arm,
     before anything has moved.
     """
     if session.capabilities.virtual:
         return {"how": "virtual", "by": "", "at": now(), "cautions": []}
+    overdue = calibration_remarks(bench, datetime.now(UTC).date())
+    if bench.arming.require_calibration and overdue and what != CHECK:
+        raise NotArmed(f"bench {bench.name}: {'; '.join(overdue)}, and [arming] require_calibration = true")
     memory = memory_of(bench)
     unseen = _unseen(memory, session.latched)
     unguarded = unguarded_text(bench, session.capabilities)

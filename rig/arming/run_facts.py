@@ -59,6 +59,7 @@ def calibration_remarks(bench: Bench, today: date) -> list[str]:
     """Return one line for each sensor whose calibration is past its due date."""
     return [
         f"channel {channel.name}: calibration was due on {channel.calibration_due}"
+        + (f" (sensor {channel.serial_number})" if channel.serial_number else "")
         for channel in bench.channels
         if channel.calibration_due and date.fromisoformat(channel.calibration_due) < today
     ]

@@ -1,4 +1,4 @@
-"""New files to begin with: bench, plan, bench with a virtual rig, driver; each with the schema that an editor checks it by."""
+"""New files to begin with: bench, plan, bench with a virtual rig, sensors, driver; each with its schema for the editor."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def new_file(
     schema_file: Path | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write a new ``"bench"``, ``"plan"`` or ``"rig"`` and its schema; return the path of the schema's file.
+    """Write a new ``"bench"``, ``"plan"``, ``"rig"`` or ``"sensors"`` and its schema; return the path of the schema's file.
 
     A plan is of a ``kind`` and for a ``bench``; its numbers are those of the shipped plan of that kind, for this bench where
     there is one. A ``"rig"`` is a bench with a virtual rig of all parts. The schema is written beside the file, or to
@@ -42,8 +42,9 @@ def new_file(
 
     Raises `ConfigurationError` for another kind, `rig.errors.RecordingError` if a file exists and ``overwrite`` is false.
     """
-    name = kind if what == "plan" else "bench"
-    table = _plan(kind, bench) if what == "plan" else {**_start(what), "name": output.stem}
+    name = {"plan": kind, "sensors": "sensors"}.get(what, "bench")
+    named = {} if what == "sensors" else {"name": output.stem}
+    table = _plan(kind, bench) if what == "plan" else {**_start(what), **named}
     schema = schema_of(name)
     beside = schema_file or output.with_name(f"{name}.schema.json")
     text = f"#:schema {_reference(beside, output)}\n{commented(table, schema)}"

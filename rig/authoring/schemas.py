@@ -1,4 +1,4 @@
-"""JSON Schemas of benches, plans and virtual rigs, written from the models that read them.
+"""JSON Schemas of benches, plans, virtual rigs and files of sensors, written from the models that read them.
 
 The description of a key is the docstring under its field, its title has its unit. A schema refuses what the program refuses
 for a reason that a schema can express: an unknown key, a wrong type, a value out of range, a missing key, a wrong choice.
@@ -14,21 +14,22 @@ from rig.authoring.draft7 import DRAFT, Schema, draft7, plain
 from rig.errors import ConfigurationError
 from rig.text.printable import shown
 
-__all__ = ["bench_schema", "plan_schema", "rig_schema", "schema_names", "schema_of"]
+__all__ = ["bench_schema", "plan_schema", "rig_schema", "schema_names", "schema_of", "sensors_schema"]
 
 
 def schema_names() -> tuple[str, ...]:
-    """Names of all schemas: ``bench``, ``plan``, ``rig``, and every kind of plan."""
+    """Names of all schemas: ``bench``, ``plan``, ``rig``, ``sensors``, and every kind of plan."""
     from rig.campaigns.kinds import KINDS
 
-    return ("bench", "plan", "rig", *KINDS)
+    return ("bench", "plan", "rig", "sensors", *KINDS)
 
 
 def schema_of(name: str) -> Schema:
-    """Return the schema ``bench``, ``plan``, ``rig`` or that of a kind of plan; `ConfigurationError` for another name."""
+    """Return the schema of that name (`schema_names`); raise `ConfigurationError` for another name."""
     if name not in schema_names():
         raise ConfigurationError(f"WHAT = {shown(name)}: allowed is {', '.join(schema_names())}")
-    return {"bench": bench_schema, "rig": rig_schema, "plan": plan_schema}.get(name, lambda: plan_schema(name))()
+    named = {"bench": bench_schema, "rig": rig_schema, "plan": plan_schema, "sensors": sensors_schema}
+    return named.get(name, lambda: plan_schema(name))()
 
 
 def plan_schema(kind: str | None = None) -> Schema:
@@ -75,7 +76,7 @@ def bench_schema() -> Schema:
         asked["properties"]["driver"].setdefault("allOf", []).append(_where_named(name, rules))
         definitions[f"{name}-options"] = loosened.table(option)
     _describe_driver(definitions["DriverChoiceChanges"], options)
-    loose["properties"] = {"base": _BASE, **loose["properties"]}
+    loose["properties"] = {"base": _BASE, "sensors": _SENSORS, **loose["properties"]}
     loose["allOf"] = [*loose.get("allOf", ()), _unless("base", asked)]
     return _whole({**loose, "definitions": definitions}, "bench")
 
@@ -85,6 +86,20 @@ _BASE = {
     "type": "string",
     "description": "Shipped bench (`rig list`), or a .toml file in the same folder, that this file changes key by key.",
 }
+
+_SENSORS = {
+    "title": "sensors",
+    "type": "string",
+    "pattern": r"\.toml$",
+    "description": "File of sensors (`rig new sensors`), to which channels refer by serial_number.",
+}
+
+
+def sensors_schema() -> Schema:
+    """Return the schema of a file of sensors by serial number."""
+    from rig.bench.sensors import SensorFile
+
+    return _whole(_of(SensorFile), "sensors")
 
 
 def _describe_driver(table: Schema, options: Schema) -> None:

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from rig.bench.channels import Channel
 from rig.bench.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
 from rig.bench.cross_checks import refuse
+from rig.bench.sensors import with_sensors
 from rig.errors import ConfigurationError
 from rig.text.printable import shown
 
@@ -105,6 +106,8 @@ class Arming(Configured):
     largest_trip_probability: float | None = Field(None, gt=0, le=1)
     """Largest probability of a trip with which a plan is armed. The plan then needs a rehearsal (``rig rehearse``) whose 95 %
     interval stays below it. Without this key no rehearsal is needed."""
+    require_calibration: bool = False
+    """Whether the bench is not armed while the calibration of a sensor is overdue; a check may still run."""
     rehearsal_valid_h: float = Field(168.0, gt=0, le=8760)
     """Age up to which such a rehearsal counts, h."""
     hardware_emergency_stop: bool = False
@@ -238,11 +241,18 @@ def load_bench(name_or_path: str | Path) -> Bench:
 
     ``base = "magnet-beam"`` in the file starts from a shipped bench, ``base = "mine.toml"`` from a file in the same folder. The
     other entries of the file change the base key by key. If ``driver.name`` differs from the base's, the base's
-    ``driver.options`` are dropped.
+    ``driver.options`` are dropped. ``sensors = "sensors.toml"`` names a file of sensors (`rig.bench.sensors`) by a path
+    from the file's folder; channels refer to it by ``serial_number``.
 
     Raises `ConfigurationError` if the file is not a valid bench, or if the bench must not run (`rig.bench.cross_checks`).
     """
-    bench = validated(Bench, _with_base(name_or_path, ()), str(name_or_path))
+    table = _with_base(name_or_path, ())
+    sensors = table.pop("sensors", None)
+    try:
+        table = table if sensors is None else with_sensors(table, sensors)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{name_or_path}: {error}") from None
+    bench = validated(Bench, table, str(name_or_path))
     try:
         refuse(bench)
     except ConfigurationError as error:
@@ -254,6 +264,10 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, An
     """Return the table of a bench merged with its bases; ``over`` are the files for which this one is a base."""
     path = find_toml(name_or_path, _folder(), "bench")
     table = read_toml(path)
+    if (sensors := table.get("sensors")) is not None:
+        if not isinstance(sensors, str) or not sensors.endswith(".toml"):
+            raise ConfigurationError(f"{name_or_path}: sensors = {shown(sensors)}: allowed is the path of a .toml file")
+        table["sensors"] = path.parent / sensors
     base = table.pop("base", None)
     if base is None:
         return table

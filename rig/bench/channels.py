@@ -1,21 +1,27 @@
 """Input channels: what is connected to them and how they are scaled."""
 
+import math
 from datetime import date
 from enum import IntEnum
-from typing import Self
+from typing import Any, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
 from rig.bench.configuration import Configured
+from rig.bench.data_sheet import volts_per_unit
+from rig.text.printable import shown
 
-__all__ = ["Channel", "Role"]
+__all__ = ["DATE", "Channel", "Role", "check_day"]
 
 UNITS = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}
 """Unit of a channel by its role; a monitor has any."""
 DATE = r"^(\d{4}-\d{2}-\d{2})?$"
+"""Pattern of a day, or of no day."""
+SAME = 1e-9  # relative difference up to which two sensitivities are one
 
 
-def _check_day(name: str, text: str) -> None:
+def check_day(name: str, text: str) -> None:
+    """Raise `ValueError` for a text of the pattern `DATE` that is no day, such as 2026-02-30."""
     try:
         date.fromisoformat(text or "2000-01-01")
     except ValueError:
@@ -35,17 +41,22 @@ class Role(IntEnum):
     """Anything else that is worth a column."""
 
 
+def _rules(schema: dict[str, Any]) -> None:
+    """Add to a schema what depends on the role, and the three ways in which a sensitivity is given."""
+    schema["required"] = [key for key in schema["required"] if key != "sensitivity_v_per_unit"]
+    ways = [{"required": [key]} for key in ("sensitivity_v_per_unit", "sensitivity", "serial_number")]
+    any_unit = [{"required": [key]} for key in ("unit", "sensitivity", "serial_number")]
+    schema["anyOf"] = ways
+    schema["allOf"] = [
+        {"if": {"properties": {"role": {"const": role}}}, "then": {"properties": {"unit": {"const": unit}}}}
+        for role, unit in UNITS.items()
+    ] + [{"if": {"properties": {"role": {"const": "monitor"}}}, "then": {"anyOf": any_unit}}]
+
+
 class Channel(Configured):
     """An input channel: what is connected to it and how it is scaled."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "allOf": [
-                {"if": {"properties": {"role": {"const": role}}}, "then": {"properties": {"unit": {"const": unit}}}}
-                for role, unit in UNITS.items()
-            ]
-        }
-    )
+    model_config = ConfigDict(json_schema_extra=_rules)
 
     name: str = Field(min_length=1, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     """Name, used in files and messages."""
@@ -55,10 +66,17 @@ class Channel(Configured):
     )
     """What it measures: the force at the drive point (``force``), the acceleration there (``drive``) or elsewhere
     (``response``), or anything else (``monitor``)."""
-    unit: str
-    """Physical unit: N for a force, m/s^2 for drive and response."""
+    unit: str = ""
+    """Physical unit: N for a force, m/s^2 for drive and response, which need not be given; of a monitor, any."""
     sensitivity_v_per_unit: float = Field(json_schema_extra={"not": {"const": 0}})
-    """Volts per unit; negative for a sensor that is mounted the other way round."""
+    """Volts per unit; negative for a sensor that is mounted the other way round. Follows from ``sensitivity`` where that is
+    given."""
+    sensitivity: str = ""
+    """Sensitivity as on the data sheet, a number and its unit: ``100 mV/g``, ``22.4 mV/N``, ``3.9 pC/N``, ``1 mm/V``."""
+    amplifier_gain: str = ""
+    """Gain of the amplifier behind a ``sensitivity``: ``10 mV/pC`` of a charge amplifier, which pC need; ``10`` of another."""
+    inverted: bool = False
+    """Whether the sensor with this ``sensitivity`` is mounted the other way round."""
     range_v: float = Field(10.0, gt=0, le=100)
     """Largest voltage that sensor and converter deliver undistorted, V."""
     resolution_v: float = Field(20.0 / 65536.0, gt=0, le=1)
@@ -68,13 +86,15 @@ class Channel(Configured):
     skew_samples: float = Field(0.0, ge=-100, le=100)
     """Delay of this channel behind the others, samples; taken out of the measured phase lag and of every amplitude."""
     sensor: str = ""
-    """Type, for the record."""
+    """Make and model, for the record."""
     serial_number: str = ""
-    """Serial number of the sensor, for the record."""
+    """Serial number of the sensor. If the bench's file of sensors has it, what it says of the sensor is taken from there."""
     calibrated: str = Field("", pattern=DATE)
     """Day of its last calibration, YYYY-MM-DD."""
     calibration_due: str = Field("", pattern=DATE)
     """Day from which on that calibration is too old, YYYY-MM-DD; a run that begins later says so."""
+    certificate: str = ""
+    """Certificate of that calibration, for the record."""
     loopback: bool = False
     """Whether the output itself is connected to this channel, of role ``monitor``: a check then measures the latency."""
     mode_shape: float | None = None
@@ -82,10 +102,43 @@ class Channel(Configured):
     where it moves with the drive point. A check then tells its polarity, and whether it has been swapped with another; levels
     in metres are checked at this channel too."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _from_data_sheet(cls, table: Any) -> Any:
+        """Fill in ``unit`` and ``sensitivity_v_per_unit`` where role and data sheet say them."""
+        if not isinstance(table, dict):
+            return table
+        unit = table.get("unit") or UNITS.get(str(table.get("role")), "")
+        sheet, gain, inverted = (table.get(key) for key in ("sensitivity", "amplifier_gain", "inverted"))
+        if not sheet and sheet in (None, ""):
+            if gain or inverted:
+                what = "amplifier_gain" if gain else "inverted"
+                raise ValueError(f"{what}: allowed is beside `sensitivity`; sensitivity_v_per_unit holds gain and sign")
+            return {**table, "unit": unit}
+        if not isinstance(sheet, str) or not isinstance(gain or "", str):
+            key, value = ("amplifier_gain", gain) if isinstance(sheet, str) else ("sensitivity", sheet)
+            raise ValueError(f"{key} = {shown(value)}: allowed is a text with number and unit, such as '100 mV/g'")
+        volts, of = volts_per_unit(sheet, gain or "")
+        if unit and of != unit:
+            raise ValueError(
+                f"sensitivity = {sheet!r}: is per {of}, the channel is in {unit}: allowed is one per {unit}"
+            )
+        volts = -volts if inverted is True else volts
+        given = table.get("sensitivity_v_per_unit", volts)
+        if isinstance(given, float) and not math.isclose(given, volts, rel_tol=SAME):
+            raise ValueError(
+                f"sensitivity_v_per_unit = {given:g}: sensitivity = {sheet!r} makes it {volts:.6g}; allowed is one of the two"
+            )
+        return {**table, "unit": of, "sensitivity_v_per_unit": volts}
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.sensitivity_v_per_unit == 0.0:
             raise ValueError("sensitivity_v_per_unit = 0: allowed is any number but 0")
+        if not self.unit:
+            raise ValueError(
+                "unit: is missing, which a channel with role 'monitor' needs: allowed is its physical unit"
+            )
         if self.loopback and self.role != "monitor":
             raise ValueError(f"loopback: allowed is a channel with role 'monitor', {self.name!r} has {self.role!r}")
         if self.mode_shape is not None and self.role != "response":
@@ -94,7 +147,7 @@ class Channel(Configured):
                 "point is specimen.drive_mode_shape"
             )
         for name in ("calibrated", "calibration_due"):
-            _check_day(name, getattr(self, name))
+            check_day(name, getattr(self, name))
         wanted = UNITS.get(self.role, self.unit)
         if self.unit != wanted:
             raise ValueError(f"unit = {self.unit!r}: a channel with role {self.role!r} is in {wanted!r}")

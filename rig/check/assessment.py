@@ -13,6 +13,7 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
+from rig.check.calibration import calibration_findings
 from rig.check.findings import Finding, failed
 from rig.check.judging import driven_findings, latency_findings
 from rig.check.recorded import about, is_check
@@ -67,6 +68,7 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
     findings = [
         *_how_it_ended(recording, bench),
         *_limits(bench),
+        *calibration_findings(bench, recording.started[:10]),
         *silent_findings(bench, _silence(recording, bench, plan)),
     ]
     found = responses_in(recording)

@@ -40,6 +40,9 @@ def export_(
         list[int] | None, typer.Option(help="Point whose samples are wanted, from 1; may be repeated.", min=1)
     ] = None,
     item: Annotated[int, typer.Option(help="Which object, where the file holds several.", min=0)] = 0,
+    encoding: Annotated[
+        str, typer.Option(help="UFF: ascii or binary; else time data are binary, all else ASCII.")
+    ] = "",
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -51,9 +54,8 @@ def export_(
 
     format_ = format_of(output, to, "--to")
     keep_existing([file], output, overwrite)
-    written = export_file(
-        file, output, format_, data=data, points=tuple(number - 1 for number in point or ()), item=item
-    )
+    numbers = tuple(number - 1 for number in point or ())
+    written = export_file(file, output, format_, data=data, points=numbers, item=item, encoding=encoding)
     if json:
         print_json({"file": str(output), "format": format_, "written": [one.summary() for one in written]})
         return

@@ -1,4 +1,4 @@
-"""``rig list``: shipped benches, plans and specimens, and the parts of a virtual rig."""
+"""``rig list``: shipped benches, plans, specimens and shakers, and the parts of a virtual rig."""
 
 from importlib import resources
 from json import dumps
@@ -14,7 +14,7 @@ def list_(
     part: Annotated[str | None, typer.Argument(help="A part of a virtual rig, whose keys are printed.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
-    """Shipped benches, plans and specimens, installed drivers, and the parts that a virtual rig is built from."""
+    """Shipped benches, plans, specimens and shakers, installed drivers, and the parts that a virtual rig is built from."""
     from rig.drivers.virtual.parts import part_keys
     from rig.text.console import print_json
 
@@ -29,12 +29,15 @@ def list_(
 def _everything() -> dict[str, Any]:
     from rig.drivers import driver_names
     from rig.drivers.virtual.parts import parts, specimens
+    from simulators.shipped import shaker_descriptions
 
+    shakers = [{"name": name, "description": text} for name, text in shaker_descriptions().items()]
     return {
         "benches": _shipped_in("rig.bench"),
         "plans": _shipped_in("rig.campaigns"),
         "drivers": driver_names(),
         "specimens": specimens(),
+        "shakers": shakers,
         "parts": parts(),
     }
 
@@ -47,7 +50,7 @@ def _shipped_in(package: str) -> list[dict[str, str]]:
 
 
 def _print_everything(everything: dict[str, Any]) -> None:
-    headings = ("benches", "plans", "specimens")
+    headings = ("benches", "plans", "specimens", "shakers")
     width = max(len(row["name"]) for heading in headings for row in everything[heading])
     for heading in headings:
         print(f"{heading}:")

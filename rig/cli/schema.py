@@ -11,11 +11,11 @@ __all__ = ["new", "schema"]
 
 
 def schema(
-    what: Annotated[str, typer.Argument(help="bench, plan, rig (the parts of a virtual rig) or a kind of plan.")],
+    what: Annotated[str, typer.Argument(help="bench, plan, rig (parts of a virtual rig), sensors or a kind of plan.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="File to write; default: print it.")] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """The JSON Schema of benches, plans or virtual rigs, by which an editor completes and checks their files."""
+    """The JSON Schema of benches, plans, virtual rigs or sensors, by which an editor completes and checks their files."""
     from rig.authoring.new_files import schema_text, written
     from rig.authoring.schemas import schema_of
 
@@ -27,7 +27,9 @@ def schema(
 
 
 def new(
-    what: Annotated[str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig) or driver (a folder).")],
+    what: Annotated[
+        str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig), sensors or driver (folder).")
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write; of a driver, the folder.")],
     plan_kind: Annotated[str, typer.Option("--kind", help="Kind of a plan.")] = "backbone",
     bench: Annotated[str | None, typer.Option(help="Bench of a plan; default: that of the shipped plan.")] = None,
@@ -45,7 +47,8 @@ def new(
         new_driver(output, overwrite)
         print(f"{output}: take it apart and put your device in its place (docs/tutorials/a-driver.md)")
         return
-    if what not in ("bench", "plan", "rig"):
-        raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig or driver")
+    if what not in ("bench", "plan", "rig", "sensors"):
+        raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig, sensors or driver")
     beside = new_file(what, output, kind=plan_kind, bench=bench, schema_file=schema_file, overwrite=overwrite)
-    print(f"{output}: a {what} to begin with, checked by {beside}")
+    one = "file of sensors" if what == "sensors" else what
+    print(f"{output}: a {one} to begin with, checked by {beside}")

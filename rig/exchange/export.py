@@ -26,11 +26,14 @@ from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.system.whole_file import whole_file
 from rig.text.contents import Contents
+from rig.text.printable import shown
 
 __all__ = ["DATA", "export_file", "read_objects", "write_contents"]
 
 DATA = ("results", "time")
 """Choices of data to take from a recording."""
+ENCODINGS = ("ascii", "binary")
+"""Choices of the encoding of functions in a universal file."""
 
 
 def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) -> list[Any]:
@@ -86,14 +89,22 @@ def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:
     return out
 
 
-_WRITERS = {"mat": write_mat, "uff": write_uff, "csv": write_csv}
+_WRITERS = {"mat": write_mat, "csv": write_csv}
 
 
 def export_file(
-    source: Path, output: Path, format_: str, *, data: str = "results", points: tuple[int, ...] = (), item: int = 0
+    source: Path,
+    output: Path,
+    format_: str,
+    *,
+    data: str = "results",
+    points: tuple[int, ...] = (),
+    item: int = 0,
+    encoding: str = "",
 ) -> list[Contents]:
     """Write the objects in ``source`` (see `read_objects`), or one of them by its number from 1, in another format.
 
+    ``encoding`` of a universal file is ``ascii`` or ``binary``; by default its time data are binary and all else is ASCII.
     Returns the written contents. Raises `RecordingError` if reading or writing fails; ``output`` is then unchanged.
     """
     try:
@@ -108,14 +119,19 @@ def export_file(
         raise RecordingError(
             f"{source}: {loose.kind} is matrices and no table, for which {format_} has no place; use mat"
         )
-    write_contents(chosen, output, format_)
+    write_contents(chosen, output, format_, encoding)
     return chosen
 
 
-def write_contents(items: list[Contents], output: Path, format_: str) -> None:
-    """Write contents in a format. The file is written completely or not at all."""
+def write_contents(items: list[Contents], output: Path, format_: str, encoding: str = "") -> None:
+    """Write contents in a format, a universal file in an encoding. The file is written completely or not at all."""
+    if encoding and (encoding not in ENCODINGS or format_ != "uff"):
+        raise ConfigurationError(f"`encoding` = {shown(encoding)}: allowed is {' or '.join(ENCODINGS)}, of format uff")
     with whole_file(output) as part:
         try:
-            _WRITERS[format_](items, part)
+            if format_ == "uff":
+                write_uff(items, part, encoding)
+            else:
+                _WRITERS[format_](items, part)
         except RigError as error:
             raise type(error)(f"{output}: {error}") from None

@@ -1,6 +1,6 @@
 """Read measurements and models from files of other programs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ __all__ = [
     "ImportFailed",
     "format_of",
     "import_file",
+    "import_sep005",
     "read_frequency_responses",
     "read_mapping",
 ]
@@ -85,6 +86,27 @@ def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> 
     """Read stepped-sine frequency responses from a MAT file (up to version 7), in SI; errors are as for `import_file`."""
     found: tuple[FrequencyResponse, ...] = import_file(Path(mat_path), "mat", Path(mapping_path))
     return found
+
+
+def import_sep005(series: Sequence[Mapping[str, Any]], mapping: str | Path) -> Any:
+    """Read the measurement in time series of SEP005 (SDyPy), which a mapping describes by their names.
+
+    Parameters
+    ----------
+    series
+        Dictionaries with ``data``, ``name``, ``unit_str`` and ``fs`` or ``time``. Series of one name are realisations.
+    mapping
+        TOML file, such as one of ``kind = "multisine"``.
+
+    Errors are those of `import_file`.
+    """
+    from identification.errors import IdentificationError
+    from rig.exchange.sep005 import data_of_series
+
+    try:
+        return _mapped(data_of_series(series), Path(mapping))
+    except IdentificationError as error:
+        raise ImportFailed(f"the series do not fit {mapping}: {error}") from None
 
 
 def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
@@ -185,12 +207,15 @@ def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
         return _mapped(time_data_in(datasets, units), mapping)
     kinds = {(dataset["type"], dataset.get("func_type", 0)) for dataset in datasets}
     modes = (55, 0) in kinds
-    if modes and (58, 4) in kinds and options["item"] not in (1, 2):
+    if modes and (58, 4) in kinds and not options["item"]:
         raise ImportFailed(f"{path}: holds modes and frequency responses; choose by `item` 1 (modes) or 2 (responses)")
-    if (58, 4) in kinds and not (modes and options["item"] == 1):
-        return responses_in(datasets, units)
-    if modes:
+    if modes and options["item"] in (0, 1):
         return modes_in(datasets, units, options["drive"])
+    if (58, 4) in kinds:
+        before = [None] if modes else []  # the modes are item 1
+        return _chosen([*before, *responses_in(datasets, units)], path, options["item"])
+    if modes:
+        raise ImportFailed(f"{path}: holds modes alone; choose by `item` 1")
     if (58, 1) in kinds:
         raise ImportFailed(f"{path}: holds time data; say by `mapping` with kind = 'multisine' what was played")
     raise ImportFailed(f"{path}: holds neither frequency responses (58, type 4), modes (55) nor time data (58, type 1)")

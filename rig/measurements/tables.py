@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["points_table", "telemetry"]
+__all__ = ["points_table", "selected_rows", "telemetry"]
 
 ABOUT = ("direction", "repeat", "settled", "quality", "reason")
 """What is known of a point of any kind besides its level and results."""
@@ -97,6 +97,30 @@ def telemetry(
         import xarray
     except ImportError:
         raise _missing("xarray") from None
+    number, samples, found = selected_rows(
+        recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every
+    )
+    rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
+    variables = {name: ("time", values, attributes) for name, values, attributes in found}
+    coordinate = ("time", samples / rate_hz, {"units": "s", "long_name": "time from the beginning of the part"})
+    facts = {"kind": recording.kind, "part": number, "sample_rate_hz": rate_hz, "started": recording.started}
+    return xarray.Dataset(variables, {"time": coordinate}, facts)
+
+
+def selected_rows(
+    recording: Recording,
+    *,
+    columns: Sequence[str] | None = None,
+    part: int | None = None,
+    point: int | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    every: int = 1,
+) -> tuple[int, np.ndarray, list[tuple[str, np.ndarray, dict[str, str]]]]:
+    """Return the number of the part, the samples of the rows from its beginning, and name, values and attributes.
+
+    Arguments and errors are those of `telemetry`.
+    """
     if every < 1:
         raise RecordingError(f"`every` = {every}: allowed is from 1")
     number, first, end = _stretch(recording, part, point)
@@ -105,14 +129,8 @@ def telemetry(
     places = StoredSamples(stored)
     start = max(first, places.rows_before(_sample(from_s, rate_hz)))
     stop = end if to_s is None else min(end, places.rows_before(_sample(to_s, rate_hz)))
-    time_s = places.samples(np.arange(start, max(start, stop), every)) / rate_hz
-    variables = {
-        name: ("time", values, attributes)
-        for name, values, attributes in _variables(recording, stored, columns, slice(start, stop), every)
-    }
-    coordinate = ("time", time_s, {"units": "s", "long_name": "time from the beginning of the part"})
-    facts = {"kind": recording.kind, "part": number + 1, "sample_rate_hz": rate_hz, "started": recording.started}
-    return xarray.Dataset(variables, {"time": coordinate}, facts)
+    samples = places.samples(np.arange(start, max(start, stop), every))
+    return number + 1, samples, _variables(recording, stored, columns, slice(start, stop), every)
 
 
 def _sample(time_s: float | None, rate_hz: float) -> int:

@@ -57,7 +57,7 @@ def bench_section(recording: Recording) -> Section:
                 str(one.get("serial_number") or "-"),
                 _sensitivity(one),
                 number(one.get("range_v"), "g"),
-                str(one.get("calibrated") or "-"),
+                _calibrated(one),
                 str(one.get("calibration_due") or "-") + (" (overdue)" if i in overdue else ""),
             )
             for i, one in enumerate(channels)
@@ -79,7 +79,16 @@ def bench_section(recording: Recording) -> Section:
     return Section("Bench and sensors", blocks)
 
 
+def _calibrated(channel: Mapping[str, Any]) -> str:
+    certificate = f" ({channel['certificate']})" if channel.get("certificate") else ""
+    return (str(channel.get("calibrated") or "") + certificate).strip() or "-"
+
+
 def _sensitivity(channel: Mapping[str, Any]) -> str:
+    """Return the sensitivity as on the data sheet, or else in mV per unit."""
+    if sheet := channel.get("sensitivity"):
+        gain = f" x {channel['amplifier_gain']}" if channel.get("amplifier_gain") else ""
+        return f"{sheet}{gain}" + (", inverted" if channel.get("inverted") else "")
     unit = str(channel["unit"])
     return f"{number(channel['sensitivity_v_per_unit'], '.6g', 1e3)} mV/{f'({unit})' if '/' in unit else unit}"
 

@@ -90,6 +90,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "integrity": recording.integrity,
         "specimen": bench["specimen"]["name"],
         "bench": bench["name"],
+        "sensors": _sensors(bench["channels"], recording.started[:10]),
         "started": recording.started,
         "software_version": recording.software_version,
         "seed": recording.seed,
@@ -115,6 +116,20 @@ def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[Any]]) -
     """Return the names of what ended the run early or spoilt points, by which the documentation explains them."""
     names = [*(end["reason"] for end in ends[-1:]), *(str(point.quality) for point in points if not point.accepted)]
     return list(dict.fromkeys(page_of(name) for name in names if page_of(name) not in UNEXPLAINED))
+
+
+def _sensors(channels: Sequence[Mapping[str, Any]], day: str) -> list[dict[str, Any]]:
+    """Return what the bench says of the sensors that have a serial number or a calibration."""
+    keys = ("sensor", "serial_number", "sensitivity", "amplifier_gain", "calibrated", "calibration_due", "certificate")
+    return [
+        {
+            "channel": one["name"],
+            **{key: one.get(key) or None for key in keys},
+            "overdue": bool(one.get("calibration_due")) and one["calibration_due"] < day,
+        }
+        for one in channels
+        if one.get("serial_number") or one.get("calibrated") or one.get("calibration_due")
+    ]
 
 
 def _about(about: Mapping[str, Any] | None) -> dict[str, Any] | None:

@@ -90,6 +90,8 @@ def print_summary(summary: dict[str, Any]) -> None:
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
         _print_points(summary["kind"], summary["former_points"])
+    for sensor in summary["sensors"]:
+        print(f"sensor of {sensor['channel']}: {_sensor_line(sensor)}")
     print(f"loop: {loop_line(summary['loop'])}")
     for number_shown, part in enumerate(summary["parts"], 1):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
@@ -100,6 +102,19 @@ def print_summary(summary: dict[str, Any]) -> None:
         _print_about(part["about"] or {})
         print_rehearsal((part["about"] or {}).get("rehearsal"), part.get("beside_rehearsal"))
         print_loop(part["loop"] or {}, part["counters"] or {})
+
+
+def _sensor_line(sensor: Mapping[str, Any]) -> str:
+    """Return make and model, serial number, sensitivity and calibration of a sensor in one line."""
+    told = {
+        "serial_number": "no. ",
+        "calibrated": "calibrated ",
+        "calibration_due": "due ",
+        "certificate": "certificate ",
+    }
+    keys = ("sensor", "serial_number", "sensitivity", "amplifier_gain", "calibrated", "calibration_due", "certificate")
+    line = ", ".join(f"{told.get(key, '')}{sensor[key]}" for key in keys if sensor[key])
+    return line + (" (overdue)" if sensor["overdue"] else "")
 
 
 def _print_advice(part: Mapping[str, Any]) -> None:

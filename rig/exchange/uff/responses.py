@@ -22,21 +22,33 @@ def _names(dataset: Dataset) -> tuple[str, str]:
     return degree_of(dataset, "rsp"), degree_of(dataset, "ref")
 
 
-def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
-    """Return the functions of type 4 as a `FrequencyResponseMatrix`, or as the levels of a stepped sine of this package.
+def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> list[Any]:
+    """Return the functions of type 4 as one or several objects: `FrequencyResponseMatrix`, or levels of a stepped sine.
 
-    A response with the node and axis of a reference is the drive point. Raises `ImportFailed` for missing or duplicate paths,
-    unequal frequencies, or unclear units.
+    Where a response is there more than once, each load case is a matrix of its own, in the order of the file: a level of a
+    multisine, in a file of this package. The levels of a stepped sine of this package are one object. A response with the node
+    and axis of a reference is the drive point. Raises `ImportFailed` for missing or duplicate paths, unequal frequencies, or
+    unclear units.
     """
     functions = [dataset for dataset in datasets if dataset["type"] == 58 and dataset["func_type"] == 4]
     units = file_units(datasets, assumed)
     if functions and all(function["id4"] == "vibrolock frequency-responses" for function in functions):
-        return _stepped_sines(datasets, functions)
+        return [_stepped_sines(datasets, functions)]
     if not functions:
         raise ImportFailed(f"no frequency response (dataset 58 of function type 4) among {len(datasets)} datasets")
+    names = [_names(function) for function in functions]
+    if len(set(names)) == len(names):
+        return [_matrix(functions, units)]
+    cases = dict.fromkeys(function["load_case_id"] for function in functions)
+    return [_matrix([one for one in functions if one["load_case_id"] == case], units) for case in cases]
+
+
+def _matrix(functions: Sequence[Dataset], units: FileUnits) -> FrequencyResponseMatrix:
+    """Return frequency responses of all outputs to all inputs; each is there once."""
     paths: dict[tuple[str, str], Any] = {}
     outputs: dict[str, Channel] = {}
     inputs: dict[str, Channel] = {}
+    rms: dict[str, float] = {}
     frequency_hz = np.asarray(functions[0]["x"], dtype=np.float64)
     for function in functions:
         where, x = function["where"], function["x"]
@@ -44,9 +56,13 @@ def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
             raise ImportFailed(f"{where}: its frequencies are not those of the first; import such files one by one")
         output, source = _names(function)
         if (output, source) in paths:
-            raise ImportFailed(f"{where}: a second response of {output} to {source}; wanted is one, take levels apart")
+            raise ImportFailed(
+                f"{where}: a second response of {output} to {source} in load case {function['load_case_id']}; wanted is one"
+            )
         value, channels = _path(function, units, output, source)
         paths[output, source] = value
+        if told := re.search(r", input RMS (\S+) ", function["id5"] + " "):
+            rms[source] = float(told[1])
         for known, channel in zip((outputs, inputs), channels, strict=True):
             if known.setdefault(channel.name, channel).unit != channel.unit:
                 raise ImportFailed(
@@ -64,6 +80,7 @@ def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> Any:
         frequency_hz=frequency_hz,
         value=np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1),
         estimator=_estimator(functions[0]),
+        input_rms=tuple(rms[name] for name in inputs) if set(rms) == set(inputs) else (),
         specimen="" if functions[0]["id2"] == "NONE" else functions[0]["id2"],
     )
 

@@ -22,10 +22,14 @@ __all__ = ["write_uff"]
 
 _TIME_RESPONSE, _GENERAL, _RESPONSE_FUNCTION = 1, 0, 4
 _PROGRAM = "vibrolock"
+_MATRIX = "frequency-response-matrix"
 
 
-def write_uff(items: Sequence[Contents], path: Path) -> None:
+def write_uff(items: Sequence[Contents], path: Path, encoding: str = "") -> None:
     """Write header, units (SI) and the datasets of all items to an empty file; may raise any error of pyuff.
+
+    ``encoding`` of the functions (dataset 58) is ``ascii`` (12 digits; 6 for uneven abscissas) or ``binary`` (every bit); by
+    default time data are binary and all else is ASCII. Levels of frequency responses are told apart by the load case, from 1.
 
     Raises `RecordingError` for a kind that universal files cannot represent, and for NaN in a function.
     """
@@ -37,15 +41,24 @@ def write_uff(items: Sequence[Contents], path: Path) -> None:
             return False
 
     writer = Writer(str(path))
-    for dataset in [
-        *_head(items),
-        *(dataset for item in items for dataset in _DATASETS.get(item.kind, _refused)(item)),
-    ]:
+    for dataset in [*_head(items), *_functions(items, encoding)]:
         if not np.all(np.isfinite(dataset.get("data", 0.0))):
             raise RecordingError(f"'{dataset['id1']}' holds a number that is not finite, which universal files cannot")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves a binary file to the garbage collector
             writer.write_sets(dataset, "add")
+
+
+def _functions(items: Sequence[Contents], encoding: str) -> Iterator[dict[str, Any]]:
+    """Yield the datasets of all items in an encoding; levels of frequency responses with numbers as load cases."""
+    several = sum(item.kind == _MATRIX for item in items) > 1
+    level = 0
+    for item in items:
+        level += item.kind == _MATRIX
+        for dataset in _DATASETS.get(item.kind, _refused)(item):
+            case = {"load_case_id": level} if several and item.kind == _MATRIX else {}
+            told = {"binary": int(encoding == "binary")} if encoding and dataset["type"] == 58 else {}
+            yield {**dataset, **case, **told}
 
 
 def _head(items: Sequence[Contents]) -> list[dict[str, Any]]:
@@ -120,9 +133,10 @@ def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
         for row, output in enumerate(outputs):
             title = f"{output.name} / {source.name}"
             function = _function(_RESPONSE_FUNCTION, row + 1, title, item, x, item.arrays["value"][:, row, column])
-            function["id5"] = _ascii(
-                f"{output.role} / {source.role}, estimator {item.attributes['estimator'] or 'unknown'}, {item.title}"
-            )
+            rms = item.attributes["input_rms"][column] if item.attributes["input_rms"] else None
+            level = "" if rms is None else f", input RMS {rms!r} {source.unit}"
+            estimator = item.attributes["estimator"] or "unknown"
+            function["id5"] = _ascii(f"{output.role} / {source.role}, estimator {estimator}{level}")
             function["id2"] = _ascii(item.attributes["specimen"])
             yield (
                 function

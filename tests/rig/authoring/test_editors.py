@@ -68,6 +68,7 @@ def test_what_is_shipped_and_what_is_new_passes(checker, tmp_path):
         put(tmp_path, f"{name.replace('/', '-')}-any.toml", text, "plan")
     new_file("bench", tmp_path / "new-bench.toml")
     new_file("rig", tmp_path / "new-rig.toml")
+    new_file("sensors", tmp_path / "new-sensors.toml")
     for kind in KINDS:
         new_file("plan", tmp_path / f"new-{kind}.toml", kind=kind)
     assert complaints(checker, tmp_path) == set()

@@ -118,7 +118,8 @@ def files_of_pages():
         for block in blocks(page):
             if block.file.endswith(".toml"):
                 table = json.loads(json.dumps(tomllib.loads(block.text), default=str))
-                name = "plan" if table.get("kind") in KINDS else "bench" if {"driver", "base"} & set(table) else ""
+                is_plan = table.get("kind") in KINDS and "channels" not in table  # those are of a mapping
+                name = "plan" if is_plan else "bench" if {"driver", "base"} & set(table) else ""
                 if name:
                     yield pytest.param(name, table, id=f"{page.stem}: {block.file}")
 
@@ -251,10 +252,55 @@ def test_the_table_of_a_controller_in_open_loop_has_two_names():
 
 
 def test_another_name_of_a_schema_is_refused():
-    with pytest.raises(ConfigurationError, match="allowed is bench, plan, rig, backbone"):
+    with pytest.raises(ConfigurationError, match="allowed is bench, plan, rig, sensors, backbone"):
         schema_of("benches")
 
 
 def test_a_driver_of_somebody_elses_has_options_of_its_own():
     table = {**bench_table(), "driver": {"name": "box", "options": {"serial_number": "B-0042"}}}
     of("bench").validate(table)
+
+
+SENSORS = {"sensors": [{"serial_number": "1", "sensitivity": "100 mV/g", "calibrated": "2026-01-31"}]}
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("sensors", []), ("sensors", None), ("sensors.0.serial_number", None), ("sensors.0.serial_number", 1),
+        ("sensors.0.sensitivity", None), ("sensors.0.sensitivity", 0.1), ("sensors.0.calibrated", "January"),
+        ("sensors.0.calibration_interval_months", 0), ("sensors.0.sensitivty", "1 mV/g"),
+    ],
+)  # fmt: skip
+def test_a_broken_file_of_sensors_is_refused_by_the_program_and_by_the_schema(path, value):
+    from rig.bench.sensors import SensorFile
+
+    assert of("sensors").is_valid(SENSORS)
+    table = changed(SENSORS, path, value)
+    with pytest.raises(ConfigurationError):
+        validated(SensorFile, table, "sensors.toml")
+    assert not of("sensors").is_valid(table)
+
+
+def test_a_channel_gives_its_sensitivity_in_one_of_three_ways():
+    for key, value in (("sensitivity", "112.4 mV/N"), ("serial_number", "1")):
+        table = changed(changed(bench_table(), "channels.0.sensitivity_v_per_unit", None), "channels.0.unit", None)
+        assert not of("bench").is_valid(table)
+        assert of("bench").is_valid(changed(table, f"channels.0.{key}", value) | {"sensors": "sensors.toml"})
+
+
+@pytest.mark.parametrize(
+    ("stinger", "fits"),
+    [
+        ({"diameter_m": 0.002, "length_m": 0.1, "material": "steel"}, True),
+        ({"diameter_m": 0.002, "material": "steel"}, False),
+        ({"diameter_m": 0.002, "length_m": 0.1, "material": "wood"}, False),
+        ({}, False),
+    ],
+)
+def test_a_rig_of_all_parts_may_name_a_shaker_and_the_geometry_of_its_stinger(stinger, fits):
+    table = read(SPECIMENS / "magnet-beam.toml")
+    table["exciter"] = {"shaker": "lds-v203"}
+    table["stinger"] = {"at": "drive", "damping_n_s_m": 1.0, **stinger}
+    assert of("rig").is_valid(table) == fits
+    assert not of("rig").is_valid({**table, "exciter": {"amplifier": "voltage"}})

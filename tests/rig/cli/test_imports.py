@@ -33,8 +33,8 @@ MATPLOTLIB = {
     *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
     *("pyparsing", "six"),
 }
-NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser", "charset_normalizer"}
-"""Numba, and what it and numpy load where it is installed: the last three."""
+WHERE_INSTALLED = {"cffi", "pycparser", "yaml", "charset_normalizer"}  # by numba, and by numpy for scipy
+NUMBA = {"numba", "llvmlite", "scipy", *WHERE_INSTALLED}
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
 FILES = {"numpy", "pydantic", "h5py"}
 CAN = {

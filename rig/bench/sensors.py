@@ -1,0 +1,130 @@
+"""The file of a laboratory's sensors by serial number, and the channels of a bench that refer to it."""
+
+from calendar import monthrange
+from datetime import date
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, model_validator
+
+from rig.bench.channels import DATE, check_day
+from rig.bench.configuration import Configured, read_toml, validated
+from rig.bench.data_sheet import volts_per_unit
+from rig.errors import ConfigurationError
+from rig.text.printable import shown
+
+__all__ = ["Sensor", "SensorFile", "load_sensors", "with_sensors"]
+
+
+class Sensor(Configured):
+    """A sensor: what its data sheet and its calibration say."""
+
+    serial_number: str = Field(min_length=1)
+    """Serial number, by which channels refer to the sensor."""
+    make: str = ""
+    """Manufacturer."""
+    model: str = ""
+    """Model."""
+    sensitivity: str = Field(min_length=1)
+    """Sensitivity as on the data sheet or certificate, a number and its unit: ``100 mV/g``, ``22.4 mV/N``, ``3.9 pC/N``."""
+    calibrated: str = Field("", pattern=DATE)
+    """Day of the last calibration, YYYY-MM-DD."""
+    calibration_due: str = Field("", pattern=DATE)
+    """Day from which on that calibration is too old, YYYY-MM-DD."""
+    calibration_interval_months: int | None = Field(None, ge=1, le=600)
+    """Months after which that calibration is too old, instead of ``calibration_due``."""
+    certificate: str = ""
+    """Certificate of the calibration: its number, who issued it."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        volts_per_unit(self.sensitivity, "1 V/pC" if "C/" in self.sensitivity else "")  # the amplifier is the channel's
+        for name in ("calibrated", "calibration_due"):
+            check_day(name, getattr(self, name))
+        if self.calibration_interval_months is not None and (self.calibration_due or not self.calibrated):
+            raise ValueError(
+                f"calibration_interval_months = {self.calibration_interval_months}: allowed is with `calibrated`, "
+                "and without `calibration_due`"
+            )
+        if self.calibrated and self.calibration_due and self.calibration_due < self.calibrated:
+            raise ValueError(
+                f"calibration_due = {self.calibration_due!r}: allowed is a day after calibrated = {self.calibrated!r}"
+            )
+        return self
+
+    @property
+    def due(self) -> str:
+        """Day from which on the calibration is too old, YYYY-MM-DD; empty if none is known."""
+        if self.calibration_interval_months is None:
+            return self.calibration_due
+        day = date.fromisoformat(self.calibrated)
+        years, month = divmod(day.month - 1 + self.calibration_interval_months, 12)
+        year = day.year + years
+        return day.replace(year=year, month=month + 1, day=min(day.day, monthrange(year, month + 1)[1])).isoformat()
+
+    def of_channel(self) -> dict[str, str]:
+        """Return what a channel with this sensor takes from here."""
+        facts = {
+            "sensor": f"{self.make} {self.model}".strip(),
+            "sensitivity": self.sensitivity,
+            "calibrated": self.calibrated,
+            "calibration_due": self.due,
+            "certificate": self.certificate,
+        }
+        return {key: value for key, value in facts.items() if value}
+
+
+class SensorFile(Configured):
+    """Sensors of a laboratory, written once; the channels of a bench refer to them by serial number."""
+
+    sensors: tuple[Sensor, ...] = Field(min_length=1)
+    """The sensors."""
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Self:
+        numbers = [sensor.serial_number for sensor in self.sensors]
+        for index, number in enumerate(numbers):
+            if number in numbers[:index]:
+                raise ValueError(f"sensors[{index}].serial_number = {number!r}: is there twice, allowed is once")
+        return self
+
+
+def load_sensors(path: Path) -> dict[str, Sensor]:
+    """Return the sensors in a file by serial number; raise `ConfigurationError` if it is not valid."""
+    return {sensor.serial_number: sensor for sensor in validated(SensorFile, read_toml(path), str(path)).sensors}
+
+
+def with_sensors(table: dict[str, Any], path: Path) -> dict[str, Any]:
+    """Return the table of a bench, its channels completed by the sensors in a file.
+
+    Raises `ConfigurationError` for a channel that says itself what the file says of its sensor, and for one that has no
+    sensitivity and a serial number that the file does not have.
+    """
+    sensors = load_sensors(path)
+    channels = table.get("channels")
+    if not isinstance(channels, list):
+        return table
+    return {**table, "channels": [_completed(one, index, sensors, path) for index, one in enumerate(channels)]}
+
+
+def _completed(channel: Any, index: int, sensors: dict[str, Sensor], path: Path) -> Any:
+    if not isinstance(channel, dict) or not isinstance(number := channel.get("serial_number", ""), str) or not number:
+        return channel
+    field = f"channels[{index}].serial_number = {shown(number)}"
+    if number not in sensors:
+        if "sensitivity" in channel or "sensitivity_v_per_unit" in channel:
+            return channel
+        close = get_close_matches(number, sensors, n=1)
+        hint = f", did you mean {close[0]!r}?" if close else ""
+        raise ConfigurationError(
+            f"{field}: {path.name} has no such sensor{hint}; allowed is one of its serial numbers, or a sensitivity here"
+        )
+    facts = sensors[number].of_channel()
+    twice = [key for key in (*facts, "sensitivity_v_per_unit") if channel.get(key)]
+    if twice:
+        raise ConfigurationError(
+            f"channels[{index}].{twice[0]} = {shown(channel[twice[0]])}: {path.name} says it of sensor {number!r}; "
+            "allowed is one place"
+        )
+    return {**channel, **facts}

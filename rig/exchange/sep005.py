@@ -1,0 +1,73 @@
+"""Time series of SEP005 (SDyPy), in memory, as data that a mapping describes."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from identification import IdentificationError
+from identification.mapping.units import si_of
+from rig.exchange.mat import ImportFailed
+
+__all__ = ["data_of_series"]
+
+UNEVEN = 1e-6  # of the step
+
+
+def data_of_series(series: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return time series by name, in SI where their unit is understood, as a mapping takes them.
+
+    Series of one name are the records (realisations) of one channel, in their order: float64[n, n_records], as long as the
+    shortest. The dictionary also has ``sample_rate_hz`` and ``units`` by name; a unit that is not understood is left out.
+    Raises `ImportFailed` for what does not follow SEP005, for uneven sampling and for different rates.
+    """
+    if isinstance(series, Mapping) or not series:
+        raise ImportFailed("series: allowed is a list of dictionaries, one a signal")
+    rates = [_rate(one, number) for number, one in enumerate(series)]
+    if max(rates) / min(rates) - 1.0 > UNEVEN:
+        raise ImportFailed(f"series: sample rates from {min(rates):g} to {max(rates):g} Hz; wanted is one")
+    records: dict[str, list[Any]] = {}
+    units: dict[str, str] = {}
+    for number, one in enumerate(series):
+        name, told = (_text(one, key, number) for key in ("name", "unit_str"))
+        try:
+            unit, factor = si_of(told, name)
+        except IdentificationError:
+            unit, factor = "", 1.0
+        if units.setdefault(name, unit) != unit:
+            raise ImportFailed(f"series[{number}].unit_str = {told!r}: {name} was in {units[name]!r} before")
+        records.setdefault(name, []).append(_data(one, number) * factor)
+    columns = {name: np.column_stack([r[: min(map(len, found))] for r in found]) for name, found in records.items()}
+    return {**columns, "units": {name: unit for name, unit in units.items() if unit}, "sample_rate_hz": rates[0]}
+
+
+def _text(one: Mapping[str, Any], key: str, number: int) -> str:
+    if not isinstance(value := one.get(key), str):
+        raise ImportFailed(f"series[{number}].{key} = {value!r}: allowed is a text")
+    return value
+
+
+def _data(one: Mapping[str, Any], number: int) -> Any:
+    try:
+        data = np.asarray(one["data"], np.float64)
+    except (KeyError, TypeError, ValueError):
+        raise ImportFailed(f"series[{number}].data: allowed is a list of numbers") from None
+    if data.ndim != 1 or data.size < 2:
+        raise ImportFailed(f"series[{number}].data: has shape {data.shape}, allowed is (n,) with n from 2")
+    return data
+
+
+def _rate(one: Mapping[str, Any], number: int) -> float:
+    """Return the sample rate by ``fs``, or else by ``time``."""
+    data, fs, time = _data(one, number), one.get("fs"), one.get("time")
+    if fs is None and time is None:
+        raise ImportFailed(f"series[{number}].fs: is missing, and so is time; wanted is one of them")
+    if fs is None:
+        instants = np.asarray(time, np.float64)
+        steps = np.diff(instants)
+        if instants.shape != data.shape or not np.all(np.abs(steps - steps.mean()) <= 1e-3 * abs(steps.mean())):
+            raise ImportFailed(f"series[{number}].time: allowed are evenly spaced instants, one for each of the data")
+        fs = 1.0 / float(steps.mean())
+    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < float(fs) < np.inf:
+        raise ImportFailed(f"series[{number}].fs = {fs!r}: allowed is a number above 0")
+    return float(fs)
