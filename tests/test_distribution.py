@@ -52,10 +52,10 @@ def _run(command, folder, **further):
 
 
 def tracked(*folders):
-    """Files that the project has below folders, without what Python leaves there."""
+    """Files that the project has below folders, without what Python and Sphinx leave there."""
     for folder in folders:
         for path in sorted((ROOT / folder).rglob("*")):
-            if path.is_file() and "__pycache__" not in path.parts:
+            if path.is_file() and not {"__pycache__", ".doctrees"} & set(path.parts):
                 yield path.relative_to(ROOT).as_posix()
 
 

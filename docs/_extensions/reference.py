@@ -25,9 +25,10 @@ from rig.cli.app import app as command_line
 from rig.reference.commands import command_entries, commands_of, option_names
 from rig.reference.entry import Entry
 from rig.reference.keys import key_entries, keys_of, tables
-from rig.reference.messages import PAGES, message_entries, slug
+from rig.reference.messages import PAGES, message_entries
 from rig.reference.names import documentation, first_line, name_entries
 from rig.reference.words import words_of, write_words
+from rig.text.message_pages import page_of
 
 COMMANDS = {command.name: command for command in commands_of(get_command(command_line))}
 
@@ -127,7 +128,7 @@ class ErrorTree(Generated):
         return self.parsed(self._branch(getattr(import_module(module), name), ""))
 
     def _branch(self, error: type, indent: str) -> Iterator[str]:
-        page = f"{PAGES}/{slug(error.__name__)}"
+        page = f"{PAGES}/{page_of(error.__name__)}"
         more = f" ([what to do](/{page}.md))" if page in self.env.found_docs else ""
         name, module = error.__name__, error.__module__
         yield f"{indent}- {{py:exc}}`{name} <{module}.{name}>`: {first_line(module, name)}{more}"

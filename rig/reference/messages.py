@@ -3,12 +3,12 @@
 Each has a name in small letters with hyphens, such as ``lost-lock`` or ``daq-timeout``, which is that of its page.
 """
 
-import re
 from collections.abc import Iterator
 
 from rig.reference.entry import Entry
+from rig.text.message_pages import page_of
 
-__all__ = ["PAGES", "message_entries", "slug"]
+__all__ = ["PAGES", "message_entries"]
 
 PAGES = "reference/messages"
 """Folder of their pages on the site."""
@@ -30,7 +30,7 @@ def _end_reasons() -> Iterator[tuple[str, str, str]]:
 
     for reason, text in TEXT.items():
         if reason not in (EndReason.NONE, EndReason.COMPLETED):
-            yield slug(reason.name), "end of a run", text
+            yield page_of(reason.name), "end of a run", text
 
 
 def _qualities() -> Iterator[tuple[str, str, str]]:
@@ -50,9 +50,4 @@ def _errors() -> Iterator[tuple[str, str, str]]:
         error = getattr(errors, name)
         if isinstance(error, type) and error not in (errors.RigError, errors.DaqError):
             line = " ".join(str(error.__doc__).partition("\n\n")[0].split())
-            yield slug(name), "error", line
-
-
-def slug(name: str) -> str:
-    """Return the name of a message in small letters with hyphens: ``daq-timeout`` for ``DaqTimeout``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])|_", "-", name).lower()
+            yield page_of(name), "error", line

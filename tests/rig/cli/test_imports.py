@@ -33,8 +33,8 @@ MATPLOTLIB = {
     *("matplotlib", "mpl_toolkits", "PIL", "contourpy", "cycler", "dateutil", "fontTools", "kiwisolver", "packaging"),
     *("pyparsing", "six"),
 }
-WHERE_INSTALLED = {"cffi", "pycparser", "yaml", "charset_normalizer"}  # by numba, and by numpy for scipy
-NUMBA = {"numba", "llvmlite", "scipy", *WHERE_INSTALLED}
+NUMBA = {"numba", "llvmlite", "scipy", "cffi", "pycparser", "yaml", "charset_normalizer"}
+"""Numba, and what it and numpy load where it is installed: the last four."""
 OPTIMIZE = {f"scipy.{name}" for name in ("optimize", "linalg", "sparse", "spatial", "special", "fft", "constants")}
 FILES = {"numpy", "pydantic", "h5py"}
 CAN = {
@@ -48,7 +48,6 @@ CAN = {
     "msgpack",
     "packaging",
     "asyncio",
-    "yaml",  # loaded by python-can where it is installed
 }
 DRIVERS = {"numpy", "pydantic", "simulators", "serial", "cobs"} | CAN | NUMBA  # whose options a schema describes
 

@@ -5,7 +5,7 @@ import pytest
 from rig.cli.app import app
 from rig.errors import RecordingError
 from rig.reference.entry import Entry
-from rig.reference.messages import message_entries, slug
+from rig.reference.messages import message_entries
 from rig.reference.words import WORDS_FILE, closest, found, known_words, read_words, words_of, write_words
 
 ENTRIES = [
@@ -74,11 +74,3 @@ def test_a_message_that_is_a_reason_and_a_quality_has_one_page():
     assert "end of a run" in entries["lost-lock"].line
     assert "quality of a point" in entries["lost-lock"].line
     assert all(entry.line for entry in entries.values())
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("DaqTimeout", "daq-timeout"), ("NO_LOCK_IN_WINDOW", "no-lock-in-window"), ("NotArmed", "not-armed")],
-)
-def test_a_message_is_named_in_small_letters_with_hyphens(name, expected):
-    assert slug(name) == expected
