@@ -33,8 +33,9 @@ def _say(summary: dict[str, Any]) -> None:
     low, high = summary["band_hz"]
     source = f"{summary['estimator']}, " if summary["estimator"] else ""
     level = f", {summary['force_rms_n']:.3g} N RMS" if summary["force_rms_n"] > 0.0 else ""
-    residual = number(summary["fit_residual"], ".2f")
-    print(f"{source}{low:g} to {high:g} Hz{level}; residual {residual} times that expected from noise")
+    residual = summary["fit_residual"]
+    left = "" if residual != residual else f"; residual {number(residual, '.2f')} times that expected from noise"
+    print(f"{source}{low:g} to {high:g} Hz{level}{left}")
     print_table(
         ("mode", "frequency Hz", "+-", "damping %", "+-", *(f"shape {name}" for name in summary["channels"])),
         [
