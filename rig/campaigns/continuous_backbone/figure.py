@@ -63,7 +63,6 @@ _WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", "#4f9d69"
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw the results of both ways, their differences from the mean, and the history of the control loop."""
-    page.set_size_inches(9.0, 9.6)
     axes = page.subplots(3, 2)
     points = points_of(recording, ContinuousBackboneResult)
     draw_ways(axes[0], points)
