@@ -102,7 +102,7 @@ class Curves:
 
 
 def channel_of(channels: tuple[Channel, ...], view: View) -> int:
-    """Return the row of the channel that the view shows, by default the drive point; raise `RecordingError` if there is none."""
+    """Return the row of the view's channel, by default the drive point; raise `RecordingError` if there is none."""
     names = [channel.name for channel in channels]
     if view.channel and view.channel not in names:
         raise RecordingError(f"`channel` {view.channel}: there are {', '.join(names)}")

@@ -5,6 +5,9 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
+from identification import IdentificationError
+from rig.campaigns.evaluation.figure import draw_failure
+from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
 from rig.drawing.page import page_for
@@ -75,5 +78,11 @@ def _draw_recording(page: "Figure", source: Path, *, lateness: bool) -> None:
     with Recording(source) as recording:
         if lateness:
             draw_lateness(page, recording)
-        else:
+            return
+        try:
             resolve_name(CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw)(page, recording)
+        except IdentificationError:
+            if any(point.accepted for point in points_of(recording)):
+                raise
+            page.clear()
+            draw_failure(page, recording)

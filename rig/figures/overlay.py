@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MARKERS, REJECTED, engineering, shade, title
 from rig.errors import RecordingError
 from rig.figures.curves import Curves, Panel, Quantity, Trace, View
@@ -117,7 +117,7 @@ def _draw(page: "Figure", names: Sequence[str], found: Sequence[Curves], view: V
                 look = _look(number, levels.index(trace.level), len(found), len(levels), dense)
                 _line(axes[n], panel, trace, n, look, view, engineering(metres)[1], curves.panels)
         _axes(axes[n], panel, view, engineering(metres)[1])
-    _legend(page, axes[0], names, levels, found, dense)
+    _legend(page, names, levels, found, dense)
     specimens = " and ".join(dict.fromkeys(curves.specimen for curves in found if curves.specimen))
     omitted = [f"{name}: {curves.omitted}" for name, curves in zip(names, found, strict=True) if curves.omitted]
     what = names[0] if len(names) == 1 else f"{len(names)} {family}"
@@ -184,9 +184,7 @@ def _axes(axis: "Axes", panel: Panel, view: View, unit: str) -> None:
         axis.axhline(90.0, color=REJECTED, lw=0.8, zorder=1)
 
 
-def _legend(
-    page: "Figure", axis: "Axes", names: Sequence[str], levels: Sequence[str], found: Sequence[Curves], dense: bool
-) -> None:
+def _legend(page: "Figure", names: Sequence[str], levels: Sequence[str], found: Sequence[Curves], dense: bool) -> None:
     """Name files, levels and hollow points below the panels."""
     from matplotlib.lines import Line2D
 
@@ -209,8 +207,4 @@ def _legend(
         entries.append(
             entry(_Look(REJECTED, "o", ""), "folds back: unstable at a constant level of the force", mfc="white")
         )
-    if entries:
-        columns = max(1, min(4, int(page.get_figwidth() / 1.9)))
-        legend = page.legend(handles=entries, loc="outside lower left", ncols=columns)
-        for text in legend.get_texts():
-            text.set_parse_math(False)
+    legend_below(page, handles=entries)

@@ -11,7 +11,7 @@ from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, say_why_empty, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, rc, say_why_empty, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 
@@ -81,7 +81,7 @@ def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) 
         seconds = (start + stored.samples(width * (np.arange(part.n_rows // width) + 0.5))) / rate
         running = _binned(part, "segment", width).least >= 0.0
         _band(frequency, seconds, _binned(part, "frequency_hz", width))
-        level.plot(seconds, _binned(part, "command_v", width).mean, color=SECOND, lw=_THIN * _line_width())
+        level.plot(seconds, _binned(part, "command_v", width).mean, color=SECOND, lw=_THIN * rc("lines.linewidth"))
         _shade_ramp(frequency, seconds, running)
         if error is not None:
             errors = _binned(part, "phase_error_rad", width)
@@ -118,12 +118,6 @@ def _shade_ramp(axis: "Axes", seconds: np.ndarray, running: np.ndarray) -> None:
     if running.size and not running[-1]:
         begin = int(np.flatnonzero(running)[-1]) if running.any() else 0
         axis.axvspan(seconds[begin], seconds[-1], color=REJECTED, alpha=0.25, lw=0, label="ramp-down")
-
-
-def _line_width() -> float:
-    from matplotlib import rcParams
-
-    return float(rcParams["lines.linewidth"])
 
 
 def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
@@ -184,4 +178,4 @@ def _usual_error_deg(part: Part) -> float:
 def _band(axis: "Axes", seconds: np.ndarray, bins: _Bins, label: str | None = None) -> None:
     """Draw the mean of each bin as a line and its range as a band; plain decimation would alias the detector's ripple."""
     axis.fill_between(seconds, bins.least, bins.most, color=MAIN, alpha=0.25, lw=0)
-    axis.plot(seconds, bins.mean, color=MAIN, lw=_THIN * _line_width(), label=label)
+    axis.plot(seconds, bins.mean, color=MAIN, lw=_THIN * rc("lines.linewidth"), label=label)
