@@ -251,8 +251,8 @@ def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float 
     axis.set(**{f"{which}scale": "log"})
     low, high = getattr(axis, f"get_{which}lim")()
     if high < least_span * low:
-        widen = np.sqrt(least_span * low / high)
-        low, high = low / widen, high * widen
+        factor = np.sqrt(least_span * low / high)
+        low, high = low / factor, high * factor
         axis.set(**{f"{which}lim": (low, high)})
     ticks = getattr(axis, f"{which}axis")
     ticks.set_minor_formatter(NullFormatter())

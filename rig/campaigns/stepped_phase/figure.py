@@ -111,16 +111,11 @@ def _branch(
     label: str | None = None,
 ) -> None:
     """Draw one level in the order of measurement: dotted where it folds back, with its resonant point filled."""
-    folded = folds_back(item.frequency_hz, item.phase_lag_deg)
-    joined = np.ones(folded.size, bool)
-    joined[gaps - 1] = False
-    for line, which in (("-", joined & ~folded), (":", joined & folded)):
-        ends = np.flatnonzero(which)
-        x, y = (
-            np.stack([one[ends], one[ends + 1], np.full(ends.size, np.nan)], axis=1)
-            for one in (item.frequency_hz, values)
-        )
-        axis.plot(x.ravel(), y.ravel(), line, color=colour)
+    folded = np.flatnonzero(folds_back(item.frequency_hz, item.phase_lag_deg)) + 1
+    stable = np.setdiff1d(np.arange(1, values.size), folded)
+    for line, elsewhere in (("-", folded), (":", stable)):
+        breaks = np.union1d(gaps, elsewhere).astype(np.intp)
+        axis.plot(np.insert(item.frequency_hz, breaks, np.nan), np.insert(values, breaks, np.nan), line, color=colour)
     axis.plot(item.frequency_hz, values, "o", mfc="white", color=colour)
     if label is not None:
         axis.plot([], [], "o-", mfc="white", color=colour, label=label)
