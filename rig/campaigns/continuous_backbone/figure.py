@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, OneWay
-from rig.campaigns.evaluation.figure import draw_history, heading, why_none
+from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_none
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.page import grid
@@ -68,8 +68,11 @@ def draw(page: "Figure", recording: Recording) -> None:
     The phase error of the loop is not drawn: while the level is ramped, the lag swings by more than 180 deg and says nothing of
     a point. What counts is the detuning.
     """
-    axes = grid(page, 3, 2)
     points = points_of(recording, ContinuousBackboneResult)
+    if not any(point.evaluated for point in points):
+        draw_failure(page, recording)
+        return
+    axes = grid(page, 3, 2)
     draw_ways(axes[0], points)
     draw_differences(axes[1], points)
     draw_history(axes[2, 0], None, recording)

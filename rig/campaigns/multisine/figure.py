@@ -57,7 +57,7 @@ def draw_multisine(
         axes[0, 1], axes[1, 1], spectra.frequency_response(response, instrument=voltage), f"{response} over {force}"
     )
     _coherence(axes[2, 1], spectra, response, force)
-    legend_below(page, axes[1, 0], axes[0, 1])
+    legend_below(page, *axes[:, 0], axes[0, 1])
     heading(page, title)
 
 
