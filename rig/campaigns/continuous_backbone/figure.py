@@ -10,7 +10,7 @@ from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading,
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, log_axis, say_why_empty
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, log_axis, say_why_empty, widen
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ class _Quantity(NamedTuple):
     mean: Callable[[Modal], float | None]
     std: Callable[[Modal], float | None]
     way: Callable[[OneWay], float]
+    least_span: float
+    """Smallest part of the value that its axis spans: less would show scatter as if it were a change."""
 
 
 _QUANTITIES = (
@@ -39,6 +41,7 @@ _QUANTITIES = (
         lambda modal: modal.modal_frequency_hz,
         lambda modal: modal.modal_frequency_std_hz,
         lambda way: way.modal_frequency_hz,
+        1e-3,
     ),
     _Quantity(
         "modal damping ratio, %",
@@ -46,6 +49,7 @@ _QUANTITIES = (
         lambda modal: modal.damping_ratio,
         lambda modal: modal.damping_ratio_std,
         lambda way: way.damping_ratio,
+        0.1,
     ),
 )
 
@@ -135,6 +139,8 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
             out = [point for point in some if not point.accepted]
             values = _values(out, quantity.mean, quantity.scale)
             _line(axis, out, scale_m, values, "not accepted" if said else None, marker="x", ls="", color=REJECTED)
+    for axis, quantity in zip(axes, _QUANTITIES, strict=True):
+        widen(axis, quantity.least_span)
     if axes[1].get_legend_handles_labels()[0]:
         axes[1].legend()
 
@@ -149,7 +155,9 @@ def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None
             for way in _WAYS:
                 found = [one for point in both if (one := way.of(result_of(point))) is not None]
                 values = 100.0 * (np.array([quantity.way(one) for one in found]) / mean - 1.0)
-                _line(axis, both, scale_m, values, None, marker=way.marker, ls=":", color=way.colour)
+                _line(axis, both, scale_m, values, None, marker=way.marker, mfc="none", ls=":", color=way.colour)
+        least = 10.0 * quantity.least_span
+        axis.set_ylim(min(-least, axis.get_ylim()[0]), max(least, axis.get_ylim()[1]))
 
 
 def _values(points: Sequence[Measured], of: Callable[[Modal], float | None], scale: float = 1.0) -> np.ndarray:

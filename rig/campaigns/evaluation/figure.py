@@ -57,11 +57,16 @@ def heading(page: "Figure", recording: Recording) -> None:
 
 
 def draw_failure(page: "Figure", recording: Recording) -> None:
-    """Draw what there is of a recording without an accepted point: why there is none, and the history of the loop."""
-    axes = grid(page, 1, 2)[0]
-    draw_history(axes[0], axes[1], recording)
+    """Draw what there is of a recording without an accepted point: why there is none, and the history of the loop.
+
+    The phase error is drawn if a loop controlled the phase.
+    """
+    phase = any(np.isfinite(part.rows("phase_error_rad")).any() for part in recording.parts)
+    axes = grid(page, 1, 2 if phase else 1)[0]
+    draw_history(axes[0], axes[1] if phase else None, recording)
     heading(page, recording)
-    page.text(0.01, 0.0, f"Nothing else to draw: {why_none(points_of(recording))}", va="bottom", wrap=True)
+    why = f"Nothing else to draw: {why_none(points_of(recording))}"
+    page.supxlabel(why, x=0.01, ha="left", parse_math=False, wrap=True)
 
 
 def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) -> None:

@@ -107,6 +107,6 @@ def _coherence(axis: "Axes", spectra: PeriodicSpectra, response: str, force: str
     try:
         found = coherence(spectra, response, force)
     except IdentificationError:
-        say_why_empty(axis, "coherence needs more than one period")
+        say_why_empty(axis, "coherence needs more\nthan one period")
         return
     axis.plot(spectra.frequency_hz[spectra.excited], found, ".-", color=MAIN)

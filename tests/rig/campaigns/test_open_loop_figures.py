@@ -130,7 +130,7 @@ def test_a_coherence_of_a_single_period_is_not_shown(page: Figure) -> None:
     voltage = design.realisation(0, 0)
     spectra = periodic_spectra([np.array([voltage, 2.0 * voltage, 3.0 * voltage])], CHANNELS, design)
     draw_multisine(page, spectra)
-    assert "coherence needs more than one period" in rendered(page)
+    assert "coherence needs more\nthan one period" in rendered(page)
     assert not page.axes[5].get_lines()
 
 

@@ -106,10 +106,10 @@ def test_stepped_phase_dots_the_branch_that_folds_back(tmp_path, drawn):
 def test_a_held_sweep_shows_no_drop_out(recordings, drawn, tmp_path):
     free = texts(drawn(drawing(recordings["sweep"])))
     assert any("% of" in text and "N at" in text for text in free)
-    speed = {"rate_hz_per_s": 0.5, "levels_n": [0.1], "start_hz": 24.0, "stop_hz": 25.0, "hold_periods": 50}
+    speed = {"rate_hz_per_s": 0.05, "levels_n": [0.1], "start_hz": 24.0, "stop_hz": 24.3}
     held = texts(drawn(drawing(run(tmp_path / "held.h5", "magnet-beam/controlled-sweep-up", **speed))))
     assert not any("N at" in text for text in held)
-    assert any("% of the level" in text for text in held), held
+    assert any("% of the level" in text for text in held)
 
 
 @pytest.mark.parametrize("look", ["screen", "paper", "slide"])
