@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = ["draw", "draw_detuning", "draw_differences", "draw_ways"]
 
+LEAST_DETUNING = 0.002
+"""Smallest detuning, relative, at which its axis ends."""
+
 Measured = Point[ContinuousBackboneResult]
 
 
@@ -91,17 +94,16 @@ def draw_detuning(axis: "Axes", points: Sequence[Measured], accepted: float) -> 
     ``accepted`` (relative) is drawn where it is near.
     """
     for some, scale_m, _ in _repeats(axis, points, "largest detuning, %"):
-        values = np.array([_detuning(point) for point in some])
-        for accepted_ones, style in (
-            (True, {"marker": "o", "color": MAIN}),
-            (False, {"marker": "x", "color": REJECTED}),
-        ):
-            shown = [point for point in some if point.accepted == accepted_ones]
-            _line(axis, shown, scale_m, 100.0 * values[[point in shown for point in some]], None, ls="", **style)
-        if np.nanmax(np.abs(values), initial=0.0) > 0.5 * accepted:
-            for limit in (-accepted, accepted):
-                axis.axhline(100.0 * limit, color=REJECTED, lw=0.8, ls="--")
-        axis.axhline(0.0, color=REJECTED, lw=0.8)
+        for used, style in ((True, {"marker": "o", "color": MAIN}), (False, {"marker": "x", "color": REJECTED})):
+            shown = [point for point in some if point.accepted == used]
+            _line(axis, shown, scale_m, [100.0 * _detuning(point) for point in shown], None, ls="", **style)
+    largest = float(np.nanmax([LEAST_DETUNING, *(abs(_detuning(point)) for point in points)]))
+    if largest > 0.5 * accepted:
+        largest = max(largest, accepted)
+        for limit in (-accepted, accepted):
+            axis.axhline(100.0 * limit, color=REJECTED, lw=0.8, ls="--")
+    axis.axhline(0.0, color=REJECTED, lw=0.8)
+    axis.set_ylim(-115.0 * largest, 115.0 * largest)
 
 
 def _detuning(point: Measured) -> float:

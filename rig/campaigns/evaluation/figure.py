@@ -10,7 +10,7 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
-from rig.drawing.page import grid
+from rig.drawing.page import grid, text_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, rc, say_why_empty, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -66,7 +66,8 @@ def draw_failure(page: "Figure", recording: Recording) -> None:
     draw_history(axes[0], axes[1] if phase else None, recording)
     heading(page, recording)
     why = f"Nothing else to draw: {why_none(points_of(recording))}"
-    page.supxlabel(why, x=0.01, ha="left", parse_math=False, wrap=True)
+    ended = [str(part.end["text"]) for part in recording.parts if part.end is not None and part.end.get("text")]
+    text_below(page, why if not ended or ended[-1] in why else f"{why}; the run ended: {ended[-1]}")
 
 
 def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) -> None:
