@@ -6,6 +6,7 @@ function passes no ``fontsize``, so that `restyle` reaches all text. Curves that
 as a level, take their colour from viridis without its yellow end (`shade`).
 """
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,9 +34,11 @@ __all__ = [
     "engineering",
     "from_zero",
     "height_is_free",
+    "lines_on",
     "log_axis",
     "page_in",
     "plain_log",
+    "points",
     "rc",
     "restyle",
     "say_why_empty",
@@ -53,6 +56,8 @@ COLOURS = (MAIN, SECOND, THIRD, "#e69f00", "#cc79a7", "#56b4e9", "#000000")
 MARKERS = "os^Dv<>P"
 """Markers of things beside one another: with a marker of its own, each can also be told apart in black and white."""
 
+_LETTER = 0.56
+"""Mean width of a letter over the size of its font (DejaVu Sans)."""
 TRACE_BINS = 1200
 _MM_PER_IN = 25.4
 
@@ -225,14 +230,29 @@ def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
 
 def say_why_empty(axis: "Axes", text: str) -> None:
     """Write into a panel why it is empty."""
-    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, wrap=True)
+    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, parse_math=False)
     axis.set(xticks=[], yticks=[])
 
 
 def title(page: "Figure", text: str) -> None:
     """Write a title at the top left, in as many lines as it needs, unless the text is empty."""
     if text:
-        page.suptitle(text, x=0.01, ha="left", parse_math=False, wrap=True)
+        page.suptitle(lines_on(page, text, "figure.titlesize"), x=0.01, ha="left", parse_math=False)
+
+
+def lines_on(page: "Figure", text: str, setting: str) -> str:
+    """Return a text in lines as long as a page is wide, for the font size of a setting such as ``figure.titlesize``.
+
+    Matplotlib's own wrapping would read ``$`` as the beginning of a formula.
+    """
+    return textwrap.fill(text, max(20, int(0.98 * 72.0 * page.get_figwidth() / (_LETTER * points(setting)))))
+
+
+def points(setting: str) -> float:
+    """Return a font size of the style, points, by the name of its setting."""
+    from matplotlib.font_manager import FontProperties
+
+    return float(FontProperties(size=rc(setting)).get_size_in_points())
 
 
 def unit_text(unit: str) -> str:
