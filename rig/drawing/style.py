@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,10 +32,8 @@ __all__ = [
     "TRACE_BINS",
     "Preset",
     "engineering",
-    "from_zero",
     "height_is_free",
     "lines_on",
-    "log_axis",
     "page_in",
     "plain_log",
     "points",
@@ -45,7 +43,6 @@ __all__ = [
     "shade",
     "title",
     "unit_text",
-    "widen",
 ]
 
 MAIN, SECOND, THIRD = "#0072b2", "#d55e00", "#009e73"
@@ -262,45 +259,6 @@ def unit_text(unit: str) -> str:
         return written[unit]
     over, slash, under = unit.rpartition("/")
     return f"({written[over]})/{under}" if slash and over in written else unit
-
-
-def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
-    """Make an axis logarithmic that spans at least a factor, with plain numbers at 1, 2, 5 where it spans few decades.
-
-    To be called after the data are drawn.
-    """
-    from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter, NullLocator, StrMethodFormatter
-
-    axis.set(**{f"{which}scale": "log"})
-    low, high = getattr(axis, f"get_{which}lim")()
-    if high < least_span * low:
-        factor = np.sqrt(least_span * low / high)
-        low, high = low / factor, high * factor
-        axis.set(**{f"{which}lim": (low, high)})
-    ticks = getattr(axis, f"{which}axis")
-    ticks.set_minor_formatter(NullFormatter())
-    if high < 6.0 * low:
-        ticks.set_major_locator(AutoLocator())
-        ticks.set_minor_locator(NullLocator())
-    elif high < 300.0 * low:
-        ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    if low >= 1e-3 and high <= 1e4:
-        ticks.set_major_formatter(StrMethodFormatter("{x:g}"))
-
-
-def from_zero(axis: "Axes", *values: np.ndarray) -> None:
-    """Let an axis of amplitudes begin at zero, with room above the largest of the values."""
-    largest = max((float(np.nanmax(one)) for one in values if np.isfinite(one).any()), default=0.0)
-    if largest > 0.0:
-        axis.set_ylim(0.0, 1.08 * largest)
-
-
-def widen(axis: "Axes", least: float) -> None:
-    """Let the vertical axis span at least a part ``least`` of its middle value, so that scatter does not look like a trend."""
-    low, high = axis.get_ylim()
-    middle = 0.5 * (low + high)
-    half = max(0.5 * (high - low), 0.5 * least * abs(middle))
-    axis.set_ylim(middle - half, middle + half)
 
 
 def plain_log(axis: "Axes") -> None:
