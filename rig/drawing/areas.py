@@ -1,6 +1,7 @@
 """Areas of a page for parts of a figure that differ in kind; on a narrow page they stand below one another."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ __all__ = ["areas", "broad", "is_narrow", "legend_below"]
 
 _NARROW_IN = 5.0
 _PANEL_IN = 1.65
+_LETTERS = 52  # of a legend's line on a narrow page
 
 
 def is_narrow(page: "Figure") -> bool:
@@ -37,7 +39,8 @@ def legend_below(page: "Figure", handles: Mapping[str, Any]) -> None:
     if narrow and height_is_free():
         line_in = 1.5 * FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points() / 72.0
         page.set_figheight(page.get_figheight() + line_in * (len(handles) + 2))
-    page.legend(list(handles.values()), list(handles), loc="outside lower left", ncols=1 if narrow else 3)
+    labels = ["\n".join(wrap(label, _LETTERS)) for label in handles] if narrow else list(handles)
+    page.legend(list(handles.values()), labels, loc="outside lower left", ncols=1 if narrow else 3)
 
 
 def areas(page: "Figure", panels: Sequence[int], sizes: Sequence[float], *, beside: bool = False) -> list[Any]:
