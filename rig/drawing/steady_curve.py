@@ -54,12 +54,16 @@ def ends_within(response: SteadyPrediction) -> np.ndarray:
     if response.force == "recorded":
         return np.zeros(0, dtype=np.int64)
     band = (
-        (float(response.frequency_hz.min()), float(response.frequency_hz.max())) if not response.complete else (0.0, 0.0)
+        (float(response.frequency_hz.min()), float(response.frequency_hz.max()))
+        if not response.complete
+        else (0.0, 0.0)
     )
     found = []
     for branch in np.unique(response.branch):
         on = np.flatnonzero(response.branch == branch)
-        closed = np.isclose(*response.frequency_hz[on[[0, -1]]], rtol=_SAME) and np.isclose(*amplitude[on[[0, -1]]])
+        closed = bool(np.allclose(response.frequency_hz[on[0]], response.frequency_hz[on[-1]], rtol=_SAME)) and bool(
+            np.allclose(amplitude[on[0]], amplitude[on[-1]])
+        )
         for end in () if closed else (on[0], on[-1]):
             at_edge = any(abs(response.frequency_hz[end] - edge) <= _SAME * edge for edge in band)
             if not at_edge and amplitude[end] > _VISIBLE * amplitude.max():
