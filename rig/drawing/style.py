@@ -6,6 +6,7 @@ function passes no ``fontsize``, so that `restyle` reaches all text. Curves that
 as a level, take their colour from viridis without its yellow end (`shade`).
 """
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,8 +33,11 @@ __all__ = [
     "Preset",
     "engineering",
     "height_is_free",
+    "lines_on",
     "page_in",
     "plain_log",
+    "points",
+    "rc",
     "restyle",
     "say_why_empty",
     "shade",
@@ -49,6 +53,8 @@ COLOURS = (MAIN, SECOND, THIRD, "#e69f00", "#cc79a7", "#56b4e9", "#000000")
 MARKERS = "os^Dv<>P"
 """Markers of things beside one another: with a marker of its own, each can also be told apart in black and white."""
 
+_LETTER = 0.56
+"""Mean width of a letter over the size of its font (DejaVu Sans)."""
 TRACE_BINS = 1200
 _MM_PER_IN = 25.4
 
@@ -77,6 +83,7 @@ PRESETS = {
             "ytick.labelsize": 6.5,
             "axes.titlesize": 7.5,
             "figure.titlesize": 7.5,
+            "figure.labelsize": 7.5,
             "axes.linewidth": 0.6,
             "lines.linewidth": 0.9,
             "lines.markersize": 2.8,
@@ -95,6 +102,7 @@ PRESETS = {
             "ytick.labelsize": 13.0,
             "axes.titlesize": 15.0,
             "figure.titlesize": 18.0,
+            "figure.labelsize": 15.0,
             "axes.linewidth": 1.1,
             "lines.linewidth": 2.0,
             "lines.markersize": 6.5,
@@ -110,6 +118,7 @@ _COMMON: dict[str, Any] = {
     "legend.fontsize": 8,
     "axes.titlesize": 9,
     "figure.titlesize": 11,
+    "figure.labelsize": 9,
     "axes.titlelocation": "left",
     "axes.grid": True,
     "axes.spines.top": False,
@@ -193,6 +202,14 @@ def height_is_free() -> bool:
     return _page_mm[0] is not None and _page_mm[1] is None
 
 
+def rc(name: str) -> Any:
+    """Return a setting of matplotlib with which the figure at hand is drawn, such as ``lines.linewidth``."""
+    import matplotlib as mpl
+
+    settings: Any = mpl.rcParams
+    return settings[name]
+
+
 def shade(index: int, count: int) -> tuple[float, float, float, float]:
     """Return the colour of one of ``count`` things in an order, such as levels: from dark to light."""
     from matplotlib import colormaps
@@ -210,14 +227,29 @@ def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
 
 def say_why_empty(axis: "Axes", text: str) -> None:
     """Write into a panel why it is empty."""
-    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, wrap=True)
+    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, parse_math=False)
     axis.set(xticks=[], yticks=[])
 
 
 def title(page: "Figure", text: str) -> None:
     """Write a title at the top left, in as many lines as it needs, unless the text is empty."""
     if text:
-        page.suptitle(text, x=0.01, ha="left", parse_math=False, wrap=True)
+        page.suptitle(lines_on(page, text, "figure.titlesize"), x=0.01, ha="left", parse_math=False)
+
+
+def lines_on(page: "Figure", text: str, setting: str) -> str:
+    """Return a text in lines as long as a page is wide, for the font size of a setting such as ``figure.titlesize``.
+
+    Matplotlib's own wrapping would read ``$`` as the beginning of a formula.
+    """
+    return textwrap.fill(text, max(20, int(0.98 * 72.0 * page.get_figwidth() / (_LETTER * points(setting)))))
+
+
+def points(setting: str) -> float:
+    """Return a font size of the style, points, by the name of its setting."""
+    from matplotlib.font_manager import FontProperties
+
+    return float(FontProperties(size=rc(setting)).get_size_in_points())
 
 
 def unit_text(unit: str) -> str:

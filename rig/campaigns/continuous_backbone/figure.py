@@ -6,17 +6,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, OneWay
-from rig.campaigns.evaluation.figure import draw_history, heading
+from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_none
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, say_why_empty
+from rig.drawing.axes import log_axis, widen
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, say_why_empty
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_differences", "draw_ways"]
+__all__ = ["draw", "draw_detuning", "draw_differences", "draw_ways"]
+
+LEAST_DETUNING = 0.002
+"""Smallest detuning, relative, at which its axis ends."""
 
 Measured = Point[ContinuousBackboneResult]
 
@@ -29,6 +34,8 @@ class _Quantity(NamedTuple):
     mean: Callable[[Modal], float | None]
     std: Callable[[Modal], float | None]
     way: Callable[[OneWay], float]
+    least_span: float
+    """Smallest part of the value that its axis spans: less would show scatter as if it were a change."""
 
 
 _QUANTITIES = (
@@ -38,6 +45,7 @@ _QUANTITIES = (
         lambda modal: modal.modal_frequency_hz,
         lambda modal: modal.modal_frequency_std_hz,
         lambda way: way.modal_frequency_hz,
+        1e-3,
     ),
     _Quantity(
         "modal damping ratio, %",
@@ -45,6 +53,7 @@ _QUANTITIES = (
         lambda modal: modal.damping_ratio,
         lambda modal: modal.damping_ratio_std,
         lambda way: way.damping_ratio,
+        0.1,
     ),
 )
 
@@ -58,18 +67,52 @@ class _Way(NamedTuple):
     of: Callable[[ContinuousBackboneResult], OneWay | None]
 
 
-_WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", "#4f9d69", "v", lambda found: found.down))
+_WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", THIRD, "v", lambda found: found.down))
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw the results of both ways, their differences from the mean, and the history of the control loop."""
-    page.set_size_inches(9.0, 9.6)
-    axes = page.subplots(3, 2)
+    """Draw the results of both ways, their differences from the mean, the loop over time, and how far off resonance it was.
+
+    The phase error of the loop is not drawn: while the level is ramped, the lag swings by more than 180 deg and says nothing of
+    a point. What counts is the detuning.
+    """
     points = points_of(recording, ContinuousBackboneResult)
+    if not any(point.evaluated for point in points):
+        draw_failure(page, recording)
+        return
+    axes = grid(page, 3, 2)
     draw_ways(axes[0], points)
     draw_differences(axes[1], points)
-    draw_history(axes[2, 0], axes[2, 1], recording)
+    draw_history(axes[2, 0], None, recording)
+    draw_detuning(axes[2, 1], points, float(recording.configuration["plan"]["accepted_detuning"]))
     heading(page, recording)
+
+
+def draw_detuning(axis: "Axes", points: Sequence[Measured], accepted: float) -> None:
+    """Draw how far the frequency was off resonance, at most, while a level was passed, in per cent of the frequency.
+
+    The stored lag is that of a settled vibration at this detuning, ``tan(lag) = detuning / damping ratio``. The limit
+    ``accepted`` (relative) is drawn where it is near.
+    """
+    for some, scale_m, _ in _repeats(axis, points, "largest detuning, %"):
+        for used, style in ((True, {"marker": "o", "color": MAIN}), (False, {"marker": "x", "color": REJECTED})):
+            shown = [point for point in some if point.accepted == used]
+            _line(axis, shown, scale_m, [100.0 * _detuning(point) for point in shown], None, ls="", **style)
+    largest = float(np.nanmax([LEAST_DETUNING, *(abs(_detuning(point)) for point in points)]))
+    if largest > 0.5 * accepted:
+        largest = max(largest, accepted)
+        for limit in (-accepted, accepted):
+            axis.axhline(100.0 * limit, color=REJECTED, lw=0.8, ls="--")
+    axis.axhline(0.0, color=REJECTED, lw=0.8)
+    axis.set_ylim(-115.0 * largest, 115.0 * largest)
+
+
+def _detuning(point: Measured) -> float:
+    """Return the largest relative detuning of a point; NaN if it has none."""
+    if point.lock is None or point.modal is None:
+        return np.nan
+    lag, damping = point.lock.phase_error_deg, point.modal.damping_ratio
+    return np.nan if lag is None or damping is None else float(np.tan(np.radians(lag)) * damping)
 
 
 def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
@@ -88,6 +131,7 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
                     [quantity.scale * quantity.way(found) for _, found in there],
                     f"way {way.name}" if said else None,
                     marker=way.marker,
+                    mfc="none",
                     ls=":",
                     color=way.colour,
                 )
@@ -98,21 +142,25 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
             out = [point for point in some if not point.accepted]
             values = _values(out, quantity.mean, quantity.scale)
             _line(axis, out, scale_m, values, "not accepted" if said else None, marker="x", ls="", color=REJECTED)
+    for axis, quantity in zip(axes, _QUANTITIES, strict=True):
+        widen(axis, quantity.least_span)
     if axes[1].get_legend_handles_labels()[0]:
-        axes[1].legend(fontsize=8)
+        axes[1].legend()
 
 
 def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
     """Draw the differences of both ways from their mean, in per cent of the mean, with the 95 % band of the mean."""
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
-        for some, scale_m, _said in _repeats(axis, points, f"from the mean {quantity.label.split(',')[0]}, %"):
+        for some, scale_m, _said in _repeats(axis, points, f"{quantity.label.split(',')[0]}, way minus mean, %"):
             both = [point for point in some if all(way.of(result_of(point)) is not None for way in _WAYS)]
             mean, std = _values(both, quantity.mean), _values(both, quantity.std)
             _band(axis, both, scale_m, np.zeros(len(both)), 100.0 * std / np.abs(mean))
             for way in _WAYS:
                 found = [one for point in both if (one := way.of(result_of(point))) is not None]
                 values = 100.0 * (np.array([quantity.way(one) for one in found]) / mean - 1.0)
-                _line(axis, both, scale_m, values, None, marker=way.marker, ls=":", color=way.colour)
+                _line(axis, both, scale_m, values, None, marker=way.marker, mfc="none", ls=":", color=way.colour)
+        least = 10.0 * quantity.least_span
+        axis.set_ylim(min(-least, axis.get_ylim()[0]), max(least, axis.get_ylim()[1]))
 
 
 def _values(points: Sequence[Measured], of: Callable[[Modal], float | None], scale: float = 1.0) -> np.ndarray:
@@ -124,13 +172,14 @@ def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[t
     """Yield for each repeat: measured points by rising amplitude, the amplitude scale, and whether it is the first repeat."""
     measured = [point for point in points if point.vibration is not None]
     if not measured:
-        say_why_empty(axis, "no level was passed")
+        say_why_empty(axis, why_none(points))
         return
     unit = engineering(np.array([vibration_of(point).amplitude_m for point in measured]))[1]
-    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel=label, xscale="log")
+    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel=label)
     for number, repeat in enumerate(dict.fromkeys(point.repeat for point in measured)):
         some = sorted((p for p in measured if p.repeat == repeat), key=lambda point: vibration_of(point).amplitude_m)
         yield some, 1e6 if unit == "µm" else 1e3, number == 0
+    log_axis(axis, "x")
 
 
 def _band(axis: "Axes", points: Sequence[Measured], scale_m: float, mean: Any, std: Any) -> None:
@@ -143,4 +192,4 @@ def _line(
 ) -> None:
     if points:
         x = [scale_m * vibration_of(point).amplitude_m for point in points]
-        axis.plot(x, values, ms=3.5, label=label, **{"lw": 1.0, **style})
+        axis.plot(x, values, label=label, **style)
