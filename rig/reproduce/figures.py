@@ -1,14 +1,15 @@
 """Figures of a study: errors by training set, steady responses with the true ones, sweeps."""
 
 from collections.abc import Callable, Mapping, Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from identification import ErrorTable
 from identification.pnlss.error_table import SAME_LEVEL
-from rig.drawing.areas import broad, legend_below
-from rig.drawing.page import grid, page_for
+from rig.drawing.areas import broad
+from rig.drawing.page import grid, legend_below, page_for
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends
 from rig.drawing.style import COLOURS, MAIN, MARKERS, REJECTED, SECOND, shade, title
 from rig.reproduce.study import VARIANTS, Study
@@ -22,6 +23,7 @@ __all__ = ["draw_study"]
 
 _SEED = 0
 _IDENTIFIED, _LINEAR = next(iter(VARIANTS)), "linear start"
+_LETTERS = 44  # of a line of the legend
 _MOST_SHOWN, _MOST_OF_UNBOUNDED = 2.5, 1.6  # times the largest recorded value
 _HELD = {"pure-sine": "pure sine", "fundamental": "constant fundamental", "voltage": "constant voltage"}
 _POINTS: dict[str, Any] = {"textcoords": "offset points"}
@@ -60,7 +62,7 @@ def _errors(page: "Figure", study: Study) -> None:
         axis.yaxis.set_major_formatter("{x:g}")
         axis.yaxis.set_minor_formatter(_few_numbers)
     axes[0].set_ylabel(f"error of {study.table.output}, %")
-    legend_below(page, _handles(axes))
+    legend_below(page, *axes)
     models = sum(len({row.model for row in study.table.tests if row.training_set == one}) for one in sets)
     count = f"{models} model{'' if models == 1 else 's'}"
     title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of {count}{_few(study)}")
@@ -167,15 +169,16 @@ def _explain(page: "Figure", axes: np.ndarray, study: Study, reasons: Sequence[s
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles = _handles(axes)
+    more: list[Any] = []
     predicted = [one.prediction for one in study.steady if one.prediction is not None]
     if any(not one.stable.all() for one in predicted):
-        handles["unstable"] = Line2D([], [], color=REJECTED, ls=UNSTABLE)
+        more.append(Line2D([], [], color=REJECTED, ls=UNSTABLE, label="unstable"))
     if any(one.range_use.max() > BEYOND for one in predicted):
-        handles["beyond the training data"] = Patch(color=REJECTED, alpha=0.25, lw=0)
+        more.append(Patch(color=REJECTED, alpha=0.25, lw=0, label="beyond the training data"))
     for reason in reasons:
-        handles[f"ends here: {reason}"] = Line2D([], [], color=REJECTED, marker="s", ls="none")
-    legend_below(page, handles)
+        label = fill(f"ends here: {reason}", _LETTERS)
+        more.append(Line2D([], [], color=REJECTED, marker="s", ls="none", label=label))
+    legend_below(page, *axes.ravel(), handles=more)
 
 
 def _sweeps(page: "Figure", study: Study) -> None:
@@ -190,7 +193,7 @@ def _sweeps(page: "Figure", study: Study) -> None:
         gone = ", ".join(f"{one.training_set} at {one.unbounded_at_s:.1f} s" for one in lost)
         axis.set(xlabel="frequency of the plan, Hz", ylabel="drive, m/s²")
         axis.set_title(f"{name}: {f'unbounded: {gone}' if lost else 'all runs bounded'}")
-    legend_below(page, _handles(axes))
+    legend_below(page, *axes)
     title(page, f"{study.options.specimen.name}: sweeps simulated from the measured {study.options.input}")
 
 
@@ -227,15 +230,6 @@ def _envelopes(axis: Any, shown: Sequence[SweepResult], colours: Mapping[str, An
     )
     if highest > _MOST_SHOWN * top:
         axis.text(0.99, 0.95, "cut off above", ha="right", va="top", transform=axis.transAxes)
-
-
-def _handles(axes: np.ndarray) -> dict[str, Any]:
-    """Return the legend entries of all panels by label."""
-    found: dict[str, Any] = {}
-    for axis in axes.ravel():
-        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return found
 
 
 def _around(axis: Any, truth: Truth, wide: Truth, band_hz: tuple[float, float]) -> None:

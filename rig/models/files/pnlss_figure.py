@@ -68,7 +68,7 @@ def _title(found: "IdentifiedPnlss", kept: list[str]) -> str:
     left_out = [text for name, text in missing.items() if name not in kept]
     if left_out and kept:
         lines.append(f"not in the file: {', '.join(left_out)}")
-    return "\n".join(lines)
+    return "; ".join(lines)
 
 
 def _unit(channel: "Channel") -> str:
