@@ -1,7 +1,6 @@
 """Figures of a study: errors by training set, steady responses with the true ones, sweeps."""
 
 from collections.abc import Callable, Mapping, Sequence
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +22,6 @@ __all__ = ["draw_study"]
 
 _SEED = 0
 _IDENTIFIED, _LINEAR = next(iter(VARIANTS)), "linear start"
-_LETTERS = 44  # of a line of the legend
 _MOST_SHOWN, _MOST_OF_UNBOUNDED = 2.5, 1.6  # times the largest recorded value
 _HELD = {"pure-sine": "pure sine", "fundamental": "constant fundamental", "voltage": "constant voltage"}
 _POINTS: dict[str, Any] = {"textcoords": "offset points"}
@@ -120,7 +118,7 @@ def _beside(tables: Mapping[str, ErrorTable]) -> list[tuple[str, ErrorTable, Any
 def _steady(page: "Figure", study: Study) -> None:
     """Draw selected models and the rig: one row per held quantity, one column per force.
 
-    For a pure sine, the rig is shown by its backbone and its peak. A square marks where a curve ends, and the legend says why.
+    For a pure sine, the rig is shown by its backbone and its peak. A square marks where a curve ends, and the title says why.
     """
     forces = study.options.specimen.forces_n
     rows = list(dict.fromkeys(truth.held for truth in study.truths))
@@ -142,8 +140,9 @@ def _steady(page: "Figure", study: Study) -> None:
         lost = f"; none for {', '.join(missing)}" if missing else ""
         axis.set_title(f"{_HELD[truth.held]}, {truth.text}{lost}")
         axis.set(xlabel="frequency, Hz", ylabel="drive point, mm")
-    _explain(page, axes, study, list(reasons))
-    title(page, f"{study.options.specimen.name}, models {study.options.variant}: steady responses")
+    ends = f"; at the squares a curve ends, because {'; '.join(reasons)}" if reasons else ""
+    title(page, f"{study.options.specimen.name}, models {study.options.variant}: steady responses{ends}")
+    _explain(page, axes, study, ends=bool(reasons))
 
 
 def _rig(axis: Any, truth: Truth) -> None:
@@ -164,8 +163,8 @@ def _rig(axis: Any, truth: Truth) -> None:
         )
 
 
-def _explain(page: "Figure", axes: np.ndarray, study: Study, reasons: Sequence[str]) -> None:
-    """Put one legend on the page: what is drawn, and why curves end."""
+def _explain(page: "Figure", axes: np.ndarray, study: Study, *, ends: bool) -> None:
+    """Put one legend on the page."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -175,9 +174,8 @@ def _explain(page: "Figure", axes: np.ndarray, study: Study, reasons: Sequence[s
         more.append(Line2D([], [], color=REJECTED, ls=UNSTABLE, label="unstable"))
     if any(one.range_use.max() > BEYOND for one in predicted):
         more.append(Patch(color=REJECTED, alpha=0.25, lw=0, label="beyond the training data"))
-    for reason in reasons:
-        label = fill(f"ends here: {reason}", _LETTERS)
-        more.append(Line2D([], [], color=REJECTED, marker="s", ls="none", label=label))
+    if ends:
+        more.append(Line2D([], [], color=REJECTED, marker="s", ls="none", label="the curve ends"))
     legend_below(page, *axes.ravel(), handles=more)
 
 
