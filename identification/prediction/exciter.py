@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.results import Result
 
 __all__ = ["PARAMETERS", "Exciter", "VoltagePath"]
 
@@ -83,7 +84,7 @@ class VoltagePath:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Exciter:
+class Exciter(Result):
     """Amplifier, exciter and stinger of one rig; the module docstring has the equations.
 
     Parameters

@@ -1,0 +1,103 @@
+"""Figures of results in memory, for notebooks and scripts. What is drawn how is one table here."""
+
+from collections.abc import Callable
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from identification import FrequencyResponse
+from rig.drawing.style import STYLE
+from rig.errors import RecordingError
+from rig.figures.files import drawing, drawing_of_recording
+from rig.models.files.files import KINDS
+from rig.models.files.kinds import as_kept, kind_of_file_for
+from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+__all__ = ["RESULTS", "plot"]
+
+
+class ResultFigure(NamedTuple):
+    """How one type of result is drawn."""
+
+    draw: str
+    """``module:function`` that draws the result on an empty page, ``(page, result)``."""
+    figure_in: tuple[float, float] = (9.0, 4.0)
+    """Width and height of the page, inches."""
+
+
+RESULTS = {
+    "FrequencyResponse": ResultFigure("rig.figures.responses:draw_response", (9.0, 6.4)),
+    "ForceSurface": ResultFigure("rig.figures.responses:draw_surface", (11.0, 4.5)),
+    "ConstantForceCurve": ResultFigure("rig.figures.responses:draw_constant_force"),
+    "Comparison": ResultFigure("rig.figures.responses:draw_comparison"),
+    "SteadyPrediction": ResultFigure("rig.figures.responses:draw_steady"),
+    "ResponseBand": ResultFigure("rig.figures.responses:draw_band"),
+    "SweepPrediction": ResultFigure("rig.figures.responses:draw_sweep_prediction"),
+    "ContinuousBackbone": ResultFigure("rig.figures.backbones:draw_continuous"),
+    "PeriodicResponses": ResultFigure("rig.figures.backbones:draw_periodic"),
+    "DistortionLevels": ResultFigure("rig.figures.spectra:draw_distortion", (9.0, 6.4)),
+    "PeriodicSpectra": ResultFigure("rig.campaigns.multisine.figure:draw_multisine", (9.0, 6.4)),
+    "StabilisationDiagram": ResultFigure("rig.figures.spectra:draw_stabilisation"),
+    "Transient": ResultFigure("rig.figures.spectra:draw_transient", (9.0, 6.4)),
+    "Tuning": ResultFigure("rig.tuning.figure:draw_on", (11.0, 6.8)),
+    "Assessment": ResultFigure("rig.check.figure:draw_check", (9.0, 6.4)),
+}
+"""By the name of the type: results that no file of ours holds. For others see `rig.models.files.kinds`."""
+
+
+def plot(thing: Any, *, page: "Figure | SubFigure | None" = None, **options: Any) -> "tuple[Axes, ...]":
+    """Draw a result, a file or a run; return the axes of the figure, from the top left to the bottom right.
+
+    Parameters
+    ----------
+    thing
+        Path of a file that ``rig plot`` draws; a `rig.Run` or `rig.Recording`; a result of identification, of an analysis of a
+        virtual rig, of tuning, rehearsal or check; or several `identification.FrequencyResponse` in one tuple.
+    page
+        Empty figure to draw on. Default: a new figure of pyplot, in the size of ``rig plot``.
+    options
+        Of files, runs and recordings: those of ``rig plot``, such as ``lateness=True``.
+
+    Raises
+    ------
+    TypeError
+        If there is no figure for this type.
+    rig.errors.RecordingError
+        If a file cannot be read.
+    """
+    import matplotlib as mpl
+
+    size_in, draw = _drawing_of(thing, options)
+    style = {key: value for key, value in STYLE.items() if key != "figure.dpi"}  # that of the screen
+    with mpl.rc_context(style):
+        if page is None:
+            from matplotlib import pyplot
+
+            page = pyplot.figure(figsize=size_in, layout="constrained")
+        draw(page)
+    return tuple(page.axes)
+
+
+def _drawing_of(thing: Any, options: dict[str, Any]) -> tuple[tuple[float, float], Callable[[Any], None]]:
+    """Return the size of the page, inches, and what draws on it."""
+    if isinstance(thing, str | Path):
+        return drawing(Path(thing), **options)
+    recording = getattr(thing, "recording", thing)  # of a run
+    if isinstance(recording, Recording):
+        return drawing_of_recording(recording, **options)
+    if options:
+        raise TypeError(f"plot: {', '.join(options)}: allowed for files, runs and recordings alone")
+    draw_on = getattr(thing, "draw_on", None)  # of an analysis
+    if draw_on is not None:
+        return thing.figure_in, draw_on
+    found = next((RESULTS[one.__name__] for one in type(thing).__mro__ if one.__name__ in RESULTS), None)
+    if found is not None:
+        return found.figure_in, lambda page: resolve_name(found.draw)(page, thing)
+    kind = kind_of_file_for(thing)
+    if kind is None or (isinstance(thing, tuple) and not all(isinstance(one, FrequencyResponse) for one in thing)):
+        raise TypeError(f"plot: no figure for {type(thing).__name__}; allowed are files, runs, recordings and results")
+    return kind.figure_in, lambda page: resolve_name(kind.draw)(page, as_kept(kind, thing))
