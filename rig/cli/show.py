@@ -21,8 +21,26 @@ def plot_(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
     lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
+    style: Annotated[
+        str, typer.Option(help="screen, paper (one column, 85 mm), slide (16:9), or a style sheet of matplotlib.")
+    ] = "screen",
+    size: Annotated[str, typer.Option(metavar="WxH", help="Width and height, mm, or the width alone.")] = "",
 ) -> None:
     """Draw what is in a file."""
+    from rig.drawing.style import restyle
     from rig.figures.files import plot
 
+    restyle(style, size_mm=_size_mm(size))
     plot(file, output, lateness=lateness)
+
+
+def _size_mm(text: str) -> tuple[float, float | None] | None:
+    from rig.errors import RecordingError
+
+    width, _, height = text.lower().removesuffix("mm").partition("x")
+    try:
+        return (float(width), float(height) if height else None) if text else None
+    except ValueError:
+        raise RecordingError(
+            f"`size` {text}: write width and height in mm, such as 85x60, or the width alone"
+        ) from None

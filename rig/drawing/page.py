@@ -2,31 +2,41 @@
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
-from rig.drawing.style import STYLE
+import numpy as np
+
+from rig.drawing.style import STYLE, height_is_free, page_in
 from rig.errors import RecordingError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["page_for", "svg_of"]
+__all__ = ["grid", "page_for", "svg_of"]
+
+_NARROW_IN = 5.0
+"""On narrower pages panels stand below one another."""
+_WIDE = 1.6
+"""On pages whose width is more than this times their height, three rows of two panels become two rows of three."""
+_PANEL_IN, _MOST_IN = 1.65, 8.9
+"""Height of a panel on a narrow page, and of all panels together: the column of a journal."""
 
 
 @contextmanager
 def page_for(file: Path, size_in: tuple[float, float]) -> Iterator["Figure"]:
-    """Give an empty page of a size (inches), and write what has been drawn on it into a file (png, pdf or svg, by its suffix).
+    """Give an empty page, and write what has been drawn on it into a file (png, pdf or svg, by its suffix).
 
+    ``size_in`` is the size of this figure (inches); `rig.drawing.style.restyle` can ask for another page.
     Raises `RecordingError` if the file cannot be written.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(STYLE):
-        page = Figure(figsize=size_in, layout="constrained")
+        page = Figure(figsize=page_in(size_in), layout="constrained")
         yield page
         _lay_out(page)
         try:
@@ -53,6 +63,33 @@ def svg_of(draw: Callable[["Figure"], None], size_in: tuple[float, float], name:
     svg = text.getvalue()
     svg = re.sub(r"<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     return re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+
+
+def grid(
+    page: "Figure",
+    rows: int,
+    columns: int = 1,
+    *,
+    sharex: bool | Literal["none", "all", "row", "col"] = False,
+    height_ratios: Sequence[float] | None = None,
+) -> np.ndarray[Any, Any]:
+    """Give panels in rows and columns, object[rows, columns] of axes, arranged as the page allows.
+
+    On a page as narrow as a paper's column the panels stand below one another, row by row, and where its height is free the
+    page becomes as tall as they need. On a wide page, such as a slide, more rows than columns change places with them. A panel
+    is therefore best labelled by itself; where ``sharex``, label every panel and call its ``label_outer()``.
+    """
+    width, height = page.get_figwidth(), page.get_figheight()
+    if width < _NARROW_IN:
+        count = rows * columns
+        if height_is_free():
+            page.set_figheight(min(count * _PANEL_IN, _MOST_IN))
+        ratios = None if height_ratios is None else [ratio for ratio in height_ratios for _ in range(columns)]
+        axes = page.subplots(count, 1, sharex=sharex, squeeze=False, height_ratios=ratios)
+        return np.asarray(axes).reshape(rows, columns)
+    if rows > columns > 1 and width > _WIDE * height and height_ratios is None:
+        return np.asarray(page.subplots(columns, rows, sharex=sharex, squeeze=False)).T
+    return np.asarray(page.subplots(rows, columns, sharex=sharex, squeeze=False, height_ratios=height_ratios))
 
 
 def _lay_out(page: "Figure") -> None:

@@ -1,42 +1,204 @@
-"""Style shared by all figures: colours, fonts, grid, and resolution of traces."""
+"""Style shared by all figures: colours, fonts, grid, sizes of pages, and resolution of traces. `restyle` changes it.
 
+The colours are those of Okabe and Ito (*Color universal design*, 2008; recommended by B. Wong, Nature Methods 8, 441, 2011):
+readers with any of the common colour vision deficiencies can tell them apart. Font sizes come from the style alone: a drawing
+function passes no ``fontsize``, so that `restyle` reaches all text. Curves that belong to an ordered quantity, such
+as a level, take their colour from viridis without its yellow end (`shade`).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from rig.errors import RecordingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = [
+    "COLOURS",
     "MAIN",
+    "MARKERS",
+    "PRESETS",
     "REJECTED",
     "SECOND",
     "STYLE",
+    "THIRD",
     "TRACE_BINS",
+    "Preset",
     "engineering",
+    "height_is_free",
+    "page_in",
     "plain_log",
+    "restyle",
     "say_why_empty",
+    "shade",
     "title",
     "unit_text",
 ]
 
-MAIN, SECOND, REJECTED = "#1f4e79", "#c0504d", "#9a9a9a"
-STYLE: dict[Any, Any] = {
+MAIN, SECOND, THIRD = "#0072b2", "#d55e00", "#009e73"
+REJECTED = "#767676"
+"""Grey of everything that is not accepted, and of reference lines: still readable as text on white (contrast 4.5 to 1)."""
+COLOURS = (MAIN, SECOND, THIRD, "#e69f00", "#cc79a7", "#56b4e9", "#000000")
+"""Colours of things beside one another that have no order, such as recordings."""
+MARKERS = "os^Dv<>P"
+"""Markers of things beside one another: with a marker of its own, each can also be told apart in black and white."""
+
+TRACE_BINS = 1200
+_MM_PER_IN = 25.4
+
+
+@dataclass(frozen=True)
+class Preset:
+    """One look for one purpose: a size of the page, and what differs from the common style."""
+
+    width_mm: float | None = None
+    """Width of the page; None: that of each figure."""
+    height_mm: float | None = None
+    """Height of the page; None: what the panels need."""
+    rc: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of matplotlib."""
+
+
+PRESETS = {
+    "screen": Preset(),
+    "paper": Preset(
+        85.0,
+        None,
+        {
+            "font.size": 7.5,
+            "legend.fontsize": 6.5,
+            "xtick.labelsize": 6.5,
+            "ytick.labelsize": 6.5,
+            "axes.titlesize": 7.5,
+            "figure.titlesize": 7.5,
+            "axes.linewidth": 0.6,
+            "lines.linewidth": 0.9,
+            "lines.markersize": 2.8,
+            "grid.linewidth": 0.4,
+            "legend.handlelength": 1.6,
+            "figure.dpi": 600,
+        },
+    ),
+    "slide": Preset(
+        338.667,
+        190.5,
+        {
+            "font.size": 15.0,
+            "legend.fontsize": 13.0,
+            "xtick.labelsize": 13.0,
+            "ytick.labelsize": 13.0,
+            "axes.titlesize": 15.0,
+            "figure.titlesize": 18.0,
+            "axes.linewidth": 1.1,
+            "lines.linewidth": 2.0,
+            "lines.markersize": 6.5,
+            "grid.linewidth": 0.9,
+            "figure.dpi": 144,
+        },
+    ),
+}
+"""The looks by name: ``screen`` (each figure at its own size), ``paper`` (one column, 85 mm), ``slide`` (16:9, 1920 x 1080)."""
+
+_COMMON: dict[str, Any] = {
     "font.size": 9,
+    "legend.fontsize": 8,
+    "axes.titlesize": 9,
+    "figure.titlesize": 11,
+    "axes.titlelocation": "left",
     "axes.grid": True,
-    "grid.color": "#e2e2e2",
-    "grid.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
+    "axes.edgecolor": "#404040",
     "axes.formatter.useoffset": False,
+    "grid.color": "#e2e2e2",
+    "grid.linewidth": 0.6,
     "lines.linewidth": 1.2,
+    "lines.markersize": 4.0,
+    "errorbar.capsize": 2.0,
     "legend.frameon": False,
     "figure.dpi": 150,
+    "pdf.fonttype": 42,  # text stays text, in fonts that editors understand
+    "svg.fonttype": "none",
 }
+STYLE: dict[Any, Any] = dict(_COMMON)
+"""Settings of matplotlib with which figures are drawn. Only `restyle` changes them."""
+_page_mm: list[float | None] = [None, None]
 
-TRACE_BINS = 1200
+
+def restyle(
+    preset: str | Path = "screen",
+    rc: Mapping[str, Any] | None = None,
+    *,
+    size_mm: tuple[float, float | None] | None = None,
+) -> None:
+    """Draw all further figures of this process in another style. ``restyle()`` goes back to the first one.
+
+    Parameters
+    ----------
+    preset
+        ``"screen"``, ``"paper"``, ``"slide"``, or a style sheet of matplotlib (``*.mplstyle``), which is laid over the first.
+    rc
+        Settings of matplotlib that are laid over the preset, such as ``{"font.family": "serif"}``.
+    size_mm
+        Width and height of the page, mm, instead of the preset's; height None: what the panels need.
+
+    Raises
+    ------
+    RecordingError
+        If there is no such preset, no such setting or no such style sheet, or if a size is not positive.
+    """
+    import matplotlib as mpl
+
+    found = PRESETS.get(str(preset), Preset())
+    sheet: Any = {}
+    try:
+        if str(preset) not in PRESETS:
+            if Path(preset).suffix != ".mplstyle":
+                raise RecordingError(
+                    f"`style` {preset}: is none of {', '.join(PRESETS)} and no style sheet (.mplstyle)"
+                )
+            sheet = mpl.rc_params_from_file(preset, use_default_template=False)
+        wanted = {**_COMMON, **found.rc, **sheet, **(rc or {})}
+        mpl.RcParams(wanted)
+    except OSError as error:
+        raise RecordingError(f"{preset}: cannot be read: {error.strerror}") from None
+    except (KeyError, ValueError) as error:
+        raise RecordingError(f"`style` {preset}: {str(error).strip(chr(34)).splitlines()[0]}") from None
+    size = (found.width_mm, found.height_mm) if size_mm is None else size_mm
+    if any(side is not None and not 10.0 <= side <= 2000.0 for side in size):
+        sides = " x ".join(f"{side:g}" for side in size if side is not None)
+        raise RecordingError(f"`size` {sides} mm: each side of a page is 10 to 2000 mm long")
+    STYLE.clear()
+    STYLE.update(wanted)
+    _page_mm[:] = size
+
+
+def page_in(size_in: tuple[float, float]) -> tuple[float, float]:
+    """Return width and height (inches) of the page for a figure that has a size of its own (inches)."""
+    width, height = (None if side is None else side / _MM_PER_IN for side in _page_mm)
+    if width is None:
+        return size_in
+    return width, width * size_in[1] / size_in[0] if height is None else height
+
+
+def height_is_free() -> bool:
+    """Return whether a figure may make its page as tall as its panels need."""
+    return _page_mm[0] is not None and _page_mm[1] is None
+
+
+def shade(index: int, count: int) -> tuple[float, float, float, float]:
+    """Return the colour of one of ``count`` things in an order, such as levels: from dark to light."""
+    from matplotlib import colormaps
+
+    red, green, blue, alpha = colormaps["viridis"](0.85 * index / max(1, count - 1))
+    return red, green, blue, alpha
 
 
 def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
@@ -48,19 +210,23 @@ def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
 
 def say_why_empty(axis: "Axes", text: str) -> None:
     """Write into a panel why it is empty."""
-    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED)
+    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, wrap=True)
     axis.set(xticks=[], yticks=[])
 
 
 def title(page: "Figure", text: str) -> None:
-    """Write a title at the top left, unless the text is empty."""
+    """Write a title at the top left, in as many lines as it needs, unless the text is empty."""
     if text:
-        page.suptitle(text, fontsize=11, x=0.01, ha="left", parse_math=False)
+        page.suptitle(text, x=0.01, ha="left", parse_math=False, wrap=True)
 
 
 def unit_text(unit: str) -> str:
     """Return a unit as written at an axis."""
-    return {"m/s2": "m/s²", "m/s^2": "m/s²"}.get(unit, unit)
+    written = {"m/s2": "m/s²", "m/s^2": "m/s²"}
+    if unit in written:
+        return written[unit]
+    over, slash, under = unit.rpartition("/")
+    return f"({written[over]})/{under}" if slash and over in written else unit
 
 
 def plain_log(axis: "Axes") -> None:

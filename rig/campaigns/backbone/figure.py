@@ -6,6 +6,7 @@ from identification import IdentificationError, NonlinearMode, nonlinear_mode
 from rig.campaigns.backbone.points import recorded_backbone
 from rig.campaigns.evaluation.figure import draw_history, heading
 from rig.drawing.nonlinear_mode import draw_properties
+from rig.drawing.page import grid
 from rig.drawing.style import say_why_empty
 from rig.recording.reader import Recording
 
@@ -17,7 +18,7 @@ __all__ = ["draw"]
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw frequency and damping over the amplitude, and the history of the control loop."""
-    axes = page.subplots(2, 2)
+    axes = grid(page, 2, 2)
     try:
         mode: NonlinearMode | None = nonlinear_mode(recorded_backbone(recording))
     except IdentificationError:
