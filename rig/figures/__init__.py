@@ -14,8 +14,11 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
+    from rig.drawing.style import restyle
     from rig.figures.results import plot
 else:
+    from rig.drawing.style import restyle
+
     __getattr__, __dir__ = on_use(__name__, {"plot": "results"})
 
-__all__ = ["plot"]
+__all__ = ["plot", "restyle"]

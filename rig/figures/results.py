@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from identification import FrequencyResponse
 from rig.drawing.style import STYLE
-from rig.errors import RecordingError
-from rig.figures.files import drawing, drawing_of_recording
-from rig.models.files.files import KINDS
+from rig.figures.files import drawing
 from rig.models.files.kinds import as_kept, kind_of_file_for
 from rig.recording.reader import Recording
 
@@ -88,7 +86,7 @@ def _drawing_of(thing: Any, options: dict[str, Any]) -> tuple[tuple[float, float
         return drawing(Path(thing), **options)
     recording = getattr(thing, "recording", thing)  # of a run
     if isinstance(recording, Recording):
-        return drawing_of_recording(recording, **options)
+        return drawing(recording.path, **options)
     if options:
         raise TypeError(f"plot: {', '.join(options)}: allowed for files, runs and recordings alone")
     draw_on = getattr(thing, "draw_on", None)  # of an analysis

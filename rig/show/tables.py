@@ -14,7 +14,7 @@ from rig.show.point_table import attempts_refused, point_rows, points_from, show
 from rig.text.console import number, print_table
 from rig.text.printable import printable, printable_strings
 
-__all__ = ["loop_line", "print_findings", "print_rehearsal", "print_summary", "say_how_it_ended"]
+__all__ = ["loop_line", "print_findings", "print_points", "print_rehearsal", "print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
@@ -82,11 +82,11 @@ def print_summary(summary: dict[str, Any]) -> None:
             print(f"note: {note}")
         return
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
-    _print_points(summary["kind"], summary["points"])
+    print_points(summary["kind"], summary["points"])
     print_findings(summary)
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
-        _print_points(summary["kind"], summary["former_points"])
+        print_points(summary["kind"], summary["former_points"])
     print(f"loop: {loop_line(summary['loop'])}")
     for number_shown, part in enumerate(summary["parts"], 1):
         changed = f"; changed in the plan: {', '.join(part['changed'])}" if part["changed"] else ""
@@ -164,7 +164,7 @@ def print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, An
         print("  the run lies within what was foreseen")
 
 
-def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
+def print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
     """Print a table of points, then their warnings. Points are counted from 1."""
     points = points_from(kind, tables)
     columns = shown_columns(kind, points)

@@ -13,6 +13,7 @@ from rig.errors import RecordingError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from rig.tuning import Tuning
 
@@ -35,19 +36,24 @@ def check_figure(figure: Path, overwrite: bool) -> None:
 
 def draw_tuning(tuning: "Tuning", figure: Path) -> None:
     """Write the figure (png, pdf or svg, by its suffix)."""
-    designs = (tuning.chosen.design, *tuning.chosen.others)
     with page_for(figure, (11.0, 6.8)) as page:
-        axes = page.subplots(2, 3)
-        _draw_plant(axes[0, 0], axes[1, 0], tuning)
-        _draw_bode(axes[0, 1], axes[1, 1], designs)
-        _draw_frequency_step(axes[0, 2], designs)
-        _draw_level_step(axes[1, 2], designs)
-        law = tuning.chosen.design.loop
-        title(
-            page,
-            f"{tuning.bench.specimen.name}: tuned at {tuning.test.level_rms_v:.3g} V RMS, law {tuning.chosen.law}, low-pass "
-            f"{tuning.chosen.low_pass_rad_s:.4g} rad/s, locked at {law.omega_rad_s / 2.0 / math.pi:.4g} Hz",
-        )
+        draw_on(page, tuning)
+
+
+def draw_on(page: "Figure", tuning: "Tuning") -> None:
+    """Draw plant, open loops and step responses on an empty page."""
+    designs = (tuning.chosen.design, *tuning.chosen.others)
+    axes = page.subplots(2, 3)
+    _draw_plant(axes[0, 0], axes[1, 0], tuning)
+    _draw_bode(axes[0, 1], axes[1, 1], designs)
+    _draw_frequency_step(axes[0, 2], designs)
+    _draw_level_step(axes[1, 2], designs)
+    law = tuning.chosen.design.loop
+    title(
+        page,
+        f"{tuning.bench.specimen.name}: tuned at {tuning.test.level_rms_v:.3g} V RMS, law {tuning.chosen.law}, low-pass "
+        f"{tuning.chosen.low_pass_rad_s:.4g} rad/s, locked at {law.omega_rad_s / 2.0 / math.pi:.4g} Hz",
+    )
 
 
 def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
