@@ -7,7 +7,6 @@ the armature, and from them the shaker's parameters. The structure stays attache
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import identification
 import rig
@@ -25,17 +24,16 @@ exciter.plot()
 # Beside the true values of the virtual rig.
 
 true = make_daq(rig.load_bench("magnet-beam")).rig.exciter
-factor = true.force_factor_n_a
 known = {
-    "moving_mass_kg": true.armature_mass_kg,
-    "suspension_stiffness_n_m": true.suspension_stiffness_n_m,
-    "force_per_volt_n_v": factor / true.resistance_ohm,
+    "moving mass": ("moving_mass_kg", true.armature_mass_kg),
+    "suspension stiffness": ("suspension_stiffness_n_m", true.suspension_stiffness_n_m),
+    "blocked force per volt": ("force_per_volt_n_v", true.force_factor_n_a / true.resistance_ohm),
 }
-figure, axis = plt.subplots(figsize=(7, 3), layout="constrained")
-for row, (name, value) in enumerate(known.items()):
+figure, axis = plt.subplots(figsize=(7, 2.5), layout="constrained")
+for row, (name, value) in enumerate(known.values()):
     share = 100 * (getattr(exciter, name) / value - 1)
     axis.errorbar(share, row, xerr=196 * exciter.std[name] / value, fmt="o", color="C0")
 axis.axvline(0.0, color="k", lw=0.6)
-axis.set_yticks(range(len(known)), [name.rsplit("_", 1)[0].replace("_", " ") for name in known])
+axis.set_yticks(range(len(known)), known)
 axis.set(xlabel="identified over true, minus one, %, with 95 %", ylim=(-0.5, len(known) - 0.5))
 plt.show()

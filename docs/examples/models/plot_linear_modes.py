@@ -31,7 +31,8 @@ analysis = identification.ModalAnalysis(modes, responses, diagram)
 analysis.plot()
 
 # %%
-# Identified over true, for frequency and damping. The truth is the finite-element model of the rig.
+# Identified over true. The truth is the finite-element model of the rig. The intervals are those of the noise in two
+# realisations; a few thousandths of a per cent in frequency are beyond what the level of the test leaves linear.
 
 truth = make_daq(rig.load_bench("magnet-beam")).rig.linear_modes
 nearest = [truth.nearest(frequency) for frequency in modes.frequency_hz]

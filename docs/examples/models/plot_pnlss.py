@@ -7,10 +7,9 @@ seen. The linear start shows what the polynomials add.
 """
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import rig
-from identification import FitSettings, identify_pnlss
+from identification import FitSettings, error_spectra, identify_pnlss
 
 plan = rig.load_plan("magnet-beam/multisine-2").model_copy(update={"realisations": 3, "resolution_hz": 0.25})
 records = rig.run(plan).experiments(outputs=["drive"], rate_hz=250.0)
@@ -18,20 +17,16 @@ fit = identify_pnlss(records[:2], states=2, validation=records[2:], settings=Fit
 fit.plot()
 
 # %%
-# The record of the validation, its spectrum, and what is left by the linear start and by the model.
+# The spectrum of the record that the fit has not seen, and what is left by the linear start and by the model.
 
-unseen = records[2]
-measured = unseen.outputs[0]
+spectra = error_spectra(fit.model, fit.linear, records[2])
 figure, axis = plt.subplots(figsize=(8, 4), layout="constrained")
-frequency = np.fft.rfftfreq(measured.size, 1 / unseen.sample_rate_hz)
-shown = (frequency > 5) & (frequency < 90)
 for values, label in (
-    (measured, "measured"),
-    (measured - fit.linear.simulate(unseen.inputs).outputs[0, -measured.size :], "error of the linear start"),
-    (measured - fit.model.simulate(unseen.inputs).outputs[0, -measured.size :], "error of the model"),
+    (spectra.measured, "measured"),
+    (spectra.linear_error, "error of the linear start"),
+    (spectra.error, "error of the model"),
 ):
-    amplitude = 2 * np.abs(np.fft.rfft(values)) / values.size
-    axis.semilogy(frequency[shown], amplitude[shown], ".", ms=3, label=label)
-axis.set(xlabel="frequency, Hz", ylabel="acceleration, m/s²", ylim=(1e-4, None))
-axis.legend()
+    axis.semilogy(spectra.frequency_hz, values[0], ".", ms=3, label=label)
+axis.set(xlabel="frequency, Hz", ylabel="acceleration, m/s²", xlim=(0, 85), ylim=(1e-4, None))
+axis.legend(loc="lower right", markerscale=3)
 plt.show()

@@ -2,7 +2,7 @@
 A sweep predicted from a backbone
 =================================
 
-The mode and the force of a recorded sweep give the motion over time; with a model of the shaker, the voltage alone does.
+The mode and the force of a recorded sweep give the motion over time; with a model of the shaker, the voltage would do.
 """
 
 import matplotlib.pyplot as plt
@@ -14,7 +14,7 @@ import rig
 mode = identification.nonlinear_mode(rig.run("magnet-beam/backbone-short").backbone())
 change = {"start_hz": 22.5, "stop_hz": 27.0, "levels_v": (1.5,)}
 (sweep,) = rig.run(rig.load_plan("magnet-beam/sweep-1").model_copy(update=change)).sweeps().values()
-predicted = identification.predict_sweep(mode, sweep, allow_extrapolation=True)
+predicted = identification.predict_sweep(mode, sweep)
 predicted
 
 # %%

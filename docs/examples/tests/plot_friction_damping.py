@@ -14,19 +14,20 @@ from simulators.analysis import hysteresis_loops, phase_resonance_backbone
 
 mode = identification.nonlinear_mode(rig.run("friction-beam/backbone-short").backbone())
 virtual = make_daq(rig.load_bench("friction-beam")).rig
-truth = phase_resonance_backbone(virtual, amplitudes_m=mode.amplitude_m)
+truth = phase_resonance_backbone(virtual, amplitudes_m=mode.amplitude_m[::3])
 
 figure, (damping, loop) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
 x = 1e6 * mode.amplitude_m
 damping.errorbar(x, 100 * mode.damping_ratio, 100 * mode.bound_95("damping_ratio"), fmt="o", label="test, 95 %")
-damping.plot(x, 100 * truth.damping_ratio, label="harmonic balance")
+damping.plot(1e6 * truth.amplitude_m, 100 * truth.damping_ratio, "s-", mfc="w", label="harmonic balance")
 damping.set(xlabel="displacement amplitude, µm", ylabel="modal damping ratio, %", xscale="log")
 damping.legend()
 
 # Why: the hysteresis of one joint at three levels. Its area is the energy that is lost in a period.
-for point in (0, x.size // 2, x.size - 1):
+for point in (0, 2, 4):
     found = hysteresis_loops(virtual, truth, point)[0]
-    loop.plot(found.coordinate / abs(found.coordinate).max(), found.force / abs(found.force).max(), label=f"{x[point]:.0f} µm")
+    size = f"{1e6 * truth.amplitude_m[point]:.0f} µm"
+    loop.plot(found.coordinate / abs(found.coordinate).max(), found.force / abs(found.force).max(), label=size)
 loop.set(xlabel="coordinate of the joint over its largest", ylabel="force over its largest")
 loop.legend()
 plt.show()

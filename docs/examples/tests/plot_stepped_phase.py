@@ -24,8 +24,8 @@ truth = constant_force_response(make_daq(rig.load_bench("magnet-beam")).rig, 0.5
 
 figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 amplitude = 1e3 * truth.amplitude_m
-axis.plot(truth.frequency_hz, np.where(truth.stable, amplitude, np.nan), label="harmonic balance")
-axis.plot(truth.frequency_hz, np.where(truth.stable, np.nan, amplitude), "C0:", label="unstable at constant force")
+axis.plot(truth.frequency_hz, amplitude, "C0:", label="unstable at constant force")
+axis.plot(truth.frequency_hz, np.where(truth.stable, amplitude, np.nan), "C0", label="harmonic balance")
 axis.plot(measured.frequency_hz, 1e3 * measured.amplitude_m, "oC1", label="stepped phase, 0.55 N")
 axis.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm")
 axis.legend()

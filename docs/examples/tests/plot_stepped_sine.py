@@ -26,8 +26,8 @@ folds = np.flatnonzero(np.diff(truth.stable.astype(int)))
 
 figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 amplitude = 1e3 * truth.amplitude_m
-axis.plot(truth.frequency_hz, np.where(truth.stable, amplitude, np.nan), label="harmonic balance")
-axis.plot(truth.frequency_hz, np.where(truth.stable, np.nan, amplitude), "C0:", label="unstable")
+axis.plot(truth.frequency_hz, amplitude, "C0:", label="unstable at constant force")
+axis.plot(truth.frequency_hz, np.where(truth.stable, amplitude, np.nan), "C0", label="harmonic balance")
 axis.plot(truth.frequency_hz[folds], amplitude[folds], "sC2", mfc="w", label="folds")
 axis.plot(measured.frequency_hz, 1e3 * measured.amplitude_m, "oC1--", lw=0.8, label="stepped up at 0.25 N")
 axis.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm", xlim=(24.2, 24.9))

@@ -1,0 +1,26 @@
+"""
+Gains and margins from a linear test
+====================================
+
+A low-level multisine tells enough of rig and structure to choose the gains of the loop, with their margins, and to write a plan.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import rig
+from rig.tuning import tune
+
+with TemporaryDirectory() as folder:
+    tuned = tune("magnet-beam", Path(folder) / "tuned.h5")
+tuned
+
+# %%
+# Plant with its model, open loops with their margins, and what a step in frequency or level does.
+
+tuned.plot()
+
+# %%
+# The plan that comes out of it runs as it is.
+
+rig.run(tuned.plan).plot()
