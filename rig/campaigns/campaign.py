@@ -26,6 +26,8 @@ class Campaign:
     draw: str
     """``module:function`` that draws a recording on an empty page, ``(page, recording)``. It is imported only when a figure is
     drawn."""
+    figure_in: tuple[float, float] = (9.0, 6.4)
+    """Width and height of the page of its figure, inches."""
     in_one_go: bool = False
     """Whether several points are measured together; then ``measure`` is ``(bench, plan, targets, rows, passages, ended) ->
     points``."""

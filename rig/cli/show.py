@@ -18,20 +18,27 @@ def show(
 
 
 def plot_(
-    file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Recordings, models or imported measurements.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Figure to write: .png, .pdf or .svg.")],
+    label: Annotated[list[str] | None, typer.Option(help="Name in the legend; once for each file.")] = None,
+    amplitude: Annotated[str | None, typer.Option(help="Axis of amplitudes: linear, log or dB.")] = None,
+    channel: Annotated[str, typer.Option(help="Sensor to show; by default the drive point.")] = "",
+    harmonic: Annotated[int, typer.Option(help="Harmonic to show.")] = 1,
+    frequency: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Ends of the frequency axis, Hz.")] = "",
     lateness: Annotated[bool, typer.Option("--lateness", help="How punctual the loop of a recording was.")] = False,
     style: Annotated[
         str, typer.Option(help="screen, paper (one column, 85 mm), slide (16:9), or a style sheet of matplotlib.")
     ] = "screen",
     size: Annotated[str, typer.Option(metavar="WxH", help="Width and height, mm, or the width alone.")] = "",
 ) -> None:
-    """Draw what is in a file."""
+    """Draw what is in a file; of several files, or with axes of one's own, their curves over one another."""
     from rig.drawing.style import restyle
+    from rig.figures.curves import View
     from rig.figures.files import plot
 
     restyle(style, size_mm=_size_mm(size))
-    plot(file, output, lateness=lateness)
+    view = View(amplitude, channel, harmonic, _limits_hz(frequency))
+    plot(files, output, lateness=lateness, labels=label or (), view=None if view == View() else view)
 
 
 def _size_mm(text: str) -> tuple[float, float | None] | None:
@@ -44,3 +51,13 @@ def _size_mm(text: str) -> tuple[float, float | None] | None:
         raise RecordingError(
             f"`size` {text}: write width and height in mm, such as 85x60, or the width alone"
         ) from None
+
+
+def _limits_hz(text: str) -> tuple[float, float] | None:
+    from rig.errors import RecordingError
+
+    low, _, high = text.partition(":")
+    try:
+        return (float(low), float(high)) if text else None
+    except ValueError:
+        raise RecordingError(f"`frequency` {text}: write both ends in Hz, such as 24:25.5") from None

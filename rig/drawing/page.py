@@ -13,11 +13,13 @@ from rig.drawing.style import STYLE, height_is_free, page_in
 from rig.errors import RecordingError
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["grid", "page_for", "svg_of"]
+__all__ = ["NARROW_IN", "grid", "legend_below", "page_for", "svg_of"]
 
-_NARROW_IN = 5.0
+NARROW_IN = 5.0
 """On narrower pages panels stand below one another."""
 _WIDE = 1.6
 """On pages whose width is more than this times their height, three rows of two panels become two rows of three."""
@@ -72,24 +74,47 @@ def grid(
     *,
     sharex: bool | Literal["none", "all", "row", "col"] = False,
     height_ratios: Sequence[float] | None = None,
+    down_columns: bool = False,
 ) -> np.ndarray[Any, Any]:
     """Give panels in rows and columns, object[rows, columns] of axes, arranged as the page allows.
 
-    On a page as narrow as a paper's column the panels stand below one another, row by row, and where its height is free the
-    page becomes as tall as they need. On a wide page, such as a slide, more rows than columns change places with them. A panel
-    is therefore best labelled by itself; where ``sharex``, label every panel and call its ``label_outer()``.
+    On a page as narrow as a paper's column the panels stand below one another, row by row or (``down_columns``) column by
+    column, and where its height is free the page becomes as tall as they need. On a wide page, such as a slide, more rows than
+    columns change places with them. A panel is therefore best labelled by itself; where ``sharex``, label every panel and call
+    its ``label_outer()``.
     """
     width, height = page.get_figwidth(), page.get_figheight()
-    if width < _NARROW_IN:
+    if width < NARROW_IN:
         count = rows * columns
         if height_is_free():
             page.set_figheight(min(count * _PANEL_IN, _MOST_IN))
         ratios = None if height_ratios is None else [ratio for ratio in height_ratios for _ in range(columns)]
         axes = page.subplots(count, 1, sharex=sharex, squeeze=False, height_ratios=ratios)
-        return np.asarray(axes).reshape(rows, columns)
+        return np.asarray(axes).reshape(rows, columns, order="F" if down_columns else "C")
     if rows > columns > 1 and width > _WIDE * height and height_ratios is None:
         return np.asarray(page.subplots(columns, rows, sharex=sharex, squeeze=False)).T
     return np.asarray(page.subplots(rows, columns, sharex=sharex, squeeze=False, height_ratios=height_ratios))
+
+
+def legend_below(page: "Figure", *panels: "Axes", handles: Sequence["Artist"] = ()) -> None:
+    """Write one legend below all panels, in as many columns as the page has room for.
+
+    It names each thing that the ``panels`` label once, or the ``handles``. Names are not read as formulas.
+    """
+    import matplotlib as mpl
+    from matplotlib.font_manager import FontProperties
+
+    found = [*handles, *(handle for panel in panels for handle in panel.get_legend_handles_labels()[0])]
+    entries = {str(handle.get_label()): handle for handle in reversed(found)}
+    names = list(dict.fromkeys(str(handle.get_label()) for handle in found))
+    if not names:
+        return
+    points = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
+    entry_in = points * (0.55 * max(map(len, names)) + 5.0) / 72.0
+    columns = min(len(names), max(1, int(page.get_figwidth() / entry_in)))
+    legend = page.legend(handles=[entries[name] for name in names], loc="outside lower left", ncols=columns)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
 
 
 def _lay_out(page: "Figure") -> None:

@@ -9,7 +9,7 @@ as a level, take their colour from viridis without its yellow end (`shade`).
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -31,14 +31,18 @@ __all__ = [
     "TRACE_BINS",
     "Preset",
     "engineering",
+    "from_zero",
     "height_is_free",
+    "log_axis",
     "page_in",
     "plain_log",
+    "rc",
     "restyle",
     "say_why_empty",
     "shade",
     "title",
     "unit_text",
+    "widen",
 ]
 
 MAIN, SECOND, THIRD = "#0072b2", "#d55e00", "#009e73"
@@ -193,6 +197,14 @@ def height_is_free() -> bool:
     return _page_mm[0] is not None and _page_mm[1] is None
 
 
+def rc(name: str) -> Any:
+    """Return a setting of matplotlib with which the figure at hand is drawn, such as ``lines.linewidth``."""
+    import matplotlib as mpl
+
+    settings: Any = mpl.rcParams
+    return settings[name]
+
+
 def shade(index: int, count: int) -> tuple[float, float, float, float]:
     """Return the colour of one of ``count`` things in an order, such as levels: from dark to light."""
     from matplotlib import colormaps
@@ -227,6 +239,42 @@ def unit_text(unit: str) -> str:
         return written[unit]
     over, slash, under = unit.rpartition("/")
     return f"({written[over]})/{under}" if slash and over in written else unit
+
+
+def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
+    """Make an axis logarithmic that spans at least a factor, with plain numbers at 1, 2, 5 where it spans few decades.
+
+    To be called after the data are drawn.
+    """
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axis.set(**{f"{which}scale": "log"})
+    low, high = getattr(axis, f"get_{which}lim")()
+    if high < least_span * low:
+        widen = np.sqrt(least_span * low / high)
+        low, high = low / widen, high * widen
+        axis.set(**{f"{which}lim": (low, high)})
+    ticks = getattr(axis, f"{which}axis")
+    ticks.set_minor_formatter(NullFormatter())
+    if high < 300.0 * low:
+        ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    if low >= 1e-3 and high <= 1e4:
+        ticks.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def from_zero(axis: "Axes", *values: np.ndarray) -> None:
+    """Let an axis of amplitudes begin at zero, with room above the largest of the values."""
+    largest = max((float(np.nanmax(one)) for one in values if np.isfinite(one).any()), default=0.0)
+    if largest > 0.0:
+        axis.set_ylim(0.0, 1.08 * largest)
+
+
+def widen(axis: "Axes", least: float) -> None:
+    """Let the vertical axis span at least a part ``least`` of its middle value, so that scatter does not look like a trend."""
+    low, high = axis.get_ylim()
+    middle = 0.5 * (low + high)
+    half = max(0.5 * (high - low), 0.5 * least * abs(middle))
+    axis.set_ylim(middle - half, middle + half)
 
 
 def plain_log(axis: "Axes") -> None:

@@ -1,15 +1,20 @@
 """Figures of recordings, models and imported measurements. Every figure states specimen, units and omitted data."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
+from identification import IdentificationError
+from rig.campaigns.evaluation.figure import draw_failure
+from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
 from rig.drawing.page import page_for
 from rig.errors import RecordingError
+from rig.figures.curves import View
 from rig.figures.lateness import draw_lateness
+from rig.figures.overlay import overlay
 from rig.models.files.files import KINDS, load, understood
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -22,19 +27,31 @@ __all__ = ["drawing", "plot"]
 CHECK = "rig.check.figure:draw_recorded_check"
 
 
-def plot(source: Path, figure: Path, *, lateness: bool = False) -> None:
+def plot(
+    source: Path | Sequence[Path],
+    figure: Path,
+    *,
+    lateness: bool = False,
+    labels: Sequence[str] = (),
+    view: View | None = None,
+) -> None:
     """Draw the contents of ``source`` into ``figure`` (png, pdf or svg, by its suffix).
 
-    With ``lateness``, draw the timing of the recording's control loop instead. Raises `RecordingError` if the file cannot be
-    read or the figure cannot be written.
+    With ``lateness``, draw the timing of the recording's control loop instead. Of several files, or with ``labels`` or a
+    ``view``, draw the curves alone, over one another (`rig.figures.overlay.overlay`). Raises `RecordingError` if a file cannot
+    be read or the figure cannot be written.
     """
+    sources = [source] if isinstance(source, Path) else list(source)
     if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
     if figure.is_dir():
         raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
-    if figure.exists() and source.exists() and figure.samefile(source):
+    if figure.exists() and any(one.exists() and figure.samefile(one) for one in sources):
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
-    size_in, draw = drawing(source, lateness=lateness)
+    curves = len(sources) > 1 or bool(labels) or view is not None
+    if lateness and curves:
+        raise RecordingError("`lateness`: is drawn of one recording, without labels and axes of one's own")
+    size_in, draw = overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness)
     with page_for(figure, size_in) as page:
         draw(page)
 
@@ -47,7 +64,8 @@ def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float
     kind = kind_of(source)
     if kind in KINDS and not lateness:
         return KINDS[kind].figure_in, lambda page: _draw_model(page, source, kind)
-    return (9.0, 6.4), lambda page: _draw_recording(page, source, lateness=lateness)
+    size_in = CAMPAIGNS[kind].figure_in if kind in CAMPAIGNS and not lateness else (9.0, 6.4)
+    return size_in, lambda page: _draw_recording(page, source, lateness=lateness)
 
 
 def _draw_model(page: "Figure", source: Path, kind: str) -> None:
@@ -60,5 +78,11 @@ def _draw_recording(page: "Figure", source: Path, *, lateness: bool) -> None:
     with Recording(source) as recording:
         if lateness:
             draw_lateness(page, recording)
-        else:
+            return
+        try:
             resolve_name(CHECK if is_check(recording) else CAMPAIGNS[recording.kind].draw)(page, recording)
+        except IdentificationError:
+            if any(point.accepted for point in points_of(recording)):
+                raise
+            page.clear()
+            draw_failure(page, recording)

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.drawing.style import MAIN, REJECTED, SECOND, title
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
@@ -20,7 +21,7 @@ PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep
 TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
 """Times that are measured for every block, with their printed names."""
 
-COLOURS = {"wake_up": MAIN, "execution": "#4f8f4f", "response": SECOND}
+COLOURS = {"wake_up": MAIN, "execution": THIRD, "response": SECOND}
 
 
 def draw_lateness(page: "Figure", recording: Recording) -> None:
@@ -32,7 +33,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     loops = [part.end["loop"] for part in recording.parts if part.end is not None and "histograms" in part.end["loop"]]
     if not loops:
         raise RecordingError(f"{recording.path}: its loop did not run by the clock, there is no lateness to draw")
-    counts, beyond = page.subplots(2, 1, sharex=True)
+    counts, beyond = grid(page, 2, sharex=True)[:, 0]
     for key, colour in COLOURS.items():
         edges, blocks = together([loop["histograms"][key] for loop in loops])
         if not edges.size:
@@ -47,7 +48,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     beyond.set(
         xscale="log", yscale="log", xlabel="time, µs (dashed: deadline)", ylabel="share of blocks that took longer"
     )
-    beyond.legend(fontsize=8, loc="lower left")
+    beyond.legend(loc="lower left")
     overruns = sum(loop["overruns"] for loop in loops)
     specimen = recording.configuration["bench"]["specimen"]["name"]
     title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")

@@ -6,17 +6,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, OneWay
-from rig.campaigns.evaluation.figure import draw_history, heading
+from rig.campaigns.evaluation.figure import draw_history, heading, why_none
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, say_why_empty
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, log_axis, say_why_empty
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_differences", "draw_ways"]
+__all__ = ["draw", "draw_detuning", "draw_differences", "draw_ways"]
 
 Measured = Point[ContinuousBackboneResult]
 
@@ -58,18 +59,50 @@ class _Way(NamedTuple):
     of: Callable[[ContinuousBackboneResult], OneWay | None]
 
 
-_WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", "#4f9d69", "v", lambda found: found.down))
+_WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", THIRD, "v", lambda found: found.down))
 
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw the results of both ways, their differences from the mean, and the history of the control loop."""
-    page.set_size_inches(9.0, 9.6)
-    axes = page.subplots(3, 2)
+    """Draw the results of both ways, their differences from the mean, the loop over time, and how far off resonance it was.
+
+    The phase error of the loop is not drawn: while the level is ramped, the lag swings by more than 180 deg and says nothing of
+    a point. What counts is the detuning.
+    """
+    axes = grid(page, 3, 2)
     points = points_of(recording, ContinuousBackboneResult)
     draw_ways(axes[0], points)
     draw_differences(axes[1], points)
-    draw_history(axes[2, 0], axes[2, 1], recording)
+    draw_history(axes[2, 0], None, recording)
+    draw_detuning(axes[2, 1], points, float(recording.configuration["plan"]["accepted_detuning"]))
     heading(page, recording)
+
+
+def draw_detuning(axis: "Axes", points: Sequence[Measured], accepted: float) -> None:
+    """Draw how far the frequency was off resonance, at most, while a level was passed, in per cent of the frequency.
+
+    The stored lag is that of a settled vibration at this detuning, ``tan(lag) = detuning / damping ratio``. The limit
+    ``accepted`` (relative) is drawn where it is near.
+    """
+    for some, scale_m, _ in _repeats(axis, points, "largest detuning, %"):
+        values = np.array([_detuning(point) for point in some])
+        for accepted_ones, style in (
+            (True, {"marker": "o", "color": MAIN}),
+            (False, {"marker": "x", "color": REJECTED}),
+        ):
+            shown = [point for point in some if point.accepted == accepted_ones]
+            _line(axis, shown, scale_m, 100.0 * values[[point in shown for point in some]], None, ls="", **style)
+        if np.nanmax(np.abs(values), initial=0.0) > 0.5 * accepted:
+            for limit in (-accepted, accepted):
+                axis.axhline(100.0 * limit, color=REJECTED, lw=0.8, ls="--")
+        axis.axhline(0.0, color=REJECTED, lw=0.8)
+
+
+def _detuning(point: Measured) -> float:
+    """Return the largest relative detuning of a point; NaN if it has none."""
+    if point.lock is None or point.modal is None:
+        return np.nan
+    lag, damping = point.lock.phase_error_deg, point.modal.damping_ratio
+    return np.nan if lag is None or damping is None else float(np.tan(np.radians(lag)) * damping)
 
 
 def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
@@ -88,6 +121,7 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
                     [quantity.scale * quantity.way(found) for _, found in there],
                     f"way {way.name}" if said else None,
                     marker=way.marker,
+                    mfc="none",
                     ls=":",
                     color=way.colour,
                 )
@@ -99,13 +133,13 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
             values = _values(out, quantity.mean, quantity.scale)
             _line(axis, out, scale_m, values, "not accepted" if said else None, marker="x", ls="", color=REJECTED)
     if axes[1].get_legend_handles_labels()[0]:
-        axes[1].legend(fontsize=8)
+        axes[1].legend()
 
 
 def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
     """Draw the differences of both ways from their mean, in per cent of the mean, with the 95 % band of the mean."""
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
-        for some, scale_m, _said in _repeats(axis, points, f"from the mean {quantity.label.split(',')[0]}, %"):
+        for some, scale_m, _said in _repeats(axis, points, f"{quantity.label.split(',')[0]}, way minus mean, %"):
             both = [point for point in some if all(way.of(result_of(point)) is not None for way in _WAYS)]
             mean, std = _values(both, quantity.mean), _values(both, quantity.std)
             _band(axis, both, scale_m, np.zeros(len(both)), 100.0 * std / np.abs(mean))
@@ -124,13 +158,14 @@ def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[t
     """Yield for each repeat: measured points by rising amplitude, the amplitude scale, and whether it is the first repeat."""
     measured = [point for point in points if point.vibration is not None]
     if not measured:
-        say_why_empty(axis, "no level was passed")
+        say_why_empty(axis, why_none(points))
         return
     unit = engineering(np.array([vibration_of(point).amplitude_m for point in measured]))[1]
-    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel=label, xscale="log")
+    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel=label)
     for number, repeat in enumerate(dict.fromkeys(point.repeat for point in measured)):
         some = sorted((p for p in measured if p.repeat == repeat), key=lambda point: vibration_of(point).amplitude_m)
         yield some, 1e6 if unit == "µm" else 1e3, number == 0
+    log_axis(axis, "x")
 
 
 def _band(axis: "Axes", points: Sequence[Measured], scale_m: float, mean: Any, std: Any) -> None:
@@ -143,4 +178,4 @@ def _line(
 ) -> None:
     if points:
         x = [scale_m * vibration_of(point).amplitude_m for point in points]
-        axis.plot(x, values, ms=3.5, label=label, **{"lw": 1.0, **style})
+        axis.plot(x, values, label=label, **style)

@@ -308,6 +308,7 @@ CONTINUOUS_BACKBONE = Campaign(
     in_one_go=True,
     columns=CONTINUOUS_BACKBONE_COLUMNS,
     draw="rig.campaigns.continuous_backbone.figure:draw",
+    figure_in=(9.0, 9.6),
     identity=("controller.phase_lag_deg",),
     fixed=("harmonics",),
     measurements={Backbone: recorded_mean_backbone, ContinuousBackbone: recorded_continuous_backbones},

@@ -7,7 +7,8 @@ import numpy as np
 from rig.campaigns.dwell.points import DwellResult, recorded_course
 from rig.campaigns.evaluation.figure import heading
 from rig.campaigns.evaluation.recorded import points_of
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, widen
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -16,13 +17,15 @@ if TYPE_CHECKING:
 
 __all__ = ["draw"]
 
+LEAST_SPAN = 1e-3
+"""Smallest part of a value that its axis spans: less would show the scatter of the means as if it were a change."""
 NEAR = 0.2  # part of a limit from which on the limit is drawn: a distant limit would flatten the curve
 
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw the accepted means over the cycles. Limits are dashed; means that were not accepted are marked at the bottom."""
     course, plan = recorded_course(recording), recording.configuration["plan"]
-    axes: Any = page.subplots(2, 2, sharex=True)
+    axes = grid(page, 2, 2)
     held = "levels_m" if plan.get("levels_m") else ""
     amplitude, unit = engineering(course.amplitude_m)
     panels = (
@@ -34,15 +37,16 @@ def draw(page: "Figure", recording: Recording) -> None:
     results = [point.result for point in points_of(recording, DwellResult) if not point.accepted]
     left_out = [result.cycles for result in results if result is not None and result.cycles is not None]
     for axis, values, label, watched in panels:
-        axis.plot(course.cycles, values, "o-", ms=2.5, lw=0.9, color=MAIN)
-        axis.set_ylabel(label)
+        axis.plot(course.cycles, values, "o-", color=MAIN)
+        axis.set(xlabel="cycles", ylabel=label)
         _limits(axis, values, plan, watched)
         if left_out:
-            axis.plot(left_out, np.full(len(left_out), np.nanmin(values)), "x", ms=4, color=REJECTED)
-    for axis in axes[1]:
-        axis.set_xlabel("cycles")
-    if axes[0, 0].get_legend_handles_labels()[0]:
-        axes[0, 0].legend(fontsize=8)
+            at_bottom = {"transform": axis.get_xaxis_transform(), "clip_on": False}
+            axis.plot(left_out, np.full(len(left_out), 0.02), "x", color=REJECTED, label="not accepted", **at_bottom)
+        if np.isfinite(values).any():
+            widen(axis, LEAST_SPAN)
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend()
     heading(page, recording)
 
 

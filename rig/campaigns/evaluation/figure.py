@@ -1,13 +1,17 @@
 """Parts shared by the figures of several kinds of campaigns: the history of the control loop, and a heading."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
-from rig.drawing.style import MAIN, SECOND, TRACE_BINS, title
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, rc, say_why_empty, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 
@@ -15,17 +19,36 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["describe", "draw_history", "heading"]
+__all__ = ["describe", "draw_failure", "draw_history", "heading", "refused", "why_none"]
 
 AT_ONCE = 2**20  # rows that are read at a time
+_THIN = 0.7  # of the usual width: lines over time
 
 
 def describe(recording: Recording, test: str) -> str:
-    """Return specimen, kind of test, number of points and number of points not accepted, as one line."""
+    """Return specimen, kind of test, number of points, and which points were not accepted, as one line."""
     points = points_of(recording)
-    left_out = sum(not point.accepted for point in points)
     text = f"{specimen_of(recording)}: {test}, {len(points)} point{'' if len(points) == 1 else 's'}"
-    return text + (f", {left_out} not accepted" if left_out else "")
+    left_out = refused(points)
+    return text + (f", {left_out}" if left_out else "")
+
+
+def refused(points: Sequence[Point[Any]]) -> str:
+    """Return how many points were not accepted, with their qualities, such as ``3 not accepted (2 lost-lock, 1 rejected)``."""
+    left_out = Counter(str(point.quality) for point in points if not point.accepted)
+    if not left_out:
+        return ""
+    if len(left_out) == 1:
+        return f"{left_out.total()} not accepted ({next(iter(left_out))})"
+    return f"{left_out.total()} not accepted ({', '.join(f'{count} {name}' for name, count in left_out.items())})"
+
+
+def why_none(points: Sequence[Point[Any]]) -> str:
+    """Return why no point can be drawn: the reason of the first one that was not accepted."""
+    if not points:
+        return "no point was measured"
+    first = next((point for point in points if not point.accepted), None)
+    return "no point to draw" if first is None else f"no point was accepted; the first: {first.reason or first.quality}"
 
 
 def heading(page: "Figure", recording: Recording) -> None:
@@ -33,8 +56,20 @@ def heading(page: "Figure", recording: Recording) -> None:
     title(page, describe(recording, f"{recording.kind} test"))
 
 
-def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None:
-    """Draw the loop over time: oscillator frequency with output amplitude, and phase error; mean and range of each bin."""
+def draw_failure(page: "Figure", recording: Recording) -> None:
+    """Draw what there is of a recording without an accepted point: why there is none, and the history of the loop."""
+    axes = grid(page, 1, 2)[0]
+    draw_history(axes[0], axes[1], recording)
+    heading(page, recording)
+    page.text(0.01, 0.0, f"Nothing else to draw: {why_none(points_of(recording))}", va="bottom", wrap=True)
+
+
+def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) -> None:
+    """Draw the loop over time: oscillator frequency with output amplitude, and phase error; mean and range of each bin.
+
+    The ramp-down that ends a part is shaded. The phase is not controlled there, so its error is not drawn. ``error`` None: no
+    phase error.
+    """
     rate = float(recording.configuration["bench"]["sample_rate_hz"])
     level = frequency.twinx()
     width = max(1, recording.n_rows // TRACE_BINS)
@@ -44,19 +79,45 @@ def draw_history(frequency: "Axes", error: "Axes", recording: Recording) -> None
             continue
         stored = StoredSamples(part)
         seconds = (start + stored.samples(width * (np.arange(part.n_rows // width) + 0.5))) / rate
+        running = _binned(part, "segment", width).least >= 0.0
         _band(frequency, seconds, _binned(part, "frequency_hz", width))
-        level.plot(seconds, _binned(part, "command_v", width).mean, color=SECOND, lw=0.9)
-        _band(error, seconds, _binned(part, "phase_error_rad", width), label="detector" if start == 0 else None)
-        largest = max(largest, _usual_error_deg(part), _mark_points(error, part, start, rate))
+        level.plot(seconds, _binned(part, "command_v", width).mean, color=SECOND, lw=_THIN * rc("lines.linewidth"))
+        _shade_ramp(frequency, seconds, running)
+        if error is not None:
+            errors = _binned(part, "phase_error_rad", width)
+            _band(error, seconds, _Bins(*(np.where(running, one, np.nan) for one in errors)), label="detector")
+            largest = max(largest, _usual_error_deg(part), _mark_points(error, part, start, rate))
+            _shade_ramp(error, seconds, running)
         start += int(stored.samples(np.array([part.n_rows]))[0])
     frequency.set(xlabel="time, s", ylabel="oscillator frequency, Hz")
     frequency.yaxis.label.set_color(MAIN)
     level.set_ylabel("output amplitude, V", color=SECOND)
     level.grid(False)
     level.spines["right"].set_visible(True)
+    if not recording.n_rows:
+        say_why_empty(frequency, "nothing was recorded")
+        level.set(yticks=[])
+    if error is not None:
+        _label_error(error, largest)
+
+
+def _label_error(error: "Axes", largest: float) -> None:
     error.set(xlabel="time, s", ylabel="phase error, deg", ylim=(-1.3 * largest, 1.3 * largest))
-    if error.get_legend_handles_labels()[0]:
-        error.legend(fontsize=8, loc="upper right")
+    handles, labels = error.get_legend_handles_labels()
+    if handles:
+        named = dict(zip(labels, handles, strict=True))
+        error.legend(
+            named.values(), named.keys(), loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2
+        )
+    else:
+        say_why_empty(error, "nothing was recorded")
+
+
+def _shade_ramp(axis: "Axes", seconds: np.ndarray, running: np.ndarray) -> None:
+    """Shade the end of a part from where the plan no longer runs."""
+    if running.size and not running[-1]:
+        begin = int(np.flatnonzero(running)[-1]) if running.any() else 0
+        axis.axvspan(seconds[begin], seconds[-1], color=REJECTED, alpha=0.25, lw=0, label="ramp-down")
 
 
 def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
@@ -71,7 +132,7 @@ def _mark_points(axis: "Axes", part: Part, start: int, rate: float) -> float:
     middles = StoredSamples(part).samples(np.array([middle for middle, _ in marks]))
     seconds = (start + middles) / rate
     degrees = np.array([degrees for _, degrees in marks], float)
-    axis.plot(seconds, degrees, "D", ms=4, color=SECOND, label="recorded fundamental" if start == 0 else None)
+    axis.plot(seconds, degrees, "D", color=SECOND, label="recorded points", zorder=3)
     return float(np.max(np.abs(degrees)))
 
 
@@ -117,4 +178,4 @@ def _usual_error_deg(part: Part) -> float:
 def _band(axis: "Axes", seconds: np.ndarray, bins: _Bins, label: str | None = None) -> None:
     """Draw the mean of each bin as a line and its range as a band; plain decimation would alias the detector's ripple."""
     axis.fill_between(seconds, bins.least, bins.most, color=MAIN, alpha=0.25, lw=0)
-    axis.plot(seconds, bins.mean, color=MAIN, lw=0.8, label=label)
+    axis.plot(seconds, bins.mean, color=MAIN, lw=_THIN * rc("lines.linewidth"), label=label)

@@ -12,7 +12,7 @@ from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
 
-__all__ = ["frequency_responses_of", "recorded_frequency_responses"]
+__all__ = ["frequency_responses_of", "passes_of", "recorded_frequency_responses"]
 
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
 """The controlled quantity, by the unit of the levels."""
@@ -33,14 +33,9 @@ def frequency_responses_of(
     """
     roles = [channel["role"] for channel in channels]
     force, drive = roles.index("force"), roles.index("drive")
-    passes: dict[tuple[float, str, int, str], list[Point[Any]]] = {}
-    for point in of_the_result(points):
-        if point.accepted:
-            passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)
-    if not passes:
-        raise IdentificationError("points: none of the recording was accepted")
     out = []
-    for (level, direction, repeat, unit), accepted in passes.items():
+    for label, accepted in passes_of(points):
+        level, unit = accepted[0].level, accepted[0].level_unit
         frequency_hz = np.array([vibration_of(point).frequency_hz for point in accepted])
         fundamentals = np.array([spectrum_of(point).harmonics[:, 1] for point in accepted])
         to_displacement = -1.0 / (2.0 * np.pi * frequency_hz) ** 2
@@ -54,11 +49,28 @@ def frequency_responses_of(
                 kind="displacement" if unit == "m" else "acceleration",
                 controlled=CONTROLLED[unit],
                 level=level,
-                label=_label(level, unit, direction, repeat, [one for one in passes if one[0] == level]),
+                label=label,
                 specimen=specimen,
             )
         )
     return tuple(out)
+
+
+def passes_of(points: Iterable[Point[Any]]) -> list[tuple[str, list[Point[Any]]]]:
+    """Return the name and the accepted points of each level and pass, in the order of measurement.
+
+    Raises `IdentificationError` if no point was accepted.
+    """
+    passes: dict[tuple[float, str, int, str], list[Point[Any]]] = {}
+    for point in of_the_result(points):
+        if point.accepted:
+            passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)
+    if not passes:
+        raise IdentificationError("points: none of the recording was accepted")
+    return [
+        (_label(level, unit, direction, repeat, [one for one in passes if one[0] == level]), accepted)
+        for (level, direction, repeat, unit), accepted in passes.items()
+    ]
 
 
 def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[Any, ...]]) -> str:

@@ -1,13 +1,15 @@
 """Figure of a multisine test: amplitude spectra with their noise, and the frequency response."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification import InstrumentResponse, PeriodicSpectra
-from rig.campaigns.evaluation.recorded import specimen_of
+from identification import IdentificationError, InstrumentResponse, PeriodicSpectra, coherence
+from rig.campaigns.evaluation.figure import refused
+from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.multisine.points import recorded_spectra
-from rig.drawing.style import MAIN, REJECTED, SECOND, unit_text
+from rig.drawing.page import grid, legend_below
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, rc, say_why_empty, unit_text
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
@@ -17,16 +19,20 @@ if TYPE_CHECKING:
 
 __all__ = ["draw", "draw_multisine"]
 
-_ODD = "#4f9d69"
+_DOT = 0.7
+"""Size of the dots of a spectrum, over the usual size of markers."""
 
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw the highest level of a recording."""
-    level, at_level = max(recorded_spectra(recording).items())
-    realisations = at_level.spectra.shape[0]
-    draw_multisine(
-        page, at_level, title=f"{specimen_of(recording)}: multisine, {level:g} V RMS, {realisations} realisations"
-    )
+    spectra = recorded_spectra(recording)
+    level, at_level = max(spectra.items())
+    realisations, periods = at_level.spectra.shape[:2]
+    others = f", the highest of {len(spectra)} levels" if len(spectra) > 1 else ""
+    left_out = refused(points_of(recording))
+    mean = f"mean of {_counted(realisations, 'realisation')} of {_counted(periods, 'period')}"
+    text = f"{specimen_of(recording)}: multisine, {level:g} V RMS{others}, {mean}"
+    draw_multisine(page, at_level, title=text + (f", {left_out}" if left_out else ""))
 
 
 def draw_multisine(
@@ -37,64 +43,73 @@ def draw_multisine(
     response: str = "drive",
     title: str = "",
 ) -> None:
-    """Draw amplitude spectra of voltage, force and response, and the frequency response, all with their noise levels.
+    """Draw amplitude spectra of voltage, force and response, and the frequency response with its noise and coherence.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Lines that are not excited have separate marks for odd and even. What
     exceeds the noise on them is odd or even nonlinear distortion of the rig, including the shaker.
     """
     force = next(channel.name for channel in spectra.channels if channel.role == "force")
-    left, right = np.asarray(page.subfigures(1, 2))
-    axes = left.subplots(3, 1, sharex=True)
+    axes = grid(page, 3, 2, down_columns=True)
     names = {voltage: "voltage", force: "force", response: response}
-    for axis, (name, text) in zip(axes, names.items(), strict=True):
+    for axis, (name, text) in zip(axes[:, 0], names.items(), strict=True):
         _spectrum(axis, spectra, name, text)
-    axes[0].set_title(_counts(spectra), fontsize=9, loc="left")
-    handles, labels = axes[1].get_legend_handles_labels()
-    left.legend(handles, labels, fontsize=8, ncols=2, loc="outside lower center")
-    axes[2].set(xlabel="frequency, Hz")
-    _response(right, spectra.frequency_response(response, instrument=voltage), f"{response} over {force}")
+    _response(
+        axes[0, 1], axes[1, 1], spectra.frequency_response(response, instrument=voltage), f"{response} over {force}"
+    )
+    _coherence(axes[2, 1], spectra, response, force)
+    legend_below(page, axes[1, 0], axes[0, 1])
     heading(page, title)
+
+
+def _counted(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def _spectrum(axis: "Axes", spectra: PeriodicSpectra, name: str, text: str) -> None:
     row, excited = spectra.index(name), spectra.excited
     amplitude, noise = spectra.amplitude[row], spectra.noise_std[row]
-    dots = {"ls": "", "ms": 3.0}
-    axis.semilogy(spectra.frequency_hz[excited], amplitude[excited], marker="o", color=MAIN, label="excited", **dots)
+    dots = {"ls": "", "markersize": _DOT * rc("lines.markersize")}
+    axis.semilogy(
+        spectra.frequency_hz[excited], amplitude[excited], marker="o", color=MAIN, label="excited lines", **dots
+    )
     floor = 1e-6 * amplitude[excited].max()  # anything lower is rounding, not noise
     if not excited.all():
-        for name, marker, colour, parity in (("odd", "x", _ODD, ~spectra.even), ("even", "+", SECOND, spectra.even)):
+        for name, marker, colour, parity in (("odd", "x", THIRD, ~spectra.even), ("even", "+", SECOND, spectra.even)):
             rest = ~excited & parity & (amplitude > floor)
-            label = f"{name}, not excited"
+            label = f"{name} lines, not excited"
             if rest.any():
                 axis.semilogy(
                     spectra.frequency_hz[rest], amplitude[rest], marker=marker, color=colour, label=label, **dots
                 )
     if np.any(noise > floor):
-        axis.semilogy(spectra.frequency_hz, noise, color=REJECTED, lw=0.9, label="noise")
-    axis.set(ylabel=f"{text}, {unit_text(spectra.channels[row].unit)}")
+        axis.semilogy(spectra.frequency_hz, noise, color=REJECTED, label="noise")
+    axis.set(xlabel="frequency, Hz", ylabel=f"{text}, {unit_text(spectra.channels[row].unit)}")
     lowest, highest = axis.get_ylim()
     if highest < 10.0 * lowest:  # a flat spectrum stays flat
         axis.set_ylim(lowest / 3.0, 3.0 * highest)
+    axis.yaxis.set_minor_formatter("")
 
 
-def _response(page: Any, measured: InstrumentResponse, text: str) -> None:
-    size, phase = page.subplots(2, 1, sharex=True)
+def _response(size: "Axes", phase: "Axes", measured: InstrumentResponse, text: str) -> None:
     frequency = measured.frequency_hz
-    size.semilogy(frequency, np.abs(measured.value), ".-", ms=3, color=MAIN, label=text)
+    size.semilogy(frequency, np.abs(measured.value), ".-", color=MAIN, label=text)
     if np.any(measured.noise_std > 0.0):
-        size.semilogy(frequency, measured.noise_std, color=REJECTED, lw=0.9, label="noise")
+        size.semilogy(frequency, measured.noise_std, color=REJECTED, label="noise")
     if np.isfinite(measured.total_std).any():
         label = "noise and distortion"
-        size.semilogy(frequency, measured.total_std, color=SECOND, lw=0.9, label=label)
-    unit = {"m/s2/N": "1/kg", "m/s^2/N": "1/kg"}.get(measured.unit, measured.unit)
-    size.set(ylabel=f"frequency response, {unit}")
-    page.legend(fontsize=8, ncols=3, loc="outside lower center")
+        size.semilogy(frequency, measured.total_std, color=SECOND, label=label)
+    size.set(xlabel="frequency, Hz", ylabel=f"{text}, {unit_text(measured.unit)}")
     degrees = (np.degrees(np.angle(measured.value)) + 90.0) % 360.0 - 90.0  # the curve has no jump at 0 or 180 deg
-    phase.plot(frequency, degrees, ".-", ms=3, color=MAIN)
+    phase.plot(frequency, degrees, ".-", color=MAIN)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-100.0, 280.0), yticks=(-90, 0, 90, 180, 270))
 
 
-def _counts(spectra: PeriodicSpectra) -> str:
-    realisations, periods = spectra.spectra.shape[:2]
-    return f"amplitude, mean of {realisations} × {periods} periods"
+def _coherence(axis: "Axes", spectra: PeriodicSpectra, response: str, force: str) -> None:
+    """Draw the coherence of response and force over all periods of all realisations: noise and distortion lower it."""
+    axis.set(xlabel="frequency, Hz", ylabel=f"coherence, {response}–{force}", ylim=(0.0, 1.05))
+    try:
+        found = coherence(spectra, response, force)
+    except IdentificationError:
+        say_why_empty(axis, "coherence needs more than one period")
+        return
+    axis.plot(spectra.frequency_hz[spectra.excited], found, ".-", color=MAIN)

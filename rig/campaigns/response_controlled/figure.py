@@ -16,7 +16,6 @@ __all__ = ["draw"]
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw all levels, and the force surface through them if there are enough levels."""
-    page.set_size_inches(11.0, 7.0)
     responses = recorded_frequency_responses(recording)
     try:
         surface: ForceSurface | None = force_surface(responses)

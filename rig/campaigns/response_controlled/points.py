@@ -67,6 +67,7 @@ RESPONSE_CONTROLLED = Campaign(
     measure=measure_response_controlled_point,
     columns=RESPONSE_CONTROLLED_COLUMNS,
     draw="rig.campaigns.response_controlled.figure:draw",
+    figure_in=(11.0, 7.0),
     measurements={FrequencyResponse: recorded_frequency_responses},
     exchanged=lambda recording: [recorded_frequency_responses(recording)],
     experiments="segments",

@@ -10,7 +10,9 @@ from identification import FrequencyResponse
 from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.recorded import points_of
-from rig.drawing.style import REJECTED
+from rig.drawing.folding import folds_back
+from rig.drawing.page import NARROW_IN, grid, legend_below
+from rig.drawing.style import REJECTED, from_zero, rc, shade
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw", "draw_stepped_phase"]
 
+_THIN = 0.7
 NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant
 
 
@@ -45,34 +48,49 @@ def draw_stepped_phase(
     """Draw displacement amplitude, lag of the displacement, and force over frequency.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so the line runs back
-    where the response folds over. The line is interrupted where a requested lag (``lags_deg``) was not measured. The point
-    nearest to phase resonance is filled. If the force was controlled, its level is a dashed line. If another quantity was
-    ``held``, its name is the title of the legend.
+    where the response folds over; there it is dotted (`rig.drawing.folding.folds_back`). The line is interrupted where a
+    requested lag (``lags_deg``) was not measured. The point nearest to phase resonance is filled. If the force was controlled,
+    its level is a dashed line. If another quantity was ``held``, the title names it.
     """
-    from matplotlib import colormaps
-
-    axes = page.subplot_mosaic([["amplitude", "lag"], ["amplitude", "force"]], width_ratios=(1.5, 1.0))
-    amplitude, lag, force = axes["amplitude"], axes["lag"], axes["force"]
+    amplitude, lag, force = _panels(page)
     micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
+    scale = 1e6 if micro else 1e3
     for number, item in enumerate(responses):
-        colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.85)
+        colour, gaps = shade(number, len(responses)), _gaps(item, lags_deg)
         label = item.label or f"{item.level:g} {item.level_unit}"
-        gaps = _gaps(item, lags_deg)
-        _branch(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), colour, gaps, label)
+        _branch(amplitude, item, item.amplitude_m * scale, colour, gaps, label)
         _branch(lag, item, item.phase_lag_deg, colour, gaps)
         _branch(force, item, item.force_n, colour, gaps)
         if item.controlled == "force":
-            force.axhline(item.level, color=colour, lw=0.9, ls="--")
-    amplitude.set(xlabel="frequency, Hz", ylabel=f"displacement amplitude, {'µm' if micro else 'mm'}")
-    amplitude.set_ylim(bottom=0.0)
-    amplitude.legend(fontsize=8, title=held or None, title_fontsize=8)
-    lag.set(ylabel="lag of displacement, deg")
-    lag.axhline(90.0, color=REJECTED, lw=0.8)
-    lag.sharex(amplitude)
-    force.set(xlabel="frequency, Hz", ylabel="fundamental force, N")
-    force.set_ylim(bottom=0.0)
-    force.sharex(amplitude)
-    heading(page, title)
+            force.axhline(item.level, color=colour, lw=_THIN * rc("lines.linewidth"), ls="--")
+    if any(folds_back(item.frequency_hz, item.phase_lag_deg).any() for item in responses):
+        amplitude.plot(
+            [], [], "o:", mfc="white", color=REJECTED, label="folds back: unstable at this force without the loop"
+        )
+    if any(_resonant(item) is not None for item in responses):
+        amplitude.plot([], [], "o", color=REJECTED, label="nearest to phase resonance")
+    for axis, text in (
+        (amplitude, f"displacement amplitude, {'µm' if micro else 'mm'}"),
+        (force, "fundamental force, N"),
+    ):
+        axis.set(xlabel="frequency, Hz", ylabel=text)
+    from_zero(amplitude, *(item.amplitude_m * scale for item in responses))
+    from_zero(force, *(item.force_n for item in responses))
+    lag.set(xlabel="frequency, Hz", ylabel="lag of displacement, deg")
+    lag.axhline(90.0, color=REJECTED, lw=0.8, zorder=1)
+    for axis in (lag, force):
+        axis.set_xlim(amplitude.get_xlim())
+    legend_below(page, amplitude)
+    heading(page, title + (f" (levels: {held})" if held else ""))
+
+
+def _panels(page: "Figure") -> tuple["Axes", "Axes", "Axes"]:
+    """Give a large panel beside two small ones, or three below one another on a narrow page."""
+    if page.get_figwidth() < NARROW_IN:
+        amplitude, lag, force = grid(page, 3, height_ratios=(1.5, 1.0, 1.0))[:, 0]
+        return amplitude, lag, force
+    axes = page.subplot_mosaic([["amplitude", "lag"], ["amplitude", "force"]], width_ratios=(1.5, 1.0))
+    return axes["amplitude"], axes["lag"], axes["force"]
 
 
 def _gaps(item: FrequencyResponse, lags_deg: Sequence[float]) -> NDArray[np.intp]:
@@ -92,9 +110,26 @@ def _branch(
     gaps: NDArray[np.intp],
     label: str | None = None,
 ) -> None:
-    """Draw one level in the order of measurement, with its resonant point filled."""
-    x, y = np.insert(item.frequency_hz, gaps, np.nan), np.insert(values, gaps, np.nan)
-    axis.plot(x, y, "o-", ms=4, mfc="white", color=colour, label=label)
-    resonant = int(np.argmin(np.abs(item.phase_lag_deg - 90.0)))
-    if abs(item.phase_lag_deg[resonant] - 90.0) <= NEAR_DEG:
-        axis.plot(item.frequency_hz[resonant], values[resonant], "o", ms=5, color=colour)
+    """Draw one level in the order of measurement: dotted where it folds back, with its resonant point filled."""
+    folded = folds_back(item.frequency_hz, item.phase_lag_deg)
+    joined = np.ones(folded.size, bool)
+    joined[gaps - 1] = False
+    for line, which in (("-", joined & ~folded), (":", joined & folded)):
+        ends = np.flatnonzero(which)
+        x, y = (
+            np.stack([one[ends], one[ends + 1], np.full(ends.size, np.nan)], axis=1)
+            for one in (item.frequency_hz, values)
+        )
+        axis.plot(x.ravel(), y.ravel(), line, color=colour)
+    axis.plot(item.frequency_hz, values, "o", mfc="white", color=colour)
+    if label is not None:
+        axis.plot([], [], "o-", mfc="white", color=colour, label=label)
+    resonant = _resonant(item)
+    if resonant is not None:
+        axis.plot(item.frequency_hz[resonant], values[resonant], "o", color=colour)
+
+
+def _resonant(item: FrequencyResponse) -> int | None:
+    """Return the point nearest to phase resonance; None if none is near."""
+    nearest = int(np.argmin(np.abs(item.phase_lag_deg - 90.0)))
+    return nearest if abs(item.phase_lag_deg[nearest] - 90.0) <= NEAR_DEG else None

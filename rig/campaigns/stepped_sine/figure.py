@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import FrequencyResponse
+from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
-from rig.campaigns.evaluation.recorded import specimen_of
-from rig.drawing.style import REJECTED
+from rig.drawing.page import grid, legend_below
+from rig.drawing.style import REJECTED, log_axis, shade
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
@@ -27,7 +28,7 @@ _JUMP = 1.5  # times the amplitude of the previous point
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw every level of a recording."""
     responses = recorded_frequency_responses(recording)
-    draw_stepped_sine(page, responses, title=f"{specimen_of(recording)}: stepped sine, {len(responses)} levels")
+    draw_stepped_sine(page, responses, title=describe(recording, "stepped sine"))
 
 
 def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *, title: str = "") -> None:
@@ -36,13 +37,11 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
     ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so that jumps and the
     direction of a sweep stay visible.
     """
-    from matplotlib import colormaps
-
-    (force, amplitude), (lag, accelerance) = page.subplots(2, 2, sharex=True)
+    (force, amplitude), (lag, accelerance) = grid(page, 2, 2)
     micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
     for number, item in enumerate(responses):
-        colour = colormaps["viridis"](number / max(1, len(responses) - 1) * 0.9)
-        style: dict[str, Any] = {"marker": ".", "ms": 4, "color": colour}
+        colour = shade(number, len(responses))
+        style: dict[str, Any] = {"marker": ".", "color": colour}
         label = item.label or f"{item.level:g} {item.level_unit}"
         acceleration = item.amplitude_m * (2.0 * np.pi * item.frequency_hz) ** 2
         _stepped(force, item, item.force_n, label=label, **style)
@@ -50,13 +49,17 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
         _stepped(lag, item, item.phase_lag_deg, **style)
         _stepped(accelerance, item, acceleration / item.force_n, **style)
     for axis in (force, amplitude, accelerance):
-        axis.set(yscale="log")
-    force.set(ylabel="force, N")
+        log_axis(axis)
+    for axis in (force, amplitude, lag, accelerance):
+        axis.set(xlabel="frequency, Hz")
+    force.set(ylabel="fundamental force, N")
     amplitude.set(ylabel=f"displacement amplitude, {'µm' if micro else 'mm'}")
-    lag.set(ylabel="phase lag of displacement, deg", xlabel="frequency, Hz")
-    lag.axhline(90.0, color=REJECTED, lw=0.8)
-    accelerance.set(ylabel="accelerance, 1/kg", xlabel="frequency, Hz")
-    page.legend(fontsize=8, loc="outside right upper")
+    lag.set(ylabel="phase lag of displacement, deg")
+    lag.axhline(90.0, color=REJECTED, lw=0.8, zorder=1)
+    accelerance.set(ylabel="accelerance, (m/s²)/N")
+    if any(line.get_linestyle() == ":" for line in amplitude.get_lines()):
+        amplitude.plot([], [], ":", color=REJECTED, label="jump")
+    legend_below(page, force, amplitude)
     heading(page, title)
 
 
@@ -67,4 +70,4 @@ def _stepped(axis: "Axes", measured: FrequencyResponse, values: Float, **style: 
     gaps = np.full(jumps.size, np.nan)
     axis.plot(np.insert(frequency_hz, jumps, gaps), np.insert(values, jumps, gaps), **style)
     for k in jumps:
-        axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", lw=0.8, color=style["color"])
+        axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", color=style["color"])

@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import ForceDropOut, Transient, force_drop_out, zero_crossings
+from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.point import result_of
-from rig.campaigns.evaluation.recorded import point_rows, specimen_of
+from rig.campaigns.evaluation.recorded import point_rows, points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
+from rig.drawing.page import NARROW_IN, grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
@@ -23,22 +25,28 @@ __all__ = ["draw", "draw_sweep"]
 
 Float = NDArray[np.float64]
 
+_TELLS = 0.98
+"""Share of the zero crossings that must lie on the frequency axis for them to be drawn."""
+
 
 def draw(page: "Figure", recording: Recording) -> None:
-    """Draw the last sweep of a recording. Rows of other sweeps are not drawn."""
-    number, sweep = list(recorded_sweeps(recording).items())[-1]
+    """Draw the last accepted sweep of a recording. A drop-out of the force is marked unless a loop held the force."""
+    sweeps = recorded_sweeps(recording)
+    number, sweep = list(sweeps.items())[-1]
     rows, point = point_rows(recording, number), point_from(recording.latest[number], SweepResult)
-    held = result_of(point).held
-    text = "uncontrolled"
+    held, left_out = result_of(point).held, refused(points_of(recording))
+    text = f"sweep {point.direction} at {point.level:g} {point.level_unit}"
+    text += f", the last of {len(sweeps)} accepted" if len(sweeps) > 1 else ""
     if held is not None:
-        text = f"held within {100.0 * held.held_least:.1f} to {100.0 * held.held_most:.1f} %"
+        text += f", fundamental force {100.0 * held.held_least:.1f} to {100.0 * held.held_most:.1f} % of the level"
+    off_resonance_hz = recording.configuration["plan"].get("off_resonance_hz")
     draw_sweep(
         page,
         sweep,
         np.vstack([rows["inputs"].T, rows["output_v"]]),
         float(recording.configuration["bench"]["sample_rate_hz"]),
-        drop_out=force_drop_out(sweep, off_resonance_hz=recording.configuration["plan"].get("off_resonance_hz")),
-        title=f"{specimen_of(recording)}: sweep at {point.level:g} {point.level_unit}, {text}",
+        drop_out=None if held is not None else force_drop_out(sweep, off_resonance_hz=off_resonance_hz),
+        title=f"{specimen_of(recording)}: {text}" + (f", {left_out}" if left_out else ""),
     )
 
 
@@ -72,7 +80,7 @@ def draw_sweep(
         Heading.
     """
     force = next(channel.name for channel in sweep.channels if channel.role == "force")
-    axes = page.subplots(4, 1, sharex=True, height_ratios=(1.0, 1.5, 1.5, 1.2))
+    axes = grid(page, 4, sharex=True, height_ratios=(1.0, 1.5, 1.5, 1.2))[:, 0]
     names = {VOLTAGE.name: "voltage", force: "force", response: f"response ({response})"}
     longest = int(np.ceil(sample_rate_hz / sweep.frequency_hz.min()))
     for axis, (name, text) in zip(axes, names.items(), strict=False):
@@ -85,8 +93,9 @@ def draw_sweep(
     _momentary_frequency(axes[3], sweep, np.asarray(samples[sweep.index(force)]), sample_rate_hz)
     if drop_out is not None:
         _mark_drop_out(axes[1], axes[2], drop_out)
+    above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "borderaxespad": 0.0, "columnspacing": 1.0}
     for axis in axes[1:]:
-        axis.legend(fontsize=8, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 0.98), borderaxespad=0.0)
+        axis.legend(ncols=4 if page.get_figwidth() > NARROW_IN else 2, handlelength=1.4, **above)
     axes[3].set(xlabel="time, s", xlim=(0.0, samples.shape[1] / sample_rate_hz))
     heading(page, title)
 
@@ -101,14 +110,23 @@ def _signal(axis: "Axes", values: Float, period: int, rate_hz: float) -> None:
 
 
 def _momentary_frequency(axis: "Axes", sweep: Transient, force: NDArray[Any], rate_hz: float) -> None:
+    """Draw the frequency of the voltage, of the force's fundamental, and from the zero crossings of the force.
+
+    Zero crossings are left out where harmonics add some or shift them, so that they do not tell a frequency.
+    """
+    low, high = sweep.frequency_hz.min(), sweep.frequency_hz.max()
+    margin = 0.25 * (high - low)
     halves = zero_crossings(force, sample_rate_hz=rate_hz)
-    axis.plot(halves.time_s, halves.frequency_hz, ".", ms=2.0, color=REJECTED, label="zero crossings of the force")
+    tells = np.mean((halves.frequency_hz > low - margin) & (halves.frequency_hz < high + margin)) > _TELLS
+    if tells:
+        label = "zero crossings of the force"
+        axis.plot(halves.time_s, halves.frequency_hz, ".", ms=2.0, color=REJECTED, label=label)
     axis.plot(sweep.time_s, sweep.frequency_hz, color=MAIN, label="voltage")
     turning = np.unwrap(np.angle(sweep.force))
     own = sweep.frequency_hz + np.gradient(turning, sweep.time_s) / (2.0 * np.pi)
-    axis.plot(sweep.time_s, own, color=SECOND, lw=0.9, label="fundamental of the force")
-    low, high = sweep.frequency_hz.min(), sweep.frequency_hz.max()
-    margin = 0.25 * (high - low)
+    axis.plot(sweep.time_s, own, color=SECOND, ls="--", label="fundamental of the force")
+    if not tells:
+        axis.plot([], [], " ", label="(zero crossings left out: harmonics shift them)")
     axis.set(ylabel="frequency, Hz", ylim=(low - margin, high + margin))
 
 
@@ -127,7 +145,7 @@ def _mark_drop_out(force: "Axes", response: "Axes", drop_out: ForceDropOut) -> N
     )
     for seconds, newtons, ratio, frequency_hz, marker in marks:
         label = f"{100 * ratio:.3g} % of {drop_out.off_resonance_n:.3g} N at {frequency_hz:.4g} Hz"
-        force.plot(seconds, newtons, marker, ms=6, color="black", label=label)
+        force.plot(seconds, newtons, marker, color="black", label=label)
     unit = unit_text(drop_out.peak_unit)
     label = f"{drop_out.peak:.4g} {unit} at {drop_out.peak_frequency_hz:.4g} Hz"
-    response.plot(drop_out.peak_time_s, drop_out.peak, "o", ms=5, color="black", label=label)
+    response.plot(drop_out.peak_time_s, drop_out.peak, "o", color="black", label=label)

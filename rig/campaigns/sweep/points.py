@@ -223,6 +223,7 @@ SWEEP = Campaign(
     measure=measure_sweep,
     columns=SWEEP_COLUMNS,
     draw="rig.campaigns.sweep.figure:draw",
+    figure_in=(9.0, 8.0),
     identity=("start_hz", "stop_hz", "rate_hz_per_s", "rate_octaves_per_min"),
     measurements={Transient: recorded_sweeps},
     exchanged=lambda recording: list(recorded_sweeps(recording).values()),

@@ -1,0 +1,209 @@
+"""Reads the curves of a file: one reader for each family of kinds that have the same axes."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from identification import (
+    Backbone,
+    FrequencyResponse,
+    FrequencyResponseMatrix,
+    IdentificationError,
+    NonlinearMode,
+    nonlinear_mode,
+)
+from rig.campaigns.evaluation.figure import refused
+from rig.campaigns.evaluation.frequency_responses import passes_of
+from rig.campaigns.evaluation.point import spectrum_of, vibration_of
+from rig.campaigns.evaluation.recorded import points_of, specimen_of
+from rig.campaigns.evaluation.vibrations import channels_from
+from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.campaigns.multisine.points import recorded_response_matrices
+from rig.campaigns.sweep.points import recorded_sweeps
+from rig.check.recorded import is_check
+from rig.drawing.folding import folds_back
+from rig.drawing.style import unit_text
+from rig.errors import RecordingError
+from rig.figures.curves import Curves, Line, Panel, Quantity, Trace, View, channel_of, peak
+from rig.models.files.files import KINDS, load
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+
+__all__ = ["FAMILIES", "curves_of", "family_of"]
+
+FREQUENCY = Quantity("frequency", "Hz", "frequency")
+LAG = Quantity("phase lag", "deg")
+FORCE = Quantity("fundamental force", "N", "amplitude")
+DISPLACEMENT = Quantity("displacement amplitude", "m", "amplitude")
+ONE_AMPLITUDE = "the file holds the fundamental of the drive point alone"
+
+
+class _Family(NamedTuple):
+    """Kinds whose files have the same axes."""
+
+    name: str
+    kinds: tuple[str, ...]
+    read: Callable[[Any, View], Curves]
+    """Reads a recording or a model."""
+
+
+def curves_of(path: Path, view: View) -> Curves:
+    """Return the curves of a file.
+
+    Raises `RecordingError` if it cannot be read, has no curves or does not hold what the view asks for, and
+    `IdentificationError` if no point was accepted; each names the file.
+    """
+    family = family_of(path)
+    kind = kind_of(path)
+    try:
+        if kind in KINDS:
+            return family.read(load(path), view)
+        with Recording(path) as recording:
+            return family.read(recording, view)
+    except IdentificationError as error:
+        raise IdentificationError(f"{path}: {error}") from None
+    except RecordingError as error:
+        text = str(error)
+        raise error if text.startswith(str(path)) else RecordingError(f"{path}: {text}") from None
+
+
+def family_of(path: Path) -> _Family:
+    """Return the family of a file; raise `RecordingError` if it has no curves to lay over others."""
+    kind = kind_of(path)
+    if kind not in KINDS:
+        with Recording(path) as recording:
+            kind = "check" if is_check(recording) else kind
+    for family in FAMILIES:
+        if kind in family.kinds:
+            return family
+    known = ", ".join(name for family in FAMILIES for name in family.kinds)
+    raise RecordingError(f"{path}: is of kind {kind}, which has no curves to lay over others; {known} have some")
+
+
+def _backbones(source: Recording | NonlinearMode | Backbone, view: View) -> Curves:
+    """Modal frequency and damping over the amplitude, with 95 % intervals."""
+    omitted = refused(points_of(source)) if isinstance(source, Recording) else ""
+    measured = CAMPAIGNS[source.kind].measurements[Backbone](source) if isinstance(source, Recording) else source
+    mode = nonlinear_mode(measured) if isinstance(measured, Backbone) else measured
+    if isinstance(measured, Backbone):
+        harmonics = np.array([point.harmonics for point in measured.points])
+        across, amplitude = peak(measured.points[0].channels, harmonics, measured.frequency_hz, view)
+    else:
+        view.only(of=ONE_AMPLITUDE)
+        across, amplitude = DISPLACEMENT, mode.amplitude_m
+    order = np.argsort(mode.amplitude_m)
+    properties = (("modal_frequency_hz", 1.0), ("damping_ratio", 100.0))
+    lines = tuple(
+        Line(amplitude[order], scale * getattr(mode, name)[order], scale * mode.bound_95(name)[order])
+        for name, scale in properties
+    )
+    panels = (
+        Panel(across, Quantity("modal frequency", "Hz", "frequency")),
+        Panel(across, Quantity("modal damping ratio", "%")),
+    )
+    return Curves(panels, (Trace("", lines),), mode.specimen, omitted)
+
+
+def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) -> Curves:
+    """Amplitude over frequency, and the phase lag of the fundamental; what folds back at constant force is told apart."""
+    if not isinstance(source, Recording):
+        view.only(of=ONE_AMPLITUDE)
+        traces = tuple(
+            Trace(
+                one.label or f"{one.level:g} {one.level_unit}",
+                (Line(one.frequency_hz, one.amplitude_m), Line(one.frequency_hz, one.phase_lag_deg)),
+            )
+            for one in source
+        )
+        return Curves((Panel(FREQUENCY, DISPLACEMENT), Panel(FREQUENCY, LAG)), traces, source[0].specimen)
+    channels, found = channels_from(source.channels), []
+    panels: tuple[Panel, ...] = ()
+    force, row = [channel.role for channel in channels].index("force"), channel_of(channels, view)
+    points = points_of(source)
+    for label, some in passes_of(points):
+        frequency_hz = np.array([vibration_of(point).frequency_hz for point in some])
+        harmonics = np.array([spectrum_of(point).harmonics for point in some])
+        across, amplitude = peak(channels, harmonics, frequency_hz, view)
+        if some[0].level_unit == "m":
+            across, amplitude = _per_force(across, amplitude, np.abs(harmonics[:, force, 1]))
+        drive = harmonics[:, [channel.role for channel in channels].index("drive"), 1]
+        lag = np.degrees(np.angle(-harmonics[:, force, 1] / drive))
+        held = some[0].level_unit in ("N", "N RMS") and source.kind == "stepped-phase"
+        folded = _points_between(folds_back(frequency_hz, lag)) if held else None
+        lines = [Line(frequency_hz, amplitude, None, folded)]
+        panels = (Panel(FREQUENCY, across, log=some[0].level_unit == "m"),)
+        if view.harmonic == 1 and channels[row].role in ("drive", "response"):
+            turned = np.degrees(np.angle(-harmonics[:, force, 1] / harmonics[:, row, 1]))
+            lines.append(Line(frequency_hz, turned, None, folded))
+            panels = (*panels, Panel(FREQUENCY, LAG._replace(text="phase lag of displacement")))
+        found.append(Trace(label, tuple(lines)))
+    return Curves(panels, tuple(found), specimen_of(source), refused(points))
+
+
+def _per_force(across: Quantity, amplitude: np.ndarray, force_n: np.ndarray) -> tuple[Quantity, np.ndarray]:
+    """Return an amplitude over the fundamental of the force: where the response is held, its amplitude tells nothing."""
+    name = across.text.replace("displacement amplitude", "receptance").replace("amplitude", "response over force")
+    return Quantity(name, f"{across.unit}/N", "amplitude"), amplitude / force_n
+
+
+def _points_between(folded: np.ndarray) -> np.ndarray:
+    """Return bool[n]: points with a folded piece on both sides, or at the end of one that ends the curve."""
+    before, after = np.r_[folded[:1], folded], np.r_[folded, folded[-1:]]
+    return np.asarray(before & after) if folded.size else np.zeros(1, bool)
+
+
+def _transfer(source: Recording | FrequencyResponseMatrix, view: View) -> Curves:
+    """Frequency response from the force to the channel: size and phase."""
+    view.only("channel", of="a frequency response has no harmonics; they are in the scatter over realisations")
+    if isinstance(source, Recording):
+        levels = {f"{level:g} V RMS": one for level, one in recorded_response_matrices(source).items()}
+        omitted = refused(points_of(source))
+    else:
+        levels, omitted = {"": source}, ""
+    panels: tuple[Panel, ...] = ()
+    traces = []
+    for name, matrix in levels.items():
+        motions = [row for row, channel in enumerate(matrix.outputs) if channel.role in ("drive", "response")]
+        outputs = tuple(matrix.outputs[row] for row in motions)
+        channel = motions[channel_of(outputs, view)]
+        value = matrix.value[:, channel, 0]
+        unit = unit_text(f"{matrix.outputs[channel].unit}/{matrix.inputs[0].unit}")
+        of = f"{matrix.outputs[channel].name} over {matrix.inputs[0].name}"
+        panels = (
+            Panel(FREQUENCY, Quantity(of, unit, "amplitude"), log=True),
+            Panel(FREQUENCY, Quantity("phase", "deg")),
+        )
+        degrees = (np.degrees(np.angle(value)) + 90.0) % 360.0 - 90.0  # the curve has no jump at 0 or 180 deg
+        traces.append(Trace(name, (Line(matrix.frequency_hz, np.abs(value)), Line(matrix.frequency_hz, degrees))))
+    return Curves(panels, tuple(traces), next(iter(levels.values())).specimen, omitted)
+
+
+def _sweeps(source: Recording, view: View) -> Curves:
+    """Fundamentals of the channel and of the force over the frequency of each sweep."""
+    view.only("channel", of="sweeps are evaluated at their fundamental")
+    points = {point.number: point for point in points_of(source)}
+    panels: tuple[Panel, ...] = ()
+    traces = []
+    for number, sweep in recorded_sweeps(source).items():
+        harmonics = np.stack([np.zeros_like(sweep.fundamentals.T), sweep.fundamentals.T], axis=-1)
+        across, amplitude = peak(sweep.channels, harmonics, sweep.frequency_hz, view)
+        panels = (Panel(FREQUENCY, across), Panel(FREQUENCY, FORCE))
+        point = points[number]
+        name = f"{point.level:g} {point.level_unit} {point.direction}" + (
+            f" {point.repeat}" if point.repeat > 1 else ""
+        )
+        lines = (Line(sweep.frequency_hz, amplitude), Line(sweep.frequency_hz, np.abs(sweep.force)))
+        traces.append(Trace(name, lines))
+    return Curves(panels, tuple(traces), specimen_of(source), refused(list(points.values())))
+
+
+FAMILIES = (
+    _Family("backbones", ("backbone", "continuous-backbone", "nonlinear-mode", "measured-backbone"), _backbones),
+    _Family("frequency responses", ("stepped-sine", "stepped-phase", "frequency-responses"), _responses),
+    _Family("response-controlled tests", ("response-controlled",), _responses),
+    _Family("frequency response functions", ("multisine", "frequency-response-matrix"), _transfer),
+    _Family("sweeps", ("sweep",), _sweeps),
+)
+"""Kinds that can be laid over one another, by what they have in common."""
