@@ -5,64 +5,102 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import NonlinearMode
-from rig.drawing.style import MAIN, SECOND, engineering, say_why_empty, title
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, say_why_empty, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_mode", "draw_properties"]
+__all__ = ["SHAPE_FLOOR", "draw_mode", "draw_properties"]
+
+_GAIN_ERROR = 0.02
+SHAPE_FLOOR = _GAIN_ERROR**2 / 4.0
+"""1 - MAC of two equal components, one of them wrong by 2 %: a smaller change of shape is not told from a sensor's error."""
 
 
 def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
-    """Draw a nonlinear mode."""
-    shapes, purities = np.isfinite(mode.mac).any(), np.isfinite(mode.force_purity).any()
-    axes = page.subplots(2, 3 if shapes or purities else 2)
+    """Draw a nonlinear mode. Without harmonics of the force, purity and phase lag are left out.
+
+    The change of the mode shape has a panel if it exceeds `SHAPE_FLOOR`; otherwise the title says that there is none.
+    """
+    pure = bool(np.isfinite(mode.force_purity).any())
+    axes = grid(page, 2, 3 if pure else 2)
     draw_properties(axes[0, 0], axes[0, 1], mode)
     amplitude, unit = engineering(mode.amplitude_m)
     order = np.argsort(mode.force_n)
-    if shapes or purities:
-        _draw_mac(axes[0, 2], mode)
-        _draw_purity(axes[1, 2], mode)
-    axes[1, 0].plot(mode.force_n[order], amplitude[order], "o-", ms=4, color=MAIN)
-    axes[1, 0].set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement amplitude, {unit}")
+    axes[1, 0].plot(mode.force_n[order], amplitude[order], "o-", color=MAIN)
+    axes[1, 0].set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement, {unit}")
     _harmonics(axes[1, 1], mode)
-    title(page, f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {mode.force_n.size} points")
+    change, shape_text = _change_of_shape(mode)
+    if pure:
+        _draw_purity(axes[1, 2], mode)
+        if change:
+            _draw_mac(axes[0, 2], mode)
+        else:
+            _draw_lag(axes[0, 2], mode)
+    count = mode.force_n.size
+    title(
+        page,
+        f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {count} point{'' if count == 1 else 's'}"
+        + shape_text,
+    )
+
+
+def _change_of_shape(mode: NonlinearMode) -> tuple[bool, str]:
+    """Return whether the shape changes by more than sensors can tell, and otherwise a text that says so."""
+    away = 1.0 - mode.mac[np.isfinite(mode.mac)]
+    if not away.size:
+        return False, ""
+    if away.max() > SHAPE_FLOOR:
+        return True, ""
+    return False, f"; shape as the linear one (1 - MAC below {SHAPE_FLOOR:g})"
 
 
 def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
-    """Draw one minus the MAC on a logarithmic axis; a MAC close to one would be a line at the top."""
-    if not np.isfinite(mode.mac).any():
-        say_why_empty(axis, "MAC needs mode shapes")
-        return
+    """Draw one minus the MAC with its 95 % interval, over the floor below which it means nothing."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
-    away = np.maximum(1.0 - mode.mac[order], 1e-12)
-    low, high = np.maximum(1.0 - mode.interval("mac")[order, ::-1].T, 0.1 * np.nanmin(away))  # to zero, off the axis
+    away = np.maximum(1.0 - mode.mac[order], 0.1 * SHAPE_FLOOR)
+    low, high = np.maximum(1.0 - mode.interval("mac")[order, ::-1].T, 0.1 * SHAPE_FLOOR)
     axis.fill_between(amplitude, low, high, color=MAIN, alpha=0.2, lw=0)
-    axis.semilogy(amplitude, away, "o-", ms=4, color=MAIN)
-    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="1 - MAC against the linear shape")
+    axis.semilogy(amplitude, away, "o-", color=MAIN, label="measured, 95 %")
+    axis.axhspan(0.1 * SHAPE_FLOOR, SHAPE_FLOOR, color=REJECTED, alpha=0.25, lw=0, label="2 % error of a sensor")
+    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="1 - MAC to linear shape")
+    axis.legend()
+
+
+def _draw_lag(axis: "Axes", mode: NonlinearMode) -> None:
+    """Draw the phase lag of the measured points, with its 95 % interval."""
+    order = np.argsort(mode.amplitude_m)
+    amplitude, unit = engineering(mode.amplitude_m[order])
+    axis.axhline(90.0, color=REJECTED, lw=0.8)
+    bound = np.nan_to_num(mode.bound_95("phase_lag_deg")[order])
+    axis.errorbar(amplitude, mode.phase_lag_deg[order], bound, fmt="o-", color=MAIN)
+    low, high = axis.get_ylim()
+    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="phase lag, deg")
+    axis.set_ylim(min(low, 85.0), max(high, 95.0))
 
 
 def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
     """Draw the share of the fundamental in force and motion, with its 95 % interval."""
-    if not np.isfinite(mode.force_purity).any():
-        say_why_empty(axis, "purity needs harmonics")
-        return
     order = np.argsort(mode.force_n)
-    for name, label, colour in (("force_purity", "force", MAIN), ("response_purity", "drive point", SECOND)):
+    for name, label, colour, line in (
+        ("force_purity", "force", MAIN, "o-"),
+        ("response_purity", "drive point", SECOND, "s--"),
+    ):
         low, high = mode.interval(name)[order].T
         axis.fill_between(mode.force_n[order], low, high, color=colour, alpha=0.2, lw=0)
-        axis.plot(mode.force_n[order], getattr(mode, name)[order], "o-", ms=4, color=colour, label=label)
+        axis.plot(mode.force_n[order], getattr(mode, name)[order], line, color=colour, label=label)
     axis.set(xlabel="force amplitude (fundamental), N", ylabel="purity", ylim=(0.0, 1.05))
-    axis.legend(fontsize=8)
+    axis.legend(title="fundamental over RMS of all")
 
 
 def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
     """Draw modal frequency and damping over the amplitude, with their 95 % intervals."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
-    error: dict[str, Any] = {"fmt": "o-", "ms": 4, "color": colour, "capsize": 2, "elinewidth": 0.8}
+    error: dict[str, Any] = {"fmt": "o-", "color": colour}
     left.errorbar(amplitude, mode.modal_frequency_hz[order], mode.bound_95("modal_frequency_hz")[order], **error)
     left.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
     if np.isfinite(mode.damping_ratio).any():
@@ -70,7 +108,7 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
             amplitude,
             100 * mode.damping_ratio[order],
             100 * mode.bound_95("damping_ratio")[order],
-            label="one-mode fit" if mode.source == "stepped sine" else "active power of the fundamental",
+            label="one-mode fit" if mode.source == "stepped sine" else "from the fundamental's power",
             **error,
         )
         if np.isfinite(mode.damping_ratio_total_power).any():
@@ -78,13 +116,13 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
                 amplitude,
                 100 * mode.damping_ratio_total_power[order],
                 100 * mode.bound_95("damping_ratio_total_power")[order],
-                label="active power of all harmonics",
-                **{**error, "fmt": "s--", "ms": 3.5, "color": SECOND},
+                label="from the power of all harmonics",
+                **{**error, "fmt": "s--", "color": SECOND},
             )
-        right.legend(fontsize=8)
+        right.legend()
     else:
         say_why_empty(right, "damping needs the specimen's drive_mode_shape")
-    right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
+    right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
     _keep_small_changes_small(right)
 
 
@@ -105,16 +143,15 @@ def _harmonics(axis: "Axes", mode: NonlinearMode) -> None:
                 mode.force_n[order],
                 ratio[order],
                 marker + "-",
-                ms=4,
                 color=MAIN if harmonic == 2 else SECOND,
-                label=f"|F{harmonic}|/|F1|",
+                label=f"harmonic {harmonic}, |F{harmonic}|/|F1|",
             )
             drawn = True
     if drawn:
-        axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of the force")
+        axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of force")
         axis.set_ylim(bottom=0.0)
-        axis.legend(fontsize=8)
+        axis.legend()
         return
-    axis.plot(mode.modal_frequency_hz, engineering(mode.amplitude_m)[0], "o-", ms=4, color=MAIN)
+    axis.plot(mode.modal_frequency_hz, engineering(mode.amplitude_m)[0], "o-", color=MAIN)
     axis.locator_params(axis="x", nbins=5)
-    axis.set(xlabel="modal frequency, Hz", ylabel=f"displacement amplitude, {engineering(mode.amplitude_m)[1]}")
+    axis.set(xlabel="modal frequency, Hz", ylabel=f"displacement, {engineering(mode.amplitude_m)[1]}")

@@ -5,22 +5,17 @@ from typing import Any
 import numpy as np
 
 from identification import Predictions
-from rig.drawing.style import REJECTED, plain_log, say_why_empty
+from rig.drawing.style import MARKERS, REJECTED, plain_log, say_why_empty, shade
 
 __all__ = ["draw_runs"]
 
-_MARKS = "os^Dv"
-
-
 def draw_runs(area: Any, predictions: Predictions) -> None:
     """Draw one mark per realisation and output. Unbounded runs have no error; they are only counted."""
-    from matplotlib import colormaps
-
     axis = area.subplots()
     bounded = [run for run in predictions.runs if run.bounded]
     lost = len(predictions.runs) - len(bounded)
     heading = f"{lost} of {len(predictions.runs)} multisines unbounded" if lost else f"{len(bounded)} multisines"
-    axis.set_title(heading, fontsize=8, loc="left")
+    axis.set_title(heading)
     if not bounded:
         say_why_empty(axis, "no run stayed bounded")
         return
@@ -29,11 +24,11 @@ def draw_runs(area: Any, predictions: Predictions) -> None:
     known = np.isfinite(use).all()
     across = use if known else np.arange(1, len(bounded) + 1)
     for row, name in enumerate(names):
-        colour = colormaps["viridis"](0.85 * row / max(1, len(names) - 1))
-        mark = _MARKS[row % len(_MARKS)]
-        axis.semilogy(across, [100.0 * run.error[row] for run in bounded], mark, ms=4, color=colour, label=name)
+        mark, colour = MARKERS[row % len(MARKERS)], shade(row, len(names))
+        axis.semilogy(across, [100.0 * run.error[row] for run in bounded], mark, color=colour, label=name)
     if known:
-        axis.axvline(1.0, color=REJECTED, lw=0.8, ls="--", label="training data")
+        axis.set_xlim(0.0, 1.05 * max(1.0, use.max()))
+        axis.axvline(1.0, color=REJECTED, lw=0.9, ls="--", label="training data")
     axis.set(xlabel="range use" if known else "run", ylabel="relative error, %")
     plain_log(axis)
-    axis.legend(fontsize=7)
+    axis.legend()

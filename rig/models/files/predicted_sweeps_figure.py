@@ -1,31 +1,57 @@
-"""Figure of predicted sweeps: motion and force over the instantaneous frequency, with the recording if there is one."""
+"""Figure of predicted sweeps: motion, force, and their differences from the recording, over the instantaneous frequency."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification import Predictions
+from identification import Predictions, SweepPrediction, Transient
 from identification.prediction.sweep_prediction import as_recorded
 from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 
-__all__ = ["draw_sweeps"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-_MOST_SWEEPS = 4
+__all__ = ["draw_sweeps", "sweeps_shown"]
+
+_MOST_SWEEPS, _MOST_ON_A_COLUMN, _MOST_BESIDE_OTHERS = 4, 2, 1
+_LINES_OF_TEXT = 14.0  # a row of panels takes the height of so many
 _MOST_SHOWN = 2.0  # times the largest recorded value: an unbounded run is not shown beyond
 
 
-def draw_sweeps(area: Any, predictions: Predictions) -> None:
-    """Draw one row per sweep with motion and force; at most four sweeps are drawn."""
-    count = len(predictions.sweeps)
-    shown = min(count, _MOST_SWEEPS)
-    axes = area.subplots(shown, 2, squeeze=False)
+def sweeps_shown(page: "Figure", predictions: Predictions, narrow: bool, alone: bool) -> int:
+    """Return how many sweeps are drawn, the first ones: as many as the page has room for."""
+    from matplotlib import rcParams
+
+    rows = max(1, int(page.get_figheight() * 72.0 / rcParams["font.size"] / _LINES_OF_TEXT))
+    most = _MOST_ON_A_COLUMN if narrow else min(rows, _MOST_SWEEPS) if alone else _MOST_BESIDE_OTHERS
+    return min(len(predictions.sweeps), most)
+
+
+def draw_sweeps(area: Any, predictions: Predictions, shown: int, *, narrow: bool) -> None:
+    """Draw one row per sweep: motion, force and, if a sweep was recorded, prediction minus recording.
+
+    On a ``narrow`` page the panels of a sweep are below one another.
+    """
+    compared = any(recorded is not None for recorded in predictions.sweep_references[:shown])
+    columns = 3 if compared else 2
+    axes = area.subplots(shown * columns, 1) if narrow else area.subplots(shown, columns, squeeze=False)
+    axes = np.asarray(axes).reshape(shown, columns)
     for index in range(shown):
         _sweep(axes[index], predictions, index)
-    for axis in axes[-1]:
+    for axis in axes.ravel() if narrow else axes[-1]:
         axis.set_xlabel("frequency, Hz")
-    heading = None if count == shown else f"the first {shown} of {count} sweeps"
-    entries = axes[0, 0].get_legend_handles_labels()
-    area.legend(*entries, loc="outside upper left", fontsize=7, ncols=3, title=heading, title_fontsize=7)
+    count = len(predictions.sweeps)
+    heading = None if count == shown else f"{_first(shown)} of {count} sweeps, for want of room"
+    handles: dict[str, Any] = {}
+    for axis in axes.ravel():
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    columns = 1 if narrow else 3
+    area.legend(list(handles.values()), list(handles), loc="outside upper left", ncols=columns, title=heading)
+
+
+def _first(shown: int) -> str:
+    return "the first" if shown == 1 else f"the first {shown}"
 
 
 def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
@@ -39,15 +65,20 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
     unit = engineering(np.array([top]))[1]
     scale = {"mm": 1e3, "µm": 1e6}[unit]
     if recorded is not None:
-        axes[0].plot(recorded.frequency_hz, scale * measured, color=REJECTED, lw=2.4, label="recorded")
-        axes[1].plot(recorded.frequency_hz, np.abs(recorded.force), color=REJECTED, lw=2.4)
-    axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, lw=1.0, label=_origin(sweep.origin))
-    axes[1].plot(sweep.frequency_hz, force, color=MAIN, lw=1.0)
+        wide: dict[str, Any] = {"color": REJECTED, "lw": 4.0, "alpha": 0.5}
+        axes[0].plot(recorded.frequency_hz, scale * measured, label="recorded", **wide)
+        axes[1].plot(recorded.frequency_hz, np.abs(recorded.force), **wide)
+        _differences(axes[2], sweep, recorded)
+    elif len(axes) > 2:
+        axes[2].set_axis_off()
+        axes[2].text(0.5, 0.5, "not recorded", ha="center", color=REJECTED, transform=axes[2].transAxes)
+    axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, label=_origin(sweep.origin))
+    axes[1].plot(sweep.frequency_hz, force, color=MAIN)
     if np.isfinite(sweep.largest_identified):
         limit = scale * top / sweep.range_use
-        axes[0].axhline(limit, color=SECOND, lw=0.7, ls="--", label="identified up to")
+        axes[0].axhline(limit, color=SECOND, lw=0.9, ls="--", label="largest amplitude identified")
     if sweep.unbounded_at_s is not None:
-        axes[0].axvline(sweep.frequency_hz[-1], color=SECOND, lw=0.7, ls=":", label="unbounded from here on")
+        axes[0].axvline(sweep.frequency_hz[-1], color=SECOND, lw=0.9, ls=":", label="unbounded from here on")
         top = top if recorded is None else min(top, _MOST_SHOWN * float(measured.max()))
     largest = float(force.max())
     if recorded is not None:
@@ -57,7 +88,24 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
     axes[1].set_ylim(0.0, 1.08 * largest)
     axes[0].set(ylabel=f"displacement, {unit}")
     axes[1].set(ylabel="force, N")
-    axes[0].set_title(_heading(predictions, index), fontsize=8, loc="left")
+    axes[0].set_title(_heading(predictions, index))
+
+
+def _differences(axis: Any, sweep: SweepPrediction, recorded: Transient) -> None:
+    """Draw the differences of displacement and force amplitudes, in percent of the largest recorded one."""
+    measured, amplitude, force = as_recorded(sweep, recorded)
+    measured_n = np.abs(recorded.force)
+    for predicted, known, colour, line, label in (
+        (amplitude, measured, MAIN, "-", "difference of displacement, % of peak"),
+        (force, measured_n, SECOND, "--", "difference of force, % of peak"),
+    ):
+        there = np.interp(recorded.time_s, sweep.time_s, predicted, left=np.nan, right=np.nan)
+        axis.plot(recorded.frequency_hz, 100.0 * (there - known) / known.max(), ls=line, color=colour, label=label)
+    axis.axhline(0.0, color=REJECTED, lw=0.8)
+    axis.set(ylabel="difference, %")
+    shown = np.abs(axis.get_ylim()).max()
+    if shown > 100.0 * _MOST_SHOWN:
+        axis.set_ylim(-100.0 * _MOST_SHOWN, 100.0 * _MOST_SHOWN)
 
 
 def _origin(origin: str) -> str:

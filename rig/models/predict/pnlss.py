@@ -1,5 +1,6 @@
 """Predictions by nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
@@ -46,12 +47,13 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
     _check(request, model, path)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
     held = cast(Held, request.held or default_held(model, exciter))
+    alone = request.forces_without_reference([one.measured for one in references], default_held(model, exciter))
     steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
         (pnlss_frequency_response(model, level, force=one, exciter=exciter), None, None)
-        for one, levels in ((held, request.forces_n), ("voltage", request.voltages_v))
+        for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
-    steady += [compared(model, exciter, reference) for reference in references]
+    steady += [compared(model, exciter, one, whole=_asked(request, alone, one.measured)) for one in references]
     models = PnlssSweepModels(model, exciter)
     swept = [one for recording in request.sweeps for one in recorded_pnlss_sweeps(recording, models)]
     swept += [one for plan in request.planned for one in planned_pnlss_sweeps(plan, models)]
@@ -112,6 +114,12 @@ def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
         raise ConfigurationError(
             "`exciter`: means nothing to `multisines`, which takes the recorded force; leave it out"
         )
+
+
+def _asked(request: PredictionRequest, alone: Sequence[float], measured: FrequencyResponse) -> bool:
+    """Return whether the response to the force of a reference was asked for too, and so is wanted over the whole band."""
+    others = set(request.forces_n) - set(alone)
+    return measured.controlled == "force" and any(math.isclose(force, measured.level, rel_tol=1e-6) for force in others)
 
 
 def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:

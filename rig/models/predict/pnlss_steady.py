@@ -53,15 +53,16 @@ def default_held(model: PnlssModel, exciter: Exciter | None) -> Held:
 
 
 def compared(
-    model: PnlssModel, exciter: Exciter | None, reference: Reference
+    model: PnlssModel, exciter: Exciter | None, reference: Reference, *, whole: bool = False
 ) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
-    """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare."""
+    """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare.
+
+    At a held level, only the band of the reference is predicted, or the ``whole`` band of the model.
+    """
     measured, over = reference.measured, reference.over
     held, notes = default_held(model, exciter), []
-    low, high = (
-        (1.0 - _MARGIN) * float(measured.frequency_hz.min()),
-        (1.0 + _MARGIN) * float(measured.frequency_hz.max()),
-    )
+    low: float | None = None if whole else (1.0 - _MARGIN) * float(measured.frequency_hz.min())
+    high: float | None = None if whole else (1.0 + _MARGIN) * float(measured.frequency_hz.max())
     if measured.controlled == "force":
         predicted = pnlss_frequency_response(
             model, measured.level, force=held, exciter=exciter, lowest_hz=low, highest_hz=high

@@ -78,9 +78,10 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     mode = cast(NonlinearMode, load_as(NONLINEAR_MODE, model))
     modes = None if request.modes is None else modes_in(request.modes)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
-    steady: list[_Compared] = [_alone(mode, force, modes, request) for force in request.forces_n]
-    for path in request.references:
-        steady += [_compared(mode, measured, modes, request) for measured in _stepped_sines(path)]
+    references = [measured for path in request.references for measured in _stepped_sines(path)]
+    alone = request.forces_without_reference(references, "fundamental")
+    steady: list[_Compared] = [_alone(mode, force, modes, request) for force in alone]
+    steady += [_compared(mode, measured, modes, request) for measured in references]
     models = SweepModels(mode, modes, exciter, request.zero_crossings, request.allow_extrapolation)
     swept: list[Swept] = [found for path in request.sweeps for found in recorded_sweeps(path, models)]
     swept += [found for plan in request.planned for found in planned_sweeps(plan, models)]

@@ -1,11 +1,13 @@
 """Request for predictions. Options that do not fit together are refused."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import get_args
 
+from identification import FrequencyResponse
 from identification.prediction.comparison import Over
 from identification.prediction.frequency_response import HeldForce
 from rig.errors import ConfigurationError
@@ -78,3 +80,13 @@ class PredictionRequest:
             )
         if self.zero_crossings is not None and not self.sweeps:
             raise ConfigurationError("`zero_crossings`: is for recorded sweeps; add `sweeps`, or leave it out")
+
+    def forces_without_reference(self, references: Iterable[FrequencyResponse], held: str) -> list[float]:
+        """Return the requested forces, N, at which no reference was held: the others are predicted with their reference.
+
+        ``held`` is the quantity at which references of constant force are predicted.
+        """
+        if (self.held or held) != held:
+            return list(self.forces_n)
+        known = [reference.level for reference in references if reference.controlled == "force"]
+        return [force for force in self.forces_n if not any(math.isclose(force, level, rel_tol=1e-6) for level in known)]

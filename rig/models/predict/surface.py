@@ -37,7 +37,9 @@ def surface_predictions(
                 f"`references`: '{measured_at.label}' is not at constant force; a force surface is compared with responses "
                 "whose fundamental force was held"
             )
-    forces: list[tuple[float, FrequencyResponse | None]] = [(force, None) for force in request.forces_n]
+    forces: list[tuple[float, FrequencyResponse | None]] = [
+        (force, None) for force in request.forces_without_reference(references, "fundamental")
+    ]
     forces += [(one.level, one) for one in references]
     steady, bands, errors = [], [], []
     for force_n, reference in forces:

@@ -1,0 +1,79 @@
+"""Curves of predicted steady vibrations: stable and unstable parts, extrapolation, and where and why a curve ends."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification import SteadyPrediction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["BEYOND", "UNSTABLE", "draw_curve", "draw_ends", "ends_within", "why_it_ends"]
+
+BEYOND = 1.0
+"""Range use above which a model extrapolates."""
+UNSTABLE = (0, (1.2, 1.2))
+"""Line style of unstable vibrations."""
+_CUT = "the response from "
+_VISIBLE = 0.15
+_SAME = 1e-6
+_EDGE = "the range of the model ends"
+
+
+def draw_curve(
+    axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: Any, label: str | None = None
+) -> None:
+    """Draw every branch separately; unstable parts are dotted, parts beyond the identified range have a broad shade.
+
+    ``values``, float[n], are the quantity over the frequency. The label belongs to the first stable part.
+    """
+    for branch in np.unique(response.branch):
+        on = response.branch == branch
+        for which, line in ((response.stable[on], "-"), (~response.stable[on], UNSTABLE)):
+            if not which.any():
+                continue
+            shown = np.where(_with_neighbours(which), values[on], np.nan)
+            axis.plot(response.frequency_hz[on], shown, ls=line, color=colour, label=label)
+            label = None
+        beyond = np.where(response.range_use[on] > BEYOND, values[on], np.nan)
+        if np.isfinite(beyond).any():
+            axis.plot(response.frequency_hz[on], beyond, color=colour, lw=5.0, alpha=0.25)
+
+
+def draw_ends(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: Any) -> None:
+    """Mark by a square where a curve ends within the figure."""
+    ends = ends_within(response)
+    axis.plot(response.frequency_hz[ends], values[ends], "s", color=colour)
+
+
+def ends_within(response: SteadyPrediction) -> np.ndarray:
+    """int[m]: points at which a curve ends before its amplitude has become small, other than at the ends of its band."""
+    amplitude = response.amplitude_m()
+    if response.force == "recorded":
+        return np.zeros(0, dtype=np.int64)
+    band = (
+        (float(response.frequency_hz.min()), float(response.frequency_hz.max())) if not response.complete else (0.0, 0.0)
+    )
+    found = []
+    for branch in np.unique(response.branch):
+        on = np.flatnonzero(response.branch == branch)
+        closed = np.isclose(*response.frequency_hz[on[[0, -1]]], rtol=_SAME) and np.isclose(*amplitude[on[[0, -1]]])
+        for end in () if closed else (on[0], on[-1]):
+            at_edge = any(abs(response.frequency_hz[end] - edge) <= _SAME * edge for edge in band)
+            if not at_edge and amplitude[end] > _VISIBLE * amplitude.max():
+                found.append(int(end))
+    return np.array(found, dtype=np.int64)
+
+
+def why_it_ends(response: SteadyPrediction) -> list[str]:
+    """Return the reasons why a curve ends within the figure, without repetition; empty if it does not."""
+    if not ends_within(response).size:
+        return []
+    notes = [note.split(": ", 1)[1] for note in response.notes if note.startswith(_CUT) and ": " in note]
+    return list(dict.fromkeys(notes)) or [_EDGE]
+
+
+def _with_neighbours(which: np.ndarray) -> np.ndarray:
+    """True where a point or the one after it is selected, so that lines meet where stability changes."""
+    return np.asarray(which | np.concatenate([which[1:], [False]]))
