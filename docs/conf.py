@@ -1,10 +1,12 @@
 """How the documentation site is built: ``sphinx-build -W --keep-going docs rig/site``. Needs the extra ``docs``, no network."""
 
+import sys
 from pathlib import Path
 
 from vibrolock import __version__
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_extensions"))
 
 project = "vibrolock"
 author = "The vibrolock developers"
@@ -15,8 +17,9 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
+    "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["driver-template", "_build"]
+exclude_patterns = ["driver-template", "_build", "_extensions", "examples"]
 
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_block", "substitution"]
 myst_heading_anchors = 5
@@ -39,3 +42,21 @@ html_theme_options = {
 }
 html_show_sourcelink = False
 html_copy_source = False
+
+# The gallery: `-D plot_gallery=0` makes its pages without running the examples.
+SECTIONS = ("first_steps", "tests", "models", "predictions", "virtual_rigs", "on_a_bench")
+sphinx_gallery_conf = {
+    "examples_dirs": ["examples"],
+    "gallery_dirs": ["gallery"],
+    "filename_pattern": r"plot_",
+    "subsection_order": [f"examples/{name}" for name in SECTIONS],
+    "within_subsection_order": "FileNameSortKey",
+    "capture_repr": ("_repr_html_",),
+    "reset_modules": ("gallery_style.apply",),
+    "show_memory": False,
+    "show_signature": False,
+    "download_all_examples": False,
+    "min_reported_time": 600,
+    "thumbnail_size": (480, 300),
+    "log_level": {"backreference_missing": "info"},
+}

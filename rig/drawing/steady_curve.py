@@ -53,7 +53,9 @@ def ends_within(response: SteadyPrediction) -> np.ndarray:
     if response.force == "recorded":
         return np.zeros(0, dtype=np.int64)
     band = (
-        (float(response.frequency_hz.min()), float(response.frequency_hz.max())) if not response.complete else (0.0, 0.0)
+        (float(response.frequency_hz.min()), float(response.frequency_hz.max()))
+        if not response.complete
+        else (0.0, 0.0)
     )
     found = []
     for branch in np.unique(response.branch):

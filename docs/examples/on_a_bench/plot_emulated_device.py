@@ -2,8 +2,8 @@
 Another device in the bench's place
 ===================================
 
-The same plan on the virtual rig and on an emulated device behind a serial port, with the frames of the wire protocol, their check
-sums and their latency. Only the bench differs.
+The same plan on the virtual rig and on an emulated device behind a serial port, with the frames of the wire protocol, their
+check sums and their latency. Only the bench differs.
 """
 
 import matplotlib.pyplot as plt
@@ -13,7 +13,7 @@ import rig
 from rig.emulator.emulated import emulated
 
 plan = rig.load_plan("magnet-beam/backbone-short")
-plan = plan.model_copy(update={"levels_m": plan.levels_m[::3]})
+plan = plan.model_copy(update={"levels_m": plan.levels_m[3:12:4]})
 virtual = identification.nonlinear_mode(rig.run(plan).backbone())
 with emulated(rig.load_bench("magnet-beam"), "serial", lockstep=True) as bench:
     device = rig.run(plan, bench=bench)

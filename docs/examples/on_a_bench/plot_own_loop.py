@@ -40,7 +40,7 @@ for held, target in ((AmplitudeLaw.VOLTAGE, 0.1), *((AmplitudeLaw.RESPONSE, x_m)
     if held != amplitude["law"]:
         level = take_over(parameters["amplitude"], amplitude, vibration, held)
     start = level or target
-    for k in range(round(5.0 / DT)):
+    for k in range(round(3.0 / DT)):
         force = volts * math.cos(theta + float(amplitude["demanded_turn"]))
         a = (force - C * (v + 0.5 * DT * a) - K * x - K3 * x**3) / M
         v += a * DT
@@ -50,7 +50,7 @@ for held, target in ((AmplitudeLaw.VOLTAGE, 0.1), *((AmplitudeLaw.RESPONSE, x_m)
         measure_phase(parameters, state, LAG, 0.0, True)
         if vibration["force_n"] > 0.0:
             follow(parameters["frequency"], frequency, vibration, LAG)
-        level = start * (target / start) ** min(1.0, k * DT / 2.0)
+        level = start * (target / start) ** min(1.0, k * DT / 1.5)
         volts = demand(parameters["amplitude"], amplitude, vibration, level, LAG, omega, True)
         see_output(amplitude, volts, volts, float(amplitude["demanded_turn"]))
         theta = advance_phase(theta, float(frequency["omega"]), DT)
@@ -66,7 +66,7 @@ exact_m = np.linspace(0, 1.05e-3, 50)
 figure, (time, backbone) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
 time.plot(0.02 * np.arange(amplitude_m.size), 1e3 * amplitude_m)
 time.set(xlabel="time, s", ylabel="displacement amplitude, mm")
-backbone.plot(1e3 * amplitude_m[250:], frequency_hz[250:], lw=3, alpha=0.5, label="the loop")
+backbone.plot(1e3 * amplitude_m[150:], frequency_hz[150:], lw=3, alpha=0.5, label="the loop")
 backbone.plot(1e3 * exact_m, np.sqrt((K + 0.75 * K3 * exact_m**2) / M) / math.tau, "k--", label="harmonic balance")
 backbone.set(xlabel="displacement amplitude, mm", ylabel="frequency, Hz")
 backbone.legend()

@@ -2,23 +2,18 @@
 A rehearsal before anything moves
 =================================
 
-The plan runs on virtual twins of the rig, each with other gains, noise, damping and shaker within what is known. The verdict says
-how often it would end well, trip, or miss points.
+The plan runs on virtual twins of the rig, each with other gains, noise, damping and shaker within what is known. The verdict
+says how often it would end well, trip, or miss points.
 """
-
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import rig
 from rig.models.rehearse import Subject, request_for
 from rig.rehearsal.rehearsal import rehearse
-from rig.tuning import tune
 
 bench = rig.load_bench("magnet-beam")
-with TemporaryDirectory() as folder:
-    known = Path(folder) / "tuned.h5"
-    plan = tune(bench, known).plan
-    rehearsal = rehearse(request_for(Subject(plan=plan, bench=bench, sources=[known], draws=8)), jobs=2)
+plan = rig.load_plan("magnet-beam/backbone-short")
+plan = plan.model_copy(update={"levels_m": plan.levels_m[3:12:4]})
+rehearsal = rehearse(request_for(Subject(plan=plan, bench=bench, draws=8)), jobs=2)
 rehearsal
 
 # %%

@@ -2,13 +2,13 @@
 Gains and margins from a linear test
 ====================================
 
-A low-level multisine tells enough of rig and structure to choose the gains of the loop, with their margins, and to write a plan.
+A low-level multisine tells enough of rig and structure to choose the gains of the loop, with their margins, and to write a
+plan.
 """
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import rig
 from rig.tuning import tune
 
 with TemporaryDirectory() as folder:
@@ -21,6 +21,6 @@ tuned
 tuned.plot()
 
 # %%
-# The plan that comes out of it runs as it is.
+# The plan that comes out of it.
 
-rig.run(tuned.plan).plot()
+print(tuned.plan_toml)

@@ -25,7 +25,11 @@ responses[-1]
 truth = phase_resonance_backbone(make_daq(rig.load_bench("magnet-beam")).rig, amplitudes_m=whole.amplitude_m)
 figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 for response in responses:
-    axis.plot(response.frequency_hz, 1e3 * response.amplitude_m(), label=f"{response.name}, range use {response.range_use.max():.2f}")
+    axis.plot(
+        response.frequency_hz,
+        1e3 * response.amplitude_m(),
+        label=f"{response.name}, range use {response.range_use.max():.2f}",
+    )
 axis.plot(truth.frequency_hz, 1e3 * truth.amplitude_m, "k--", label="backbone by harmonic balance")
 axis.axhspan(0.0, 1e3 * small.amplitude_m.max(), color="0.93", zorder=-1)
 axis.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm", xlim=(24.1, 25.2), ylim=(0, None))

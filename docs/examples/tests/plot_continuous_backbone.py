@@ -19,7 +19,9 @@ continuous.plot()
 # %%
 # Three levels that settle.
 
-plan = rig.load_plan("magnet-beam/backbone").model_copy(update={"levels_v": (0.5852, 1.3681, 2.5958), "record_periods": 20})
+plan = rig.load_plan("magnet-beam/backbone").model_copy(
+    update={"levels_v": (0.5852, 1.3681, 2.5958), "record_periods": 20}
+)
 settled = identification.nonlinear_mode(rig.run(plan).backbone())
 quick = continuous.nonlinear_mode()
 

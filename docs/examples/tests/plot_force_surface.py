@@ -13,7 +13,10 @@ import rig
 from rig.drivers import make_daq
 from simulators.analysis import constant_force_response
 
-change = {"levels_m": (0.00045, 0.00063, 0.00089, 0.00125, 0.00165), "phase_lags_deg": (-150.0, -120.0, -90.0, -60.0, -30.0)}
+change = {
+    "levels_m": (0.00045, 0.00063, 0.00089, 0.00125, 0.00165),
+    "phase_lags_deg": (-150.0, -120.0, -90.0, -60.0, -30.0),
+}
 run = rig.run(rig.load_plan("magnet-beam/response-controlled").model_copy(update=change))
 surface = run.force_surface()
 surface.plot()
@@ -29,7 +32,9 @@ figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained
 measured = curve.response
 left.plot(truth.frequency_hz, 1e3 * truth.amplitude_m, lw=4, alpha=0.4, label="harmonic balance")
 left.plot(measured.frequency_hz, np.where(curve.stable, 1e3 * measured.amplitude_m, np.nan), "C1", label="cut")
-left.plot(measured.frequency_hz, np.where(curve.stable, np.nan, 1e3 * measured.amplitude_m), "C1:", label="cut, unstable")
+left.plot(
+    measured.frequency_hz, np.where(curve.stable, np.nan, 1e3 * measured.amplitude_m), "C1:", label="cut, unstable"
+)
 left.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm")
 left.legend()
 right.plot(truth.frequency_hz, lag, lw=4, alpha=0.4)

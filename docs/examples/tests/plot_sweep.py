@@ -13,7 +13,7 @@ import rig
 from rig.drivers import make_daq
 from simulators.analysis import constant_force_response
 
-change = {"levels_n": (0.55,), "rate_hz_per_s": 0.1, "hold_periods": 50}
+change = {"levels_n": (0.55,), "rate_hz_per_s": 0.05, "hold_periods": 50}
 up = rig.run(rig.load_plan("magnet-beam/controlled-sweep-up").model_copy(update=change))
 down = rig.run(rig.load_plan("magnet-beam/controlled-sweep-down").model_copy(update=change))
 up.plot()

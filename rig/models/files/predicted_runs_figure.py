@@ -9,6 +9,7 @@ from rig.drawing.style import MARKERS, REJECTED, plain_log, say_why_empty, shade
 
 __all__ = ["draw_runs"]
 
+
 def draw_runs(area: Any, predictions: Predictions) -> None:
     """Draw one mark per realisation and output. Unbounded runs have no error; they are only counted."""
     axis = area.subplots()

@@ -83,7 +83,9 @@ def _steady_on(area: Any, predictions: Predictions, *, beside: bool) -> None:
             _uncertainty(size, phase, band, scale, colour)
         if measured is not None:
             mark = MARKERS[index % len(MARKERS)]
-            size.plot(measured.frequency_hz, scale * measured.amplitude_m, mark, label=_measured(index, count), **_MARKED)
+            size.plot(
+                measured.frequency_hz, scale * measured.amplitude_m, mark, label=_measured(index, count), **_MARKED
+            )
             phase.plot(measured.frequency_hz, measured.phase_lag_deg % 360.0, mark, **_MARKED)
         else:
             draw_ends(size, response, amplitude, colour)

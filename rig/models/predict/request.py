@@ -89,4 +89,6 @@ class PredictionRequest:
         if (self.held or held) != held:
             return list(self.forces_n)
         known = [reference.level for reference in references if reference.controlled == "force"]
-        return [force for force in self.forces_n if not any(math.isclose(force, level, rel_tol=1e-6) for level in known)]
+        return [
+            force for force in self.forces_n if not any(math.isclose(force, level, rel_tol=1e-6) for level in known)
+        ]

@@ -12,4 +12,3 @@ def apply(gallery: Any, file: Any) -> None:
     matplotlib.rcdefaults()
     matplotlib.rcParams.update({key: value for key, value in STYLE.items() if key != "figure.dpi"})
     matplotlib.rcParams.update({"figure.dpi": 110, "axes.prop_cycle": matplotlib.cycler(color=COLOURS)})
-
