@@ -28,7 +28,8 @@ class Result:
         html: str | None = import_module(_TABLES).as_html(self)
         return html
 
-    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
-        """Print the same as text, for a terminal or a notebook that shows no HTML."""
-        text = None if cycle else import_module(_TABLES).as_text(self)
-        printer.text(repr(self) if text is None else text)
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        """Return the table as HTML and as text, for IPython in a terminal and for notebooks that show no HTML."""
+        tables = import_module(_TABLES)
+        html, text = tables.as_html(self), tables.as_text(self)
+        return {} if html is None else {"text/html": html, "text/plain": text}

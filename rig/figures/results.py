@@ -13,7 +13,7 @@ from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 __all__ = ["RESULTS", "plot"]
 
@@ -47,7 +47,7 @@ RESULTS = {
 """By the name of the type: results that no file of ours holds. For others see `rig.models.files.kinds`."""
 
 
-def plot(thing: Any, *, page: "Figure | SubFigure | None" = None, **options: Any) -> "tuple[Axes, ...]":
+def plot(thing: Any, *, page: "Figure | None" = None, **options: Any) -> "tuple[Axes, ...]":
     """Draw a result, a file or a run; return the axes of the figure, from the top left to the bottom right.
 
     Parameters

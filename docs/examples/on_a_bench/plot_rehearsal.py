@@ -11,12 +11,12 @@ from rig.models.rehearse import Subject, request_for
 from rig.rehearsal.rehearsal import rehearse
 
 bench = rig.load_bench("magnet-beam")
-plan = rig.load_plan("magnet-beam/backbone-short")
-plan = plan.model_copy(update={"levels_m": plan.levels_m[3:12:4]})
-rehearsal = rehearse(request_for(Subject(plan=plan, bench=bench, draws=8)), jobs=2)
+plan = rig.load_plan("magnet-beam/continuous-backbone")  # which says what is known of the plant
+plan = plan.model_copy(update={"levels_m": plan.levels_m[2:12:3]})
+rehearsal = rehearse(request_for(Subject(plan=plan, bench=bench, draws=6)), jobs=2)
 rehearsal
 
 # %%
-# Eight twins are few: the interval of a share is as wide as it says. A plan for a real bench is rehearsed on two hundred.
+# Six twins are few: the interval of a share is as wide as it says. A plan for a real bench is rehearsed on two hundred.
 
 rehearsal.plot()

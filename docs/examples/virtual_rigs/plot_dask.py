@@ -3,7 +3,7 @@ A parameter study on a Dask cluster
 ===================================
 
 ``ensemble`` sends rigs to whatever joblib is told to use. Here that is a Dask cluster of two workers on this machine; the
-address of a scheduler in its place is all that a real cluster needs. Dask is not part of vibrolock: ``pip install distributed``.
+address of a scheduler in its place is all that a real cluster needs. Dask is a library of its own: ``pip install distributed``.
 
 The study asks how the gap to the magnet and its strength set the hardening.
 """
