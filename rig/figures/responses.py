@@ -51,14 +51,14 @@ def draw_surface(page: "Figure", surface: ForceSurface) -> None:
         named = index in (0, len(surface.levels) - 1)
         label = f"{factor * fit.amplitude_m:.3g} {unit}" if named else None
         frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)
-        size.semilogy(frequency_hz, factor / stiffness, color=shade(index, len(surface.levels)), label=label)
+        size.plot(frequency_hz, factor / stiffness, color=shade(index, len(surface.levels)), label=label)
     size.set(xlabel=_FREQUENCY, ylabel=f"receptance, {unit}/N")
     size.legend(title="displacement held")
     for index, lag in enumerate(_LAGS_DEG):
         found = surface.section(lag)
         if found.omega.size:
             x_m, force_n = np.exp(found.log_amplitude), np.exp(found.log_force)
-            section.loglog(factor * x_m, force_n, "vo^"[index] + "-", color=shade(index, 3), label=f"lag {lag:g} deg")
+            section.plot(factor * x_m, force_n, "vo^"[index] + "-", color=shade(index, 3), label=f"lag {lag:g} deg")
     section.set(xlabel=f"displacement amplitude, {unit}", ylabel="force, N")
     section.legend()
     title(page, f"{surface.specimen or 'specimen'}: force surface, {len(surface.levels)} levels")

@@ -26,7 +26,7 @@ _TEMPLATE = """\
 </tbody>
 </table>
 {%- else %}
-<p>{{ block }}</p>
+<p>{% for line in block %}{{ line }}{% if not loop.last %}<br>{% endif %}{% endfor %}</p>
 {%- endif %}
 {%- endfor %}
 </div>
@@ -38,7 +38,17 @@ def as_html(thing: Any) -> str | None:
     from jinja2 import Environment
 
     blocks = _blocks(thing)
-    return None if blocks is None else Environment(autoescape=True).from_string(_TEMPLATE).render(blocks=blocks)
+    if blocks is None:
+        return None
+    parts: list[PrintedTable | list[str]] = []
+    for block in blocks:
+        if isinstance(block, PrintedTable):
+            parts.append(block)
+        elif parts and isinstance(parts[-1], list):  # further lines of a paragraph
+            parts[-1].append(block)
+        else:
+            parts.append([block])
+    return Environment(autoescape=True).from_string(_TEMPLATE).render(blocks=parts)
 
 
 def as_text(thing: Any) -> str | None:

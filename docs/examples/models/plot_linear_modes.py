@@ -46,3 +46,4 @@ for axis, found, std, known, name in (
     axis.axhline(0.0, color="k", lw=0.6)
     axis.set(xlabel="mode", ylabel=f"{name}, identified over true, minus one, %", xticks=range(1, len(nearest) + 1))
 plt.show()
+# sphinx_gallery_thumbnail_number = 2

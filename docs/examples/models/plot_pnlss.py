@@ -14,7 +14,7 @@ from identification import FitSettings, error_spectra, identify_pnlss
 plan = rig.load_plan("magnet-beam/multisine-2").model_copy(update={"realisations": 3, "resolution_hz": 0.25})
 records = rig.run(plan).experiments(outputs=["drive"], rate_hz=250.0)
 fit = identify_pnlss(records[:2], states=2, validation=records[2:], settings=FitSettings(iterations=8))
-fit.plot()
+fit
 
 # %%
 # The spectrum of the record that the fit has not seen, and what is left by the linear start and by the model.

@@ -13,7 +13,7 @@ import rig
 from rig.emulator.emulated import emulated
 
 plan = rig.load_plan("magnet-beam/backbone-short")
-plan = plan.model_copy(update={"levels_m": plan.levels_m[3:12:4]})
+plan = plan.model_copy(update={"levels_m": plan.levels_m[3:9:2]})
 virtual = identification.nonlinear_mode(rig.run(plan).backbone())
 with emulated(rig.load_bench("magnet-beam"), "serial", lockstep=True) as bench:
     device = rig.run(plan, bench=bench)

@@ -58,7 +58,8 @@ for held, target in ((AmplitudeLaw.VOLTAGE, 0.1), *((AmplitudeLaw.RESPONSE, x_m)
             history.append((float(vibration["displacement_m"]), omega / math.tau))
 
 # %%
-# Where the loop went, beside the backbone of the oscillator by one-term harmonic balance.
+# Where the loop went, beside the backbone of the oscillator by one-term harmonic balance. While the level rises the loop
+# lags behind; where the level rests, the loop is on the curve.
 
 amplitude_m, frequency_hz = np.array(history).T
 exact_m = np.linspace(0, 1.05e-3, 50)

@@ -32,7 +32,7 @@ left.plot(predicted.frequency_hz, np.where(predicted.stable, amplitude, np.nan),
 left.plot(predicted.frequency_hz, np.where(predicted.stable, np.nan, amplitude), "C0:", label="unstable")
 left.plot(predicted.fold_frequency_hz, 1e3 * predicted.fold_amplitude_m, "sC1", mfc="w", label="folds")
 left.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm", xlim=(23.8, 25.6))
-left.legend()
+left.legend(loc="upper left")
 
 exact = np.interp(lag, predicted.phase_lag_deg(), predicted.amplitude_m())
 low, high = band.amplitude_m / np.interp(band.phase_lag_deg, predicted.phase_lag_deg(), predicted.amplitude_m()) - 1

@@ -33,3 +33,4 @@ frequency.set(xlabel="displacement amplitude, mm", ylabel="modal frequency, Hz")
 damping.set(xlabel="displacement amplitude, mm", ylabel="modal damping ratio, %")
 frequency.legend()
 plt.show()
+# sphinx_gallery_thumbnail_number = -1

@@ -41,3 +41,4 @@ right.plot(truth.frequency_hz, lag, lw=4, alpha=0.4)
 right.plot(measured.frequency_hz, measured.phase_lag_deg, "C1")
 right.set(xlabel="frequency, Hz", ylabel="phase lag, deg")
 plt.show()
+# sphinx_gallery_thumbnail_number = -1

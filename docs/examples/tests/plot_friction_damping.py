@@ -14,7 +14,7 @@ from simulators.analysis import hysteresis_loops, phase_resonance_backbone
 
 mode = identification.nonlinear_mode(rig.run("friction-beam/backbone-short").backbone())
 virtual = make_daq(rig.load_bench("friction-beam")).rig
-truth = phase_resonance_backbone(virtual, amplitudes_m=mode.amplitude_m[::3])
+truth = phase_resonance_backbone(virtual, amplitudes_m=mode.amplitude_m[2::4])
 
 figure, (damping, loop) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
 x = 1e6 * mode.amplitude_m
@@ -24,7 +24,7 @@ damping.set(xlabel="displacement amplitude, µm", ylabel="modal damping ratio, %
 damping.legend()
 
 # Why: the hysteresis of one joint at three levels. Its area is the energy that is lost in a period.
-for point in (0, 2, 4):
+for point in (0, 1, 3):
     found = hysteresis_loops(virtual, truth, point)[0]
     size = f"{1e6 * truth.amplitude_m[point]:.0f} µm"
     loop.plot(found.coordinate / abs(found.coordinate).max(), found.force / abs(found.force).max(), label=size)

@@ -36,3 +36,4 @@ axis.semilogy(response.frequency_hz, response.noise_std, label="noise")
 axis.set(xlabel="frequency, Hz", ylabel="acceleration over force, (m/s²)/N")
 axis.legend()
 plt.show()
+# sphinx_gallery_thumbnail_number = -1

@@ -33,3 +33,4 @@ axis.plot(measured.frequency_hz, 1e3 * measured.amplitude_m, "oC1--", lw=0.8, la
 axis.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm", xlim=(24.2, 24.9))
 axis.legend()
 plt.show()
+# sphinx_gallery_thumbnail_number = -1

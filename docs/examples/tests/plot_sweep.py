@@ -34,3 +34,4 @@ for run, label in ((up, "sweep up"), (down, "sweep down")):
 axis.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm", xlim=(23.8, 25.6))
 axis.legend()
 plt.show()
+# sphinx_gallery_thumbnail_number = -1

@@ -32,3 +32,4 @@ force.set(xlabel="frequency, Hz", ylabel="force, N", xlim=(23.5, 26.5))
 motion.set(xlabel="frequency, Hz", ylabel="displacement amplitude, mm", xlim=(23.5, 26.5))
 force.legend()
 plt.show()
+# sphinx_gallery_thumbnail_number = -1

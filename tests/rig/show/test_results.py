@@ -55,7 +55,7 @@ def mode():
 
 def test_a_mode_shows_every_point_with_units_and_intervals(mode):
     shown = read(mode._repr_html_())
-    assert shown.tags == {"div", "p", "table", "thead", "tbody", "tr", "th", "td"}
+    assert shown.tags == {"div", "p", "br", "table", "thead", "tbody", "tr", "th", "td"}
     assert {"modal frequency Hz", "+-", "damping %"} <= set(shown.cells)
     assert all(f"{value:.4f}" in shown.cells for value in mode.modal_frequency_hz)
 
