@@ -36,9 +36,12 @@ def plot_(
     from rig.figures.curves import View
     from rig.figures.files import plot
 
-    restyle(style, size_mm=_size_mm(size))
     view = View(amplitude, channel, harmonic, _limits_hz(frequency))
-    plot(files, output, lateness=lateness, labels=label or (), view=None if view == View() else view)
+    restyle(style, size_mm=_size_mm(size))
+    try:
+        plot(files, output, lateness=lateness, labels=label or (), view=None if view == View() else view)
+    finally:
+        restyle()
 
 
 def _size_mm(text: str) -> tuple[float, float | None] | None:

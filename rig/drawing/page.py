@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rig.drawing.style import STYLE, height_is_free, page_in
+from rig.drawing.style import STYLE, height_is_free, page_in, rc
 from rig.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["NARROW_IN", "grid", "legend_below", "page_for", "svg_of"]
+__all__ = ["NARROW_IN", "columns_for", "grid", "legend_below", "page_for", "svg_of", "text_below"]
 
 NARROW_IN = 5.0
 """On narrower pages panels stand below one another."""
 _WIDE = 1.6
 """On pages whose width is more than this times their height, three rows of two panels become two rows of three."""
-_PANEL_IN, _MOST_IN = 1.65, 8.9
-"""Height of a panel on a narrow page, and of all panels together: the column of a journal."""
+_PANEL_IN, _TITLE_IN, _MOST_IN = 1.6, 0.3, 8.9
+"""Heights on a narrow page: of a panel, of the title, and of the column of a journal, which is the most."""
 
 
 @contextmanager
@@ -86,9 +86,9 @@ def grid(
     width, height = page.get_figwidth(), page.get_figheight()
     if width < NARROW_IN:
         count = rows * columns
+        ratios = [ratio for ratio in height_ratios or [1.0] * rows for _ in range(columns)]
         if height_is_free():
-            page.set_figheight(min(count * _PANEL_IN, _MOST_IN))
-        ratios = None if height_ratios is None else [ratio for ratio in height_ratios for _ in range(columns)]
+            page.set_figheight(min(_PANEL_IN * sum(ratios) / min(ratios) + _TITLE_IN, _MOST_IN))
         axes = page.subplots(count, 1, sharex=sharex, squeeze=False, height_ratios=ratios)
         return np.asarray(axes).reshape(rows, columns, order="F" if down_columns else "C")
     if rows > columns > 1 and width > _WIDE * height and height_ratios is None:
@@ -101,25 +101,68 @@ def legend_below(page: "Figure", *panels: "Axes", handles: Sequence["Artist"] = 
 
     It names each thing that the ``panels`` label once, or the ``handles``. Names are not read as formulas.
     """
-    import matplotlib as mpl
-    from matplotlib.font_manager import FontProperties
-
     found = [*handles, *(handle for panel in panels for handle in panel.get_legend_handles_labels()[0])]
     entries = {str(handle.get_label()): handle for handle in reversed(found)}
     names = list(dict.fromkeys(str(handle.get_label()) for handle in found))
     if not names:
         return
-    points = FontProperties(size=mpl.rcParams["legend.fontsize"]).get_size_in_points()
-    entry_in = points * (0.55 * max(map(len, names)) + 5.0) / 72.0
-    columns = min(len(names), max(1, int(page.get_figwidth() / entry_in)))
+    columns = columns_for(names, page.get_figwidth())
     legend = page.legend(handles=[entries[name] for name in names], loc="outside lower left", ncols=columns)
     for text in legend.get_texts():
         text.set_parse_math(False)
+    _grow(page, 1.6 * _points("legend.fontsize") / 72.0 * -(-len(names) // columns))
+
+
+def text_below(page: "Figure", text: str) -> None:
+    """Write a text below all panels, in as many lines as it needs."""
+    page.supxlabel(text, x=0.01, ha="left", parse_math=False, wrap=True)
+    points = _points("figure.labelsize")
+    _grow(page, 1.4 * points / 72.0 * np.ceil(0.55 * points / 72.0 * len(text) / page.get_figwidth()))
+
+
+def _grow(page: "Figure", by_in: float) -> None:
+    """Make room on a narrow page whose height is free."""
+    if height_is_free() and page.get_figwidth() < NARROW_IN:
+        page.set_figheight(page.get_figheight() + by_in)
+
+
+def columns_for(names: Sequence[str], width_in: float) -> int:
+    """Return how many entries of a legend fit beside one another into a width (inches)."""
+    entry_in = _points("legend.fontsize") * (0.55 * max(map(len, names)) + 5.0) / 72.0
+    return min(len(names), max(1, int(width_in / entry_in)))
+
+
+def _points(setting: str) -> float:
+    """Return a size of fonts, points."""
+    from matplotlib.font_manager import FontProperties
+
+    return float(FontProperties(size=rc(setting)).get_size_in_points())
 
 
 def _lay_out(page: "Figure") -> None:
-    """Lay out the page once; with a layout engine, savefig would draw all of it a second time."""
+    """Lay out the page once; with a layout engine, savefig would draw all of it a second time.
+
+    Labels that are longer than their axes are broken into two lines, which takes a second time.
+    """
     engine = page.get_layout_engine()
     if engine is not None and page.axes:
         engine.execute(page)
+        if _break_labels(page):
+            engine.execute(page)
     page.set_layout_engine(None)
+
+
+def _break_labels(page: "Figure") -> bool:
+    """Break vertical labels that are longer than their axes into two lines; return whether there were any."""
+    from matplotlib.axes import Axes
+
+    broken = False
+    for axis in page.findobj(Axes):
+        label = axis.yaxis.label
+        words = label.get_text().split()
+        if len(words) < 2 or "\n" in label.get_text() or label.get_window_extent().height <= axis.bbox.height:
+            continue
+        lines = [(" ".join(words[:n]), " ".join(words[n:])) for n in range(1, len(words))]
+        label.set_text("\n".join(min(lines, key=lambda pair: max(map(len, pair)))))
+        broken = True
+    return broken

@@ -81,6 +81,7 @@ PRESETS = {
             "ytick.labelsize": 6.5,
             "axes.titlesize": 7.5,
             "figure.titlesize": 7.5,
+            "figure.labelsize": 7.5,
             "axes.linewidth": 0.6,
             "lines.linewidth": 0.9,
             "lines.markersize": 2.8,
@@ -99,6 +100,7 @@ PRESETS = {
             "ytick.labelsize": 13.0,
             "axes.titlesize": 15.0,
             "figure.titlesize": 18.0,
+            "figure.labelsize": 15.0,
             "axes.linewidth": 1.1,
             "lines.linewidth": 2.0,
             "lines.markersize": 6.5,
@@ -114,6 +116,7 @@ _COMMON: dict[str, Any] = {
     "legend.fontsize": 8,
     "axes.titlesize": 9,
     "figure.titlesize": 11,
+    "figure.labelsize": 9,
     "axes.titlelocation": "left",
     "axes.grid": True,
     "axes.spines.top": False,
@@ -246,17 +249,20 @@ def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float 
 
     To be called after the data are drawn.
     """
-    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+    from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter, NullLocator, StrMethodFormatter
 
     axis.set(**{f"{which}scale": "log"})
     low, high = getattr(axis, f"get_{which}lim")()
     if high < least_span * low:
-        widen = np.sqrt(least_span * low / high)
-        low, high = low / widen, high * widen
+        factor = np.sqrt(least_span * low / high)
+        low, high = low / factor, high * factor
         axis.set(**{f"{which}lim": (low, high)})
     ticks = getattr(axis, f"{which}axis")
     ticks.set_minor_formatter(NullFormatter())
-    if high < 300.0 * low:
+    if high < 6.0 * low:
+        ticks.set_major_locator(AutoLocator())
+        ticks.set_minor_locator(NullLocator())
+    elif high < 300.0 * low:
         ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     if low >= 1e-3 and high <= 1e4:
         ticks.set_major_formatter(StrMethodFormatter("{x:g}"))

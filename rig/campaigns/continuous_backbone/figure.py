@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, OneWay
-from rig.campaigns.evaluation.figure import draw_history, heading, why_none
+from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_none
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, log_axis, say_why_empty
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, log_axis, say_why_empty, widen
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["draw", "draw_detuning", "draw_differences", "draw_ways"]
+
+LEAST_DETUNING = 0.002
+"""Smallest detuning, relative, at which its axis ends."""
 
 Measured = Point[ContinuousBackboneResult]
 
@@ -30,6 +33,8 @@ class _Quantity(NamedTuple):
     mean: Callable[[Modal], float | None]
     std: Callable[[Modal], float | None]
     way: Callable[[OneWay], float]
+    least_span: float
+    """Smallest part of the value that its axis spans: less would show scatter as if it were a change."""
 
 
 _QUANTITIES = (
@@ -39,6 +44,7 @@ _QUANTITIES = (
         lambda modal: modal.modal_frequency_hz,
         lambda modal: modal.modal_frequency_std_hz,
         lambda way: way.modal_frequency_hz,
+        1e-3,
     ),
     _Quantity(
         "modal damping ratio, %",
@@ -46,6 +52,7 @@ _QUANTITIES = (
         lambda modal: modal.damping_ratio,
         lambda modal: modal.damping_ratio_std,
         lambda way: way.damping_ratio,
+        0.1,
     ),
 )
 
@@ -68,8 +75,11 @@ def draw(page: "Figure", recording: Recording) -> None:
     The phase error of the loop is not drawn: while the level is ramped, the lag swings by more than 180 deg and says nothing of
     a point. What counts is the detuning.
     """
-    axes = grid(page, 3, 2)
     points = points_of(recording, ContinuousBackboneResult)
+    if not any(point.evaluated for point in points):
+        draw_failure(page, recording)
+        return
+    axes = grid(page, 3, 2)
     draw_ways(axes[0], points)
     draw_differences(axes[1], points)
     draw_history(axes[2, 0], None, recording)
@@ -84,17 +94,16 @@ def draw_detuning(axis: "Axes", points: Sequence[Measured], accepted: float) -> 
     ``accepted`` (relative) is drawn where it is near.
     """
     for some, scale_m, _ in _repeats(axis, points, "largest detuning, %"):
-        values = np.array([_detuning(point) for point in some])
-        for accepted_ones, style in (
-            (True, {"marker": "o", "color": MAIN}),
-            (False, {"marker": "x", "color": REJECTED}),
-        ):
-            shown = [point for point in some if point.accepted == accepted_ones]
-            _line(axis, shown, scale_m, 100.0 * values[[point in shown for point in some]], None, ls="", **style)
-        if np.nanmax(np.abs(values), initial=0.0) > 0.5 * accepted:
-            for limit in (-accepted, accepted):
-                axis.axhline(100.0 * limit, color=REJECTED, lw=0.8, ls="--")
-        axis.axhline(0.0, color=REJECTED, lw=0.8)
+        for used, style in ((True, {"marker": "o", "color": MAIN}), (False, {"marker": "x", "color": REJECTED})):
+            shown = [point for point in some if point.accepted == used]
+            _line(axis, shown, scale_m, [100.0 * _detuning(point) for point in shown], None, ls="", **style)
+    largest = float(np.nanmax([LEAST_DETUNING, *(abs(_detuning(point)) for point in points)]))
+    if largest > 0.5 * accepted:
+        largest = max(largest, accepted)
+        for limit in (-accepted, accepted):
+            axis.axhline(100.0 * limit, color=REJECTED, lw=0.8, ls="--")
+    axis.axhline(0.0, color=REJECTED, lw=0.8)
+    axis.set_ylim(-115.0 * largest, 115.0 * largest)
 
 
 def _detuning(point: Measured) -> float:
@@ -132,6 +141,8 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
             out = [point for point in some if not point.accepted]
             values = _values(out, quantity.mean, quantity.scale)
             _line(axis, out, scale_m, values, "not accepted" if said else None, marker="x", ls="", color=REJECTED)
+    for axis, quantity in zip(axes, _QUANTITIES, strict=True):
+        widen(axis, quantity.least_span)
     if axes[1].get_legend_handles_labels()[0]:
         axes[1].legend()
 
@@ -146,7 +157,9 @@ def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None
             for way in _WAYS:
                 found = [one for point in both if (one := way.of(result_of(point))) is not None]
                 values = 100.0 * (np.array([quantity.way(one) for one in found]) / mean - 1.0)
-                _line(axis, both, scale_m, values, None, marker=way.marker, ls=":", color=way.colour)
+                _line(axis, both, scale_m, values, None, marker=way.marker, mfc="none", ls=":", color=way.colour)
+        least = 10.0 * quantity.least_span
+        axis.set_ylim(min(-least, axis.get_ylim()[0]), max(least, axis.get_ylim()[1]))
 
 
 def _values(points: Sequence[Measured], of: Callable[[Modal], float | None], scale: float = 1.0) -> np.ndarray:

@@ -60,7 +60,7 @@ CONTINUOUS_BACKBONE_COLUMNS = (
     Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
     Column("damping_ratio_std", "+-", "%", ".4f", 196.0),
     Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
-    Column("phase_error_deg", "phase error", "deg", ".1f"),
+    Column("phase_error_deg", "off resonance", "deg", ".1f"),
     *PURITY_COLUMNS,
 )
 
@@ -103,8 +103,8 @@ class _Together:
     """Names of these ways."""
     found: ContinuousBackbone
     """The identified backbone. If there was a single way, it is used in both places."""
-    flow: SlowFlow
-    """The slow flow of both ways."""
+    flows: tuple[SlowFlow, ...]
+    """The instants of these ways that were used."""
     missing: str
     """Why a way is missing; empty if none is."""
 
@@ -125,7 +125,7 @@ def measure_continuous_backbone(
     try:
         flow = recorded_flow(bench, rows, plan.harmonics, plan.plant)
         ways = both_ways(bench, plan, rows, passages, flow, ended)
-        points = _measured(bench, plan, targets, flow, ways, rows)
+        points = _measured(bench, plan, targets, ways, rows)
     except (IdentificationError, ArithmeticError) as error:
         return [replace(not_evaluated(plan, target, error, settled=False), direction="both") for target in targets]
     return [points[target.number] for target in targets]
@@ -135,7 +135,6 @@ def _measured(
     bench: Bench,
     plan: ContinuousBackbonePlan,
     targets: Sequence[Target],
-    flow: SlowFlow,
     ways: Mapping[str, Way],
     rows: np.ndarray,
 ) -> dict[int, Point[ContinuousBackboneResult]]:
@@ -158,7 +157,7 @@ def _measured(
             bandwidth=plan.bandwidth,
             specimen=bench.specimen.name,
         )
-        together = _Together(covered, found, flow, missing)
+        together = _Together(covered, found, tuple(flows), missing)
         for index, target in enumerate(some):
             near = [rows_near(bench, rows, ways[name], target.level) for name in covered]
             out[target.number] = _point(bench, plan, target, together, index, near)
@@ -204,9 +203,10 @@ def _point(
             alien_objection(alien, plan.accepted_alien_force),
         )
     )
-    near = np.abs(np.log(together.flow.amplitude_m / target.level)) < plan.bandwidth
+    near = np.abs(np.log(np.concatenate([flow.amplitude_m for flow in together.flows]) / target.level)) < plan.bandwidth
+    momentary = np.concatenate([flow.frequency_hz for flow in together.flows])[near]
     # The lag oscillates while the level is ramped. Report the lag that a settled vibration at this detuning would have.
-    lags = np.degrees(np.arctan((together.flow.frequency_hz[near] / frequency - 1.0) / abs(damping)))
+    lags = np.degrees(np.arctan((momentary / frequency - 1.0) / abs(damping)))
     ways = {name: _one_way(found, WAYS.index(name) if len(covered) == 2 else 0, index) for name in covered}
     rows = np.concatenate(pieces)
     point = replace(

@@ -10,7 +10,7 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
-from rig.drawing.page import grid
+from rig.drawing.page import grid, text_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, rc, say_why_empty, title
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
@@ -57,11 +57,17 @@ def heading(page: "Figure", recording: Recording) -> None:
 
 
 def draw_failure(page: "Figure", recording: Recording) -> None:
-    """Draw what there is of a recording without an accepted point: why there is none, and the history of the loop."""
-    axes = grid(page, 1, 2)[0]
-    draw_history(axes[0], axes[1], recording)
+    """Draw what there is of a recording without an accepted point: why there is none, and the history of the loop.
+
+    The phase error is drawn if a loop controlled the phase.
+    """
+    phase = any(np.isfinite(part.rows("phase_error_rad")).any() for part in recording.parts)
+    axes = grid(page, 1, 2 if phase else 1)[0]
+    draw_history(axes[0], axes[1] if phase else None, recording)
     heading(page, recording)
-    page.text(0.01, 0.0, f"Nothing else to draw: {why_none(points_of(recording))}", va="bottom", wrap=True)
+    why = f"Nothing else to draw: {why_none(points_of(recording))}"
+    ended = [str(part.end["text"]) for part in recording.parts if part.end is not None and part.end.get("text")]
+    text_below(page, why if not ended or ended[-1] in why else f"{why}; the run ended: {ended[-1]}")
 
 
 def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) -> None:

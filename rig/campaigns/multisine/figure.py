@@ -9,7 +9,7 @@ from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.multisine.points import recorded_spectra
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, rc, say_why_empty, unit_text
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, log_axis, rc, say_why_empty, unit_text
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
@@ -57,7 +57,7 @@ def draw_multisine(
         axes[0, 1], axes[1, 1], spectra.frequency_response(response, instrument=voltage), f"{response} over {force}"
     )
     _coherence(axes[2, 1], spectra, response, force)
-    legend_below(page, axes[1, 0], axes[0, 1])
+    legend_below(page, *axes[:, 0], axes[0, 1])
     heading(page, title)
 
 
@@ -84,10 +84,7 @@ def _spectrum(axis: "Axes", spectra: PeriodicSpectra, name: str, text: str) -> N
     if np.any(noise > floor):
         axis.semilogy(spectra.frequency_hz, noise, color=REJECTED, label="noise")
     axis.set(xlabel="frequency, Hz", ylabel=f"{text}, {unit_text(spectra.channels[row].unit)}")
-    lowest, highest = axis.get_ylim()
-    if highest < 10.0 * lowest:  # a flat spectrum stays flat
-        axis.set_ylim(lowest / 3.0, 3.0 * highest)
-    axis.yaxis.set_minor_formatter("")
+    log_axis(axis, least_span=10.0)  # a flat spectrum stays flat
 
 
 def _response(size: "Axes", phase: "Axes", measured: InstrumentResponse, text: str) -> None:
@@ -110,6 +107,6 @@ def _coherence(axis: "Axes", spectra: PeriodicSpectra, response: str, force: str
     try:
         found = coherence(spectra, response, force)
     except IdentificationError:
-        say_why_empty(axis, "coherence needs more than one period")
+        say_why_empty(axis, "coherence needs more\nthan one period")
         return
     axis.plot(spectra.frequency_hz[spectra.excited], found, ".-", color=MAIN)

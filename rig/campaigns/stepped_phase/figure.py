@@ -31,7 +31,6 @@ def draw(page: "Figure", recording: Recording) -> None:
     draw_stepped_phase(
         page,
         recorded_frequency_responses(recording),
-        held="RMS of the force" if recording.configuration["plan"].get("levels_rms_n") else "",
         title=describe(recording, "stepped phase"),
         lags_deg=sorted({(point.asked_phase_lag_deg or 0.0) + 180.0 for point in points_of(recording)}),
     )
@@ -41,7 +40,6 @@ def draw_stepped_phase(
     page: "Figure",
     responses: Sequence[FrequencyResponse],
     *,
-    held: str = "",
     title: str = "",
     lags_deg: Sequence[float] = (),
 ) -> None:
@@ -50,7 +48,7 @@ def draw_stepped_phase(
     ``page`` is an empty figure, about 9 by 6.4 inches. Points are joined in the order of measurement, so the line runs back
     where the response folds over; there it is dotted (`rig.drawing.folding.folds_back`). The line is interrupted where a
     requested lag (``lags_deg``) was not measured. The point nearest to phase resonance is filled. If the force was controlled,
-    its level is a dashed line. If another quantity was ``held``, the title names it.
+    its level is a dashed line.
     """
     amplitude, lag, force = _panels(page)
     micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
@@ -81,7 +79,7 @@ def draw_stepped_phase(
     for axis in (lag, force):
         axis.set_xlim(amplitude.get_xlim())
     legend_below(page, amplitude)
-    heading(page, title + (f" (levels: {held})" if held else ""))
+    heading(page, title)
 
 
 def _panels(page: "Figure") -> tuple["Axes", "Axes", "Axes"]:
@@ -111,16 +109,11 @@ def _branch(
     label: str | None = None,
 ) -> None:
     """Draw one level in the order of measurement: dotted where it folds back, with its resonant point filled."""
-    folded = folds_back(item.frequency_hz, item.phase_lag_deg)
-    joined = np.ones(folded.size, bool)
-    joined[gaps - 1] = False
-    for line, which in (("-", joined & ~folded), (":", joined & folded)):
-        ends = np.flatnonzero(which)
-        x, y = (
-            np.stack([one[ends], one[ends + 1], np.full(ends.size, np.nan)], axis=1)
-            for one in (item.frequency_hz, values)
-        )
-        axis.plot(x.ravel(), y.ravel(), line, color=colour)
+    folded = np.flatnonzero(folds_back(item.frequency_hz, item.phase_lag_deg)) + 1
+    stable = np.setdiff1d(np.arange(1, values.size), folded)
+    for line, elsewhere in (("-", folded), (":", stable)):
+        breaks = np.union1d(gaps, elsewhere).astype(np.intp)
+        axis.plot(np.insert(item.frequency_hz, breaks, np.nan), np.insert(values, breaks, np.nan), line, color=colour)
     axis.plot(item.frequency_hz, values, "o", mfc="white", color=colour)
     if label is not None:
         axis.plot([], [], "o-", mfc="white", color=colour, label=label)

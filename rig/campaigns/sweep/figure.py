@@ -12,7 +12,7 @@ from rig.campaigns.evaluation.recorded import point_rows, points_of, specimen_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
-from rig.drawing.page import NARROW_IN, grid
+from rig.drawing.page import columns_for, grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
@@ -95,7 +95,8 @@ def draw_sweep(
         _mark_drop_out(axes[1], axes[2], drop_out)
     above = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "borderaxespad": 0.0, "columnspacing": 1.0}
     for axis in axes[1:]:
-        axis.legend(ncols=4 if page.get_figwidth() > NARROW_IN else 2, handlelength=1.4, **above)
+        names = axis.get_legend_handles_labels()[1]
+        axis.legend(ncols=columns_for(names, 0.85 * page.get_figwidth()), handlelength=1.4, **above)
     axes[3].set(xlabel="time, s", xlim=(0.0, samples.shape[1] / sample_rate_hz))
     heading(page, title)
 

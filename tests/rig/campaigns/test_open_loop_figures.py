@@ -86,7 +86,7 @@ def test_stepped_sines_show_accelerance_whatever_was_measured(page: Figure) -> N
     texts = rendered(page)
     accelerance = [line.get_ydata() for line in page.axes[3].get_lines()]
     np.testing.assert_allclose(accelerance, [np.full(11, 3e-3), np.full(11, 4e-3)], rtol=1e-12)
-    for text in ("force, N", "displacement amplitude, µm", "accelerance, 1/kg", "0.5 V", "1.5 V"):
+    for text in ("fundamental force, N", "displacement amplitude, µm", "accelerance, (m/s²)/N", "0.5 V", "1.5 V"):
         assert text in texts
 
 
@@ -106,18 +106,32 @@ def test_a_multisine_shows_lines_noise_and_frequency_response(page: Figure, grid
     spectra = measured_multisine(grid)
     draw_multisine(page, spectra, title="a beam: multisine")
     texts = rendered(page)
-    voltage, force, _, size, phase = page.axes
+    voltage, size, force, phase, drive, linear = page.axes
     excited = {"full": 11, "odd": 5, "odd-random": 4}[grid]
-    np.testing.assert_allclose(lines(voltage)["excited"][:, 1], np.sqrt(2 / excited), rtol=1e-9)
-    assert set(lines(voltage)) == {"excited"}  # what is commanded has no noise
+    np.testing.assert_allclose(lines(voltage)["excited lines"][:, 1], np.sqrt(2 / excited), rtol=1e-9)
+    assert set(lines(voltage)) == {"excited lines"}  # what is commanded has no noise
     expected_noise = 2 * 0.01 / np.sqrt(200 * 4)
     assert np.mean(lines(force)["noise"][:, 1]) == pytest.approx(expected_noise, rel=0.3)
     np.testing.assert_allclose(lines(size)["drive over force"][:, 1], 3.0, rtol=0.5)
     assert np.max(np.abs(phase.get_lines()[0].get_ydata())) < 90.0
-    assert ("even, not excited" in lines(page.axes[2])) == (grid != "full")
-    assert ("odd, not excited" in lines(page.axes[2])) == (grid == "odd-random")
-    for text in ("a beam: multisine", "frequency response, 1/kg", "amplitude, mean of 3 × 4 periods"):
+    assert ("even lines, not excited" in lines(drive)) == (grid != "full")
+    assert ("odd lines, not excited" in lines(drive)) == (grid == "odd-random")
+    u, y = (spectra.spectra[:, :, row][..., spectra.excited].reshape(12, -1) for row in (1, 2))
+    cross = np.abs(np.sum(y * np.conj(u), axis=0)) ** 2
+    expected = cross / np.sum(np.abs(u) ** 2, axis=0) / np.sum(np.abs(y) ** 2, axis=0)
+    np.testing.assert_allclose(linear.get_lines()[0].get_ydata(), expected, rtol=1e-9)
+    assert (expected.min() < 1.0 - 1e-9) == (grid == "full")  # an even distortion is not on odd lines
+    for text in ("a beam: multisine", "drive over force, (m/s²)/N", "coherence, drive–force"):
         assert text in texts
+
+
+def test_a_coherence_of_a_single_period_is_not_shown(page: Figure) -> None:
+    design = MultisineDesign(1000.0, 200, 50.0, 100.0, "full")
+    voltage = design.realisation(0, 0)
+    spectra = periodic_spectra([np.array([voltage, 2.0 * voltage, 3.0 * voltage])], CHANNELS, design)
+    draw_multisine(page, spectra)
+    assert "coherence needs more\nthan one period" in rendered(page)
+    assert not page.axes[5].get_lines()
 
 
 def test_points_of_a_stepped_sine_that_a_jump_parts_are_joined_by_dots(page: Figure) -> None:
@@ -128,6 +142,7 @@ def test_points_of_a_stepped_sine_that_a_jump_parts_are_joined_by_dots(page: Fig
     assert "0.5 N" in rendered(page)
     for axis in page.axes:
         dots = [np.asarray(line.get_xdata()) for line in axis.get_lines() if line.get_linestyle() == ":"]
+        dots = [dotted for dotted in dots if dotted.size]  # one stands in the legend
         np.testing.assert_array_equal(dots, [[24.1, 24.2]])
     drawn = np.asarray(page.axes[1].get_lines()[0].get_ydata())
     np.testing.assert_allclose(drawn, [1.0, 1.2, np.nan, 0.3, 0.25])

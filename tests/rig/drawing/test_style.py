@@ -137,7 +137,7 @@ def test_panels_stand_below_one_another_on_a_column_and_side_by_side_on_a_slide(
     assert len({y for _, y in screen}) == 3
     restyle("paper")
     (width, height), column = arranged(file, 2, 2)
-    assert (width, height) == pytest.approx((85.0 / 25.4, 4 * 1.65))
+    assert (width, height) == pytest.approx((85.0 / 25.4, 4 * 1.6 + 0.3))
     assert len({x for x, _ in column}) == 1
     assert [y for _, y in column] == sorted((y for _, y in column), reverse=True)
     restyle("paper", size_mm=(85.0, 100.0))
