@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         PnlssErrors,
         error_spectra,
         estimated_initial_state,
+        output_stretch,
         pnlss_errors,
         simulated_run,
     )
@@ -69,7 +70,7 @@ if TYPE_CHECKING:
     from identification.prediction.predictions import Predictions
     from identification.prediction.properties import ExtrapolationError, ModalProperties
     from identification.prediction.recorded_force import recorded_force_response
-    from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun
+    from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
     from identification.prediction.steady_prediction import SteadyPrediction
     from identification.prediction.sweep_inputs import VoltageSweep
     from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
@@ -124,6 +125,7 @@ else:
             "MultisineMapping": "mapping.multisine",
             "NonlinearMode": "nonlinear.nonlinear_modes",
             "NonlinearModeMapping": "mapping.nonlinear_mode",
+            "OutputStretch": "prediction.simulated_runs",
             "PeriodicSpectra": "multisine.spectra",
             "PeriodicVibration": "measurements",
             "PnlssErrors": "pnlss.errors",
@@ -182,6 +184,7 @@ else:
             "map_pnlss": "mapping.pnlss",
             "map_response_matrix": "mapping.response_matrix",
             "nonlinear_mode": "nonlinear.phase_resonance",
+            "output_stretch": "pnlss.errors",
             "pack_frequency_responses": "frequency_responses",
             "periodic_spectra": "multisine.spectra",
             "periodic_vibration": "signals.fourier",
@@ -244,6 +247,7 @@ __all__ = [
     "MultisineMapping",
     "NonlinearMode",
     "NonlinearModeMapping",
+    "OutputStretch",
     "PeriodicSpectra",
     "PeriodicVibration",
     "PnlssErrors",
@@ -302,6 +306,7 @@ __all__ = [
     "map_pnlss",
     "map_response_matrix",
     "nonlinear_mode",
+    "output_stretch",
     "pack_frequency_responses",
     "periodic_spectra",
     "periodic_vibration",

@@ -14,10 +14,10 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulation import Simulation
-from identification.prediction.simulated_runs import ErrorSpectra, SimulatedRun
+from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 from identification.validation import read_only
 
-__all__ = ["PnlssErrors", "error_spectra", "estimated_initial_state", "pnlss_errors", "simulated_run"]
+__all__ = ["PnlssErrors", "error_spectra", "estimated_initial_state", "output_stretch", "pnlss_errors", "simulated_run"]
 
 Float = NDArray[np.float64]
 
@@ -135,7 +135,7 @@ def simulated_run(
 
 
 def error_spectra(model: PnlssModel, linear: PnlssModel | None, experiment: Experiment) -> ErrorSpectra:
-    """Return amplitudes by line of a periodic experiment: the measurement, and the errors of a model and its linear start.
+    """Return amplitudes by line of a periodic experiment: measurement, noise, model, errors of the model and its linear start.
 
     Raises `IdentificationError` for an experiment that is not periodic.
     """
@@ -147,20 +147,48 @@ def error_spectra(model: PnlssModel, linear: PnlssModel | None, experiment: Expe
         mean = values.reshape(values.shape[0], -1, period).mean(axis=1)
         return np.abs(np.fft.rfft(mean, axis=1))[:, 1 : (period + 1) // 2] * (2.0 / period)
 
-    def error(one: PnlssModel | None) -> Float:
+    def output(one: PnlssModel | None) -> Float:
         run = None if one is None else _simulated(one, experiment, None)
         if run is None or not run.bounded:
-            return np.full(measured.shape, np.nan)
-        return lines(run.outputs[:, experiment.counted_from :] - experiment.counted_outputs)
+            return np.full(experiment.counted_outputs.shape, np.nan)
+        return run.outputs[:, experiment.counted_from :]
 
-    measured = lines(experiment.counted_outputs)
+    measured, simulated = lines(experiment.counted_outputs), output(model)
     return ErrorSpectra(
         name=experiment.name,
         outputs=tuple(channel.name for channel in experiment.output_channels),
         frequency_hz=np.arange(1, measured.shape[1] + 1) * experiment.sample_rate_hz / period,
         measured=measured,
-        linear_error=error(linear),
-        error=error(model),
+        linear_error=lines(output(linear) - experiment.counted_outputs),
+        error=lines(simulated - experiment.counted_outputs),
+        model=lines(simulated),
+        noise=np.full(measured.shape, np.nan) if experiment.output_noise is None else experiment.output_noise,
+    )
+
+
+def output_stretch(
+    model: PnlssModel, experiment: Experiment, *, samples: int = 400, initial_state: Float | None = None
+) -> OutputStretch:
+    """Return at most ``samples`` samples around the largest measured value of the first output, and the model's outputs there.
+
+    The run begins from rest or from ``initial_state``, which is estimated if the experiment requires it. Raises
+    `IdentificationError` if channels or sample rates of model and experiment differ.
+    """
+    check_channels(model, experiment)
+    run = _simulated(model, experiment, initial_state)
+    largest = experiment.counted_from + int(np.argmax(np.abs(experiment.counted_outputs[0])))
+    last = experiment.outputs.shape[1]
+    first = max(min(largest - samples // 2, last - samples), experiment.counted_from)
+    stop = min(first + samples, last)
+    simulated = np.where(np.isfinite(run.outputs), run.outputs, np.nan)
+    if run.unbounded_at is not None:
+        simulated[:, run.unbounded_at :] = np.nan
+    return OutputStretch(
+        name=experiment.name,
+        outputs=tuple(channel.name for channel in experiment.output_channels),
+        time_s=np.arange(first, stop) / experiment.sample_rate_hz,
+        measured=experiment.outputs[:, first:stop],
+        simulated=simulated[:, first:stop],
     )
 
 

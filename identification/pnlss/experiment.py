@@ -46,6 +46,9 @@ class Experiment:
     excited_hz
         Lowest and highest excited frequency; None if unknown. Frequencies that the structure generates, such as harmonics in
         a measured force, do not count as excited.
+    output_noise
+        float[n_outputs, n_lines], standard errors of the amplitudes (peak) of the outputs' lines 1, 2, ... below half the sample
+        rate, from the scatter of periods that were averaged; None if unknown.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class Experiment:
     level: float = float("nan")
     specimen: str = ""
     excited_hz: tuple[float, float] | None = None
+    output_noise: Float | None = None
 
     def __post_init__(self) -> None:
         for name in ("input_channels", "output_channels"):
@@ -101,6 +105,9 @@ class Experiment:
                 f"{where}period_samples: is {self.period_samples}, the {self.counted} samples that count are no whole "
                 "number of periods"
             )
+        lines = (len(self.outputs), (self.period_samples + 1) // 2 - 1)
+        if self.output_noise is not None and self.period_samples and np.shape(self.output_noise) != lines:
+            raise IdentificationError(f"{where}output_noise: shape {np.shape(self.output_noise)}, needs {lines}")
         if self.excited_hz is not None and not 0.0 <= self.excited_hz[0] < self.excited_hz[1]:
             raise IdentificationError(
                 f"{where}excited_hz: is {self.excited_hz}, needs two rising frequencies, none below zero"

@@ -24,7 +24,7 @@ from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 from vibrolock.results import Result
 
-__all__ = ["PARAMETERS", "Exciter", "VoltagePath"]
+__all__ = ["PARAMETERS", "Exciter", "ExciterLines", "VoltagePath"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -84,6 +84,33 @@ class VoltagePath:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class ExciterLines:
+    """Measured lines with which an exciter was identified, as means over the realisations.
+
+    Parameters
+    ----------
+    frequency_hz
+        float[n].
+    force_per_volt, acceleration_per_volt
+        complex[n], force (N) and drive-point acceleration (m/s^2) per recorded volt.
+    noise
+        float[n], standard error of the force that the model leaves over, N/V.
+    """
+
+    frequency_hz: Float
+    force_per_volt: Complex
+    acceleration_per_volt: Complex
+    noise: Float
+
+    def __post_init__(self) -> None:
+        for name in ("frequency_hz", "force_per_volt", "acceleration_per_volt", "noise"):
+            kind = np.complex128 if "per_volt" in name else np.float64
+            object.__setattr__(self, name, finite_array(name, getattr(self, name), kind, 1))
+            if getattr(self, name).shape != self.frequency_hz.shape:
+                raise IdentificationError(f"{name}: {getattr(self, name).size} values for {self.frequency_hz.size} lines")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Exciter(Result):
     """Amplifier, exciter and stinger of one rig; the module docstring has the equations.
 
@@ -113,6 +140,8 @@ class Exciter(Result):
         Rig and exciter of the parameters, which are not valid for any other.
     notes
         Remarks on the quality of the parameters, one line each.
+    lines
+        Measured lines of the identification; None if they were not kept.
 
     Raises
     ------
@@ -135,6 +164,7 @@ class Exciter(Result):
     path: VoltagePath = VoltagePath()
     source: str = ""
     notes: tuple[str, ...] = ()
+    lines: ExciterLines | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "notes", tuple(self.notes))
@@ -212,7 +242,8 @@ class Exciter(Result):
         numbers = (self.lowest_hz, self.highest_hz, self.fit_residual)
         path = np.array(astuple(self.path))
         arrays = {"values": self.values, "covariance": np.asarray(self.covariance), "fit": np.array(numbers)}
-        return arrays | {"path": path}, {"source": self.source, "notes": list(self.notes)}
+        kept = {} if self.lines is None else {f"lines/{name}": value for name, value in vars(self.lines).items()}
+        return arrays | {"path": path} | kept, {"source": self.source, "notes": list(self.notes)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Exciter":
@@ -224,6 +255,7 @@ class Exciter(Result):
                     f"exciter: has {values.size} parameters, needs {len(PARAMETERS)} ({', '.join(PARAMETERS)}); "
                     "identify it anew"
                 )
+            kept = {name.removeprefix("lines/"): array for name, array in arrays.items() if name.startswith("lines/")}
             lowest, highest, residual = np.asarray(arrays["fit"], dtype=np.float64).tolist()
             return cls(
                 **dict(zip(PARAMETERS, values.tolist(), strict=True)),
@@ -234,6 +266,7 @@ class Exciter(Result):
                 path=VoltagePath(*np.asarray(arrays["path"], dtype=np.float64).tolist()),
                 source=attributes["source"],
                 notes=tuple(attributes["notes"]),
+                lines=ExciterLines(**kept) if kept else None,
             )
         except IdentificationError:
             raise

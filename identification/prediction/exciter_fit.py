@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.multisine.spectra import PeriodicSpectra
-from identification.prediction.exciter import PARAMETERS, Exciter, VoltagePath
+from identification.prediction.exciter import PARAMETERS, Exciter, ExciterLines, VoltagePath
 from identification.validation import positive
 
 __all__ = ["beside_resonance", "identify_exciter"]
@@ -133,6 +133,7 @@ def identify_exciter(
         path=VoltagePath(rate, *_path(values)),
         source=source,
         notes=notes,
+        lines=data.kept(values),
     )
 
 
@@ -196,6 +197,19 @@ class _Lines:
         variance = np.einsum("ik,kij,jk->k", x, self.noise, np.conj(x)).real
         scaled = error / np.sqrt(0.5 * variance)
         return np.concatenate([scaled.real.ravel(), scaled.imag.ravel()])
+
+    def kept(self, p: Float) -> ExciterLines:
+        """Return force and acceleration per volt, means over the realisations, and the noise of the force left over by ``p``."""
+        x = self.coefficients(p)
+        force, acceleration, voltage = self.signals
+        power = np.sum(np.abs(voltage) ** 2, axis=0)
+        variance = np.einsum("ik,kij,jk->k", x, self.noise, np.conj(x)).real
+        return ExciterLines(
+            frequency_hz=self.frequency_hz,
+            force_per_volt=np.sum(force * np.conj(voltage), axis=0) / power,
+            acceleration_per_volt=np.sum(acceleration * np.conj(voltage), axis=0) / power,
+            noise=np.sqrt(variance / power) / np.abs(x[0]),
+        )
 
 
 def _path(p: Float) -> list[float]:

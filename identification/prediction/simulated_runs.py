@@ -1,6 +1,6 @@
 """Errors of models simulated with the inputs of recorded experiments, and the spectra of these errors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +8,14 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.validation import read_only
 
-__all__ = ["ErrorSpectra", "SimulatedRun"]
+__all__ = ["ErrorSpectra", "OutputStretch", "SimulatedRun"]
 
 Float = NDArray[np.float64]
+
+
+def _unknown() -> Float:
+    """Return NaN, which stands for one NaN per line."""
+    return np.array(np.nan)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,6 +91,10 @@ class ErrorSpectra:
     measured, linear_error, error
         float[n_outputs, n_lines], amplitudes of the measurement, of the error of the linear start, and of the error of the
         model. Errors are NaN if there is no linear start or a run is unbounded.
+    model
+        float[n_outputs, n_lines], amplitudes of the model's outputs; NaN if the run is unbounded or they were not kept.
+    noise
+        float[n_outputs, n_lines], standard errors of the measured amplitudes; NaN if unknown.
     """
 
     name: str
@@ -94,15 +103,53 @@ class ErrorSpectra:
     measured: Float
     linear_error: Float
     error: Float
+    model: Float = field(default_factory=_unknown)
+    noise: Float = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "frequency_hz", read_only(self.frequency_hz, np.float64))
-        for name in ("measured", "linear_error", "error"):
+        for name in ("model", "noise"):
+            if np.ndim(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.full((len(self.outputs), self.frequency_hz.size), np.nan))
+        for name in ("measured", "linear_error", "error", "model", "noise"):
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
             if getattr(self, name).shape != (len(self.outputs), self.frequency_hz.size):
                 raise IdentificationError(
                     f"{name}: shape {getattr(self, name).shape}, needs ({len(self.outputs)}, {self.frequency_hz.size})"
+                )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OutputStretch:
+    """A short stretch of an experiment around its largest output, with what a model simulates there.
+
+    Parameters
+    ----------
+    name
+        Name of the experiment.
+    outputs
+        Names of the outputs.
+    time_s
+        float[n], time since the first sample of the record.
+    measured, simulated
+        float[n_outputs, n], in the units of the outputs; simulated values are NaN after a run became unbounded.
+    """
+
+    name: str
+    outputs: tuple[str, ...]
+    time_s: Float
+    measured: Float
+    simulated: Float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "outputs", tuple(self.outputs))
+        object.__setattr__(self, "time_s", read_only(self.time_s, np.float64))
+        for name in ("measured", "simulated"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+            if getattr(self, name).shape != (len(self.outputs), self.time_s.size):
+                raise IdentificationError(
+                    f"{name}: shape {getattr(self, name).shape}, needs ({len(self.outputs)}, {self.time_s.size})"
                 )
 
 

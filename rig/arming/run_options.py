@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from rig.tick.tick import Tick
 
-__all__ = ["Progress", "RunOptions", "Silent"]
+__all__ = ["Progress", "RemarksOnce", "RunOptions", "Silent"]
 
 LARGEST_SEED = 2**63 - 1
 
@@ -42,6 +42,27 @@ class Silent:
 
     def remark(self, text: str) -> None:
         """Do nothing."""
+
+
+class RemarksOnce:
+    """Passes the events of several runs on to one display, each remark the first time only."""
+
+    def __init__(self, display: Progress) -> None:
+        self._display, self._known = display, set[str]()
+
+    def point(self, point: Any, number: int, total: int) -> None:
+        """Pass it on."""
+        self._display.point(point, number, total)
+
+    def advance(self, rows: "np.ndarray", tick: "Tick") -> None:
+        """Pass it on."""
+        self._display.advance(rows, tick)
+
+    def remark(self, text: str) -> None:
+        """Pass it on unless it was."""
+        if text not in self._known:
+            self._known.add(text)
+            self._display.remark(text)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -99,9 +99,9 @@ def identify_all(
             failures[found.name] = found.reason
         else:
             fits[found.name] = found.fit
-            uses = uses_of(by_name[found.name].training, by_name[found.name].validation)
-            kept = IdentifiedPnlss(model=found.fit.model, fit=found.fit, seconds=found.seconds, uses=uses)
-            save(kept, files[found.name])
+            data = by_name[found.name].training, by_name[found.name].validation
+            kept = IdentifiedPnlss(model=found.fit.model, fit=found.fit, seconds=found.seconds, uses=uses_of(*data))
+            save(kept.on(*data), files[found.name])
         count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
         say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
     return Models(jobs, fits, failures)

@@ -1,14 +1,14 @@
-"""Figure of a tuning: measured and modelled plant, Bode plots of the loops, step responses."""
+"""Figure of a tuning: measured and fitted rig with coherence, open loops with margins, step responses."""
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from controller.tuning import Design
-from rig.drawing.page import page_for
-from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from controller.tuning import Design, Margins
+from rig.drawing.page import grid, page_for
+from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title, unit_text
 from rig.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 
     from rig.tuning import Tuning
 
-__all__ = ["check_figure", "draw_tuning"]
+__all__ = ["check_figure", "draw_on", "draw_tuning"]
 
-DASHES = ("-", "--", ":")
+_STEP = 0.3
+"""Relative change of level whose effect is drawn."""
 
 
 def check_figure(figure: Path, overwrite: bool) -> None:
@@ -41,93 +42,146 @@ def draw_tuning(tuning: "Tuning", figure: Path) -> None:
 
 
 def draw_on(page: "Figure", tuning: "Tuning") -> None:
-    """Draw plant, open loops and step responses on an empty page."""
+    """Draw, from left to right: measured rig and fit; open loops with their margins; how the closed loops settle."""
     designs = (tuning.chosen.design, *tuning.chosen.others)
-    axes = page.subplots(2, 3)
+    axes = grid(page, 2, 3)
     _draw_plant(axes[0, 0], axes[1, 0], tuning)
-    _draw_bode(axes[0, 1], axes[1, 1], designs)
-    _draw_frequency_step(axes[0, 2], designs)
-    _draw_level_step(axes[1, 2], designs)
-    law = tuning.chosen.design.loop
+    _draw_bode(axes[0, 1], axes[1, 1], designs[0])
+    _draw_lag(axes[0, 2], designs)
+    _draw_level(axes[1, 2], designs)
+    law = designs[0].loop
     title(
         page,
         f"{tuning.bench.specimen.name}: tuned at {tuning.test.level_rms_v:.3g} V RMS, law {tuning.chosen.law}, low-pass "
-        f"{tuning.chosen.low_pass_rad_s:.4g} rad/s, locked at {law.omega_rad_s / 2.0 / math.pi:.4g} Hz",
+        f"{tuning.chosen.low_pass_rad_s:.4g} rad/s, locked at {law.omega_rad_s / 2.0 / math.pi:.4g} Hz; coherence "
+        f"{tuning.test.coherence[0]:.5f} (force), {tuning.test.coherence[1]:.5f} (drive)",
     )
 
 
 def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
+    """Draw force and drive acceleration per volt, measured and fitted, and the coherence above the phase."""
     measured, plant = tuning.test.responses, tuning.plant
     fine = np.linspace(*plant.band_hz, 4000)
     s = 2j * np.pi * fine
+    dots: dict[str, Any] = {"ls": "none", "marker": ".", "mew": 0.0, "alpha": 0.4}
+    seen = phase.inset_axes((0.0, 1.12, 1.0, 0.25), sharex=phase)
     models = (plant.force_per_v(s), plant.acceleration_per_v(s))
     for row, (colour, model) in enumerate(zip((MAIN, SECOND), models, strict=True)):
         value, channel = measured.value[:, row, 0], measured.outputs[row]
-        size.semilogy(measured.frequency_hz, np.abs(value), ".", ms=2.5, mew=0.0, alpha=0.4, color=colour)
-        size.semilogy(fine, np.abs(model), color=colour, lw=0.9, label=f"{channel.name}, {channel.unit}/V")
-        phase.plot(measured.frequency_hz, np.degrees(np.angle(value)), ".", ms=2.5, mew=0.0, alpha=0.4, color=colour)
-        phase.plot(fine, _unbroken(np.degrees(np.angle(model))), color=colour, lw=0.9)
+        label = f"{channel.name}, {unit_text(f'{channel.unit}/V')}"
+        size.semilogy(measured.frequency_hz, np.abs(value), color=colour, **dots)
+        size.semilogy(fine, np.abs(model), color=colour, label=label)
+        phase.plot(measured.frequency_hz, np.degrees(np.angle(value)), color=colour, **dots)
+        phase.plot(fine, _unbroken(np.degrees(np.angle(model))), color=colour)
+        noise = measured.noise_std[:, row, 0]
+        seen.plot(measured.frequency_hz, 1.0 / (1.0 + (noise / np.abs(value)) ** 2), color=colour, lw=0.9)
+    size.plot([], [], color=REJECTED, label="measured", **dots)
+    size.axvline(plant.frequency_rad_s / 2.0 / np.pi, color=REJECTED, lw=0.9, ls="--", label="structure")
+    size.axvline(plant.coupled_pole_rad_s.imag / 2.0 / np.pi, color=REJECTED, lw=0.9, ls=":", label="with exciter")
+    size.set(ylabel="response per volt", xlabel="frequency, Hz")
+    _legend_above(size, 2)
+    lowest = min(0.95, seen.get_ylim()[0])
+    seen.set(ylim=(lowest, 1.0 + 0.1 * (1.0 - lowest)), yticks=(lowest, 1.0), yticklabels=(f"{lowest:.2g}", "1"))
+    seen.text(0.98, 0.1, "coherence", ha="right", va="bottom", transform=seen.transAxes)
+    seen.tick_params(labelbottom=False)
+    phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+
+
+def _draw_bode(size: "Axes", phase: "Axes", design: Design) -> None:
+    """Draw the open loops over the modulation frequency, with their margins, at the damping that was measured.
+
+    The amplitude loop has two lines, for changes above and below the vibration's frequency; the phase of the second is
+    mirrored, as the margin counts either sign.
+    """
+    f = design.omega_rad_s / 2.0 / np.pi
+    loops = [(design.frequency_loop_gain, design.frequency_margins, MAIN, "-", "frequency loop")]
+    if design.amplitude_margins is not None:
+        above, below = design.amplitude_loop_gain
+        loops += [(above, design.amplitude_margins, SECOND, "-", "level loop")]
+        loops += [(np.conj(below), design.amplitude_margins, SECOND, "--", "")]
+    for gain, found, colour, line, name in loops:
+        label = f"{name}: {_margin_text(found)}" if name else None
+        size.loglog(f, np.abs(gain), line, color=colour, label=label)
+        phase.semilogx(f, _unbroken(np.degrees(np.angle(gain))), line, color=colour)
+        if name and found.crossover_rad_s > 0.0:
+            for axis in (size, phase):
+                axis.axvline(found.crossover_rad_s / 2.0 / np.pi, color=colour, lw=0.8, ls=":")
+    size.axhline(1.0, color=REJECTED, lw=0.9)
+    phase.axhline(-180.0, color=REJECTED, lw=0.9)
+    shown = f[np.abs(design.frequency_loop_gain) < 1e2]
     for axis in (size, phase):
-        axis.axvline(plant.frequency_rad_s / 2.0 / np.pi, color=REJECTED, lw=0.8, ls="--")
-        axis.axvline(plant.coupled_pole_rad_s.imag / 2.0 / np.pi, color=REJECTED, lw=0.8, ls=":")
-        axis.set(xlabel="frequency, Hz")
-    size.set(ylabel="response to voltage (points: measured)")
-    size.legend(fontsize=8)
-    phase.set(ylabel="phase, deg (grey: structure, with exciter)", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+        axis.set(xlabel="modulation frequency, Hz", xlim=(shown[0], f[-1]) if shown.size else None)
+    size.set(ylabel="open-loop gain", ylim=(1e-2, 1e2))
+    phase.set(ylabel="loop phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+    _legend_above(size, title="margins")
 
 
-def _draw_bode(size: "Axes", phase: "Axes", designs: tuple[Design, ...]) -> None:
-    """Draw the open loops over the frequency of a slow change, relative to the vibration frequency."""
-    for line, design in zip(DASHES, designs, strict=False):
-        share = design.omega_rad_s / design.loop.omega_rad_s
-        loops = [(design.frequency_loop_gain, MAIN, "frequency loop")]
-        if design.amplitude_margins is not None:
-            loops += [(gain, SECOND, "response loop, both sidebands") for gain in design.amplitude_loop_gain]
-        for number, (gain, colour, name) in enumerate(loops):
-            label = name if line == "-" and number < 2 else None
-            size.loglog(share, np.abs(gain), line, color=colour, lw=0.9, label=label)
-            phase.semilogx(share, _unbroken(np.degrees(np.angle(gain))), line, color=colour, lw=0.9)
-    size.axhline(1.0, color="k", lw=0.6)
-    size.set(ylabel="open loop |L|", ylim=(1e-2, 1e2), xlabel="slow frequency / frequency")
-    size.legend(fontsize=8)
-    phase.set(xlabel="slow frequency / frequency", ylabel="phase of L, deg", ylim=(-190, 190))
-    phase.set_yticks((-180, -90, 0, 90, 180))
+def _margin_text(found: Margins) -> str:
+    """Return gain and phase margin in the words of a data sheet."""
+    gain = f"{20.0 * math.log10(found.gain_margin):.0f} dB" if math.isfinite(found.gain_margin) else "any gain"
+    return f"{gain}, {found.phase_margin_deg:.0f} deg"
 
 
-def _draw_frequency_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
-    drawn = 0.0
-    for line, design in zip(DASHES, designs, strict=False):
-        if design.steps is None:
-            continue
-        periods = design.steps.time_s * design.loop.omega_rad_s / 2.0 / np.pi
-        axis.plot(periods, np.degrees(design.steps.lag_after_frequency_rad), line, color=MAIN, label=_label(design))
-        drawn = max(drawn, min(2.0 * design.settling.longest, float(periods[-1])))
-    if not drawn:
-        say_why_empty(axis, "unstable")
+def _draw_lag(axis: "Axes", designs: tuple[Design, ...]) -> None:
+    """Draw the phase error after a shift of the resonance, and after a higher level."""
+    stable = [design for design in designs if design.steps is not None]
+    if not stable:
+        say_why_empty(axis, "the closed loop is unstable")
         return
-    axis.set(xlabel="periods", ylabel="lag after a shift of\nhalf a bandwidth, deg", xlim=(0.0, drawn))
-    axis.legend(fontsize=8, title="damping", title_fontsize=8)
+    for design, line in _with_lines(stable):
+        assert design.steps is not None
+        periods = _periods(design)
+        first = line == "-"
+        after = "half a bandwidth shift" if first else None
+        axis.plot(periods, np.degrees(design.steps.lag_after_frequency_rad), ls=line, color=MAIN, label=after)
+        after = f"level +{100.0 * _STEP:.0f} %" if first else None
+        axis.plot(periods, np.degrees(_STEP * design.steps.lag_after_level_rad), ls=line, color=SECOND, label=after)
+    axis.set(xlabel="periods of vibration", ylabel="phase error, deg", xlim=(0.0, _until(stable)))
+    _legend_above(axis, title="phase error after")
 
 
-def _draw_level_step(axis: "Axes", designs: tuple[Design, ...]) -> None:
-    """Draw response and lag after a step to a level 30 % higher."""
-    drawn = 0.0
-    lag = axis.twinx()
-    for line, design in zip(DASHES, designs, strict=False):
-        if design.steps is None:
-            continue
-        periods = design.steps.time_s * design.loop.omega_rad_s / 2.0 / np.pi
-        axis.plot(periods, 30.0 * design.steps.log_response_after_level, line, color=MAIN)
-        lag.plot(periods, np.degrees(0.3 * design.steps.lag_after_level_rad), line, color=SECOND)
-        drawn = max(drawn, min(2.0 * design.settling.longest, float(periods[-1])))
-    lag.grid(False)
-    if not drawn:
-        say_why_empty(axis, "unstable")
+def _draw_level(axis: "Axes", designs: tuple[Design, ...]) -> None:
+    """Draw the level after a step, one line style per damping of the structure."""
+    stable = [design for design in designs if design.steps is not None]
+    if not stable:
+        say_why_empty(axis, "the closed loop is unstable")
         return
-    axis.set(xlabel="periods", xlim=(0.0, drawn))
-    axis.set_ylabel("response after a level 30 % higher, %", color=MAIN)
-    lag.set_ylabel("lag after it, deg", color=SECOND)
-    lag.spines["right"].set_visible(True)
+    for design, line in _with_lines(stable):
+        assert design.steps is not None
+        change = 100.0 * _STEP * design.steps.log_response_after_level
+        axis.plot(_periods(design), change, ls=line, color=SECOND, label=f"{_damping(design)}: {_settles(design)}")
+    axis.axhline(100.0 * _STEP, color=REJECTED, lw=0.9)
+    axis.set(xlabel="periods of vibration", ylabel="change of level, %", xlim=(0.0, _until(stable)))
+    axis.legend(loc="lower right", title="damping: settles in")
+
+
+def _with_lines(designs: list[Design]) -> list[tuple[Design, Any]]:
+    return list(zip(designs, ("-", "--", (0, (1, 1.5))), strict=False))
+
+
+def _periods(design: Design) -> np.ndarray:
+    assert design.steps is not None
+    return np.asarray(design.steps.time_s * design.loop.omega_rad_s / 2.0 / np.pi)
+
+
+def _until(designs: list[Design]) -> float:
+    """Return the number of periods that are drawn: twice the longest settling time, as far as it was computed."""
+    return max(min(2.0 * design.settling.longest, float(_periods(design)[-1])) for design in designs)
+
+
+def _damping(design: Design) -> str:
+    return f"{100.0 * design.loop.plant.damping_ratio:.2g} %"
+
+
+def _settles(design: Design) -> str:
+    return f"{design.settling.longest:.0f} periods"
+
+
+def _legend_above(axis: "Axes", columns: int = 1, title: str | None = None) -> None:
+    """Put the legend above the panel, where it hides nothing."""
+    axis.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2, title=title, alignment="left"
+    )
 
 
 def _unbroken(degrees: np.ndarray) -> np.ndarray:
@@ -135,7 +189,3 @@ def _unbroken(degrees: np.ndarray) -> np.ndarray:
     out = degrees.copy()
     out[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
     return out
-
-
-def _label(design: Design) -> str:
-    return f"{100.0 * design.loop.plant.damping_ratio:.3g} %"

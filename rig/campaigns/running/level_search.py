@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.arming.arming import asked_once
-from rig.arming.run_options import RunOptions
+from rig.arming.run_options import RemarksOnce, RunOptions
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.runner import carry_out, take_up
@@ -24,11 +24,16 @@ LARGEST_RISE = 4.0
 
 
 class MultisineSeries:
-    """Plays multisines one after the other into one recording. A person arms all of them at once."""
+    """Plays multisines one after the other into one recording. A person arms all of them at once, and reads a remark once."""
 
     def __init__(self, bench: Bench, output: Path, options: RunOptions, purpose: str) -> None:
         self.bench, self.output = bench, output
-        self._options = replace(options, arm=asked_once(options.arm), about=replace(options.about, purpose=purpose))
+        self._options = replace(
+            options,
+            arm=asked_once(options.arm),
+            about=replace(options.about, purpose=purpose),
+            progress=RemarksOnce(options.progress),
+        )
         self._begun = False
 
     def play(self, plan: MultisinePlan) -> Recording:

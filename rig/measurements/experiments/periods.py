@@ -46,9 +46,11 @@ def realisation(
     bench, rate_hz = signals.bench, wanted.rate_hz
     played = plan.model_copy(update={"periods": result_of(point).periods})
     recorded = turned_periods(bench, played, point.realisation or 0, rows)
-    if wanted.periods == "mean":
-        recorded = recorded.mean(axis=1, keepdims=True)
     size = samples_of_a_period(plan, bench, rate_hz)
+    noise = None
+    if wanted.periods == "mean":
+        noise = _noise(recorded[list(signals.outputs)], size)
+        recorded = recorded.mean(axis=1, keepdims=True)
     slow = _resampled(recorded, bench, size, signals.offset)
     once = slow.reshape(slow.shape[0], -1)
     ahead = round(wanted.transient_periods * size)
@@ -65,7 +67,21 @@ def realisation(
         level=point.level,
         specimen=bench.specimen.name,
         excited_hz=(plan.lowest_hz, plan.highest_hz),
+        output_noise=noise,
     )
+
+
+def _noise(periods: np.ndarray, size: int) -> np.ndarray | None:
+    """Return the standard errors of the mean's lines (peak) below half of ``size``, float[n_outputs, n_lines].
+
+    ``periods`` are float[n_outputs, n_periods, n]. Returns None for a single period.
+    """
+    count = periods.shape[1]
+    if count < 2:
+        return None
+    lines = np.fft.rfft(periods, axis=-1)[..., 1 : (size + 1) // 2] * (2.0 / periods.shape[-1])
+    scatter = np.abs(lines - lines.mean(axis=1, keepdims=True)) ** 2
+    return np.asarray(np.sqrt(scatter.sum(axis=1) / ((count - 1) * count)))
 
 
 def samples_of_a_period(plan: MultisinePlan, bench: Bench, rate_hz: float) -> int:

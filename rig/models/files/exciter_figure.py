@@ -1,55 +1,122 @@
-"""Figure of an exciter model: blocked force per volt and dynamic stiffness, with 95 % bands."""
+"""Figure of an exciter model: measured and modelled force per volt, blocked force per volt, dynamic stiffness, 95 % bands."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from identification import Exciter
 from identification.prediction.exciter import PARAMETERS
-from rig.drawing.style import MAIN, title
+from rig.drawing.page import grid
+from rig.drawing.style import MAIN, REJECTED, SECOND, title
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["draw_exciter"]
 
 _DRAWS = 400
 _DECADES = 5.0
+_DOTS: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0, "color": REJECTED, "alpha": 0.5}
 
 
 def draw_exciter(page: "Figure", exciter: Exciter) -> None:
-    """Draw blocked force per volt and dynamic stiffness over the band in which the exciter was identified."""
+    """Draw measurement and model over the band in which the exciter was identified, with amplitude above phase.
+
+    From left to right: force per volt on the rig, as measured and as the model gives it for the measured motion, with the
+    residual and its noise; blocked force per volt; dynamic stiffness of the armature. The dots of the last two are what the measured force
+    says of the one if the other is as fitted. A file without measured lines has no first column and no dots.
+    """
+    from matplotlib.ticker import LogLocator
+
+    lines = exciter.lines
     low = exciter.lowest_hz if np.isfinite(exciter.lowest_hz) else 5.0
     high = exciter.highest_hz if np.isfinite(exciter.highest_hz) else 500.0
     frequency = np.geomspace(low, high, 400)
-    s = 2j * np.pi * frequency
     drawn = _draws(exciter)
-    axes = page.subplots(2, 2, sharex=True)
-    columns = (
-        ("blocked force per volt", "N/V", exciter.force_per_volt(s), [each.force_per_volt(s) for each in drawn]),
-        (
-            "dynamic stiffness of the armature",
-            "N/m",
-            exciter.dynamic_stiffness(s),
-            [e.dynamic_stiffness(s) for e in drawn],
-        ),
-    )
-    for (size, phase), (name, unit, value, sampled) in zip(axes.T, columns, strict=True):
-        size.semilogx(frequency, np.abs(value), color=MAIN)
-        if np.abs(value).max() > _DECADES * np.abs(value).min():
-            size.set_yscale("log")
-        phase.semilogx(frequency, np.degrees(np.unwrap(np.angle(value))), color=MAIN)
-        if sampled:
-            size.fill_between(frequency, *np.quantile(np.abs(sampled), (0.025, 0.975), axis=0), color=MAIN, alpha=0.25)
+    axes = grid(page, 2, 2 if lines is None else 3)
+    if lines is not None:
+        _on_the_rig(axes[0, 0], axes[1, 0], exciter)
+    s = 2j * np.pi * frequency
+    blocked, stiffness = (np.array([]), np.array([])) if lines is None else _each(exciter)
+    for column, name, unit, measured, of in (
+        (-2, "blocked force", "N/V", blocked, Exciter.force_per_volt),
+        (-1, "stiffness", "N/m", stiffness, Exciter.dynamic_stiffness),
+    ):
+        size, phase = axes[:, column]
+        if lines is not None:
+            size.plot(lines.frequency_hz, np.abs(measured), **_DOTS)
+            phase.plot(lines.frequency_hz, np.degrees(np.angle(measured)), **_DOTS)
+        value = of(exciter, s)
+        _modelled(size, phase, frequency, value, [of(one, s) for one in drawn])
         size.set(ylabel=f"{name}, {unit}")
-        phase.set(xlabel="frequency, Hz", ylabel="phase, deg")
+        phase.set(ylabel=f"{name.removesuffix(' force')} phase, deg")
+    for axis in axes.ravel():
+        axis.set(xscale="log", xlabel="frequency, Hz")
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter("")
+    _explain(axes[0, -2], bool(drawn), lines is not None)
+    title(page, _title(exciter, low, high))
+
+
+def _on_the_rig(size: "Axes", phase: "Axes", exciter: Exciter) -> None:
+    """Draw force per volt with the structure attached: measured, modelled from the measured motion, and what is left."""
+    lines = exciter.lines
+    assert lines is not None
+    f, measured = lines.frequency_hz, lines.force_per_volt
+    modelled = exciter.force(1.0, lines.acceleration_per_volt, f)
+    size.loglog(f, np.abs(measured), **_DOTS, label="measured")
+    size.plot(f, np.abs(modelled), color=MAIN, label="model")
+    size.plot(f, np.abs(measured - modelled), marker=".", ls="none", mew=0.0, color=SECOND, label="residual")
+    size.plot(f, lines.noise, "--", color="black", lw=0.9, label="noise")
+    phase.plot(f, np.degrees(np.angle(measured)), **_DOTS)
+    phase.plot(f, np.degrees(np.angle(modelled)), color=MAIN)
+    size.set(ylabel="force, N/V")
+    phase.set(ylabel="force phase, deg")
+    size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+
+
+def _each(exciter: Exciter) -> tuple[np.ndarray, np.ndarray]:
+    """Return blocked force per volt and stiffness, complex[n_lines], from each measured line with the other as fitted."""
+    lines = exciter.lines
+    assert lines is not None
+    s = 2j * np.pi * lines.frequency_hz
+    armature = lines.acceleration_per_volt / s**2 + exciter.stinger_compliance(s) * lines.force_per_volt
+    path = exciter.path.factor(lines.frequency_hz)
+    blocked = (lines.force_per_volt + exciter.dynamic_stiffness(s) * armature) / path
+    return blocked, (exciter.force_per_volt(s) * path - lines.force_per_volt) / armature
+
+
+def _modelled(size: "Axes", phase: "Axes", frequency: np.ndarray, value: np.ndarray, drawn: list[np.ndarray]) -> None:
+    size.plot(frequency, np.abs(value), color=MAIN)
+    if np.abs(value).max() > _DECADES * np.abs(value).min():
+        size.set_yscale("log")
+    else:
+        size.set_ylim(0.0, 1.4 * np.abs(value).max())
+    phase.plot(frequency, np.degrees(np.angle(value)), color=MAIN)
+    if drawn:
+        size.fill_between(frequency, *np.quantile(np.abs(drawn), (0.025, 0.975), axis=0), color=MAIN, alpha=0.25, lw=0)
+    phase.set(ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+
+
+def _explain(axis: "Axes", band: bool, dots: bool) -> None:
+    axis.plot([], [], color=MAIN, label="model")
+    if band:
+        axis.fill([], [], color=MAIN, alpha=0.25, lw=0, label="95 % of the fit")
+    if dots:
+        axis.plot([], [], **_DOTS, label="each measured line, rest as fitted")
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.2)
+
+
+def _title(exciter: Exciter, low: float, high: float) -> str:
     damping, error = exciter.damping_n_s_m
-    known = f"{damping:.5g}" if not np.isfinite(error) else f"{damping:.5g} +- {1.96 * error:.2g}"
-    facts = (
-        f"mass {exciter.moving_mass_kg:.4g} kg, stiffness {exciter.suspension_stiffness_n_m:.4g} N/m, "
-        f"damping of suspension and back-EMF {known} N s/m"
+    known = f"{damping:.5g}" if not np.isfinite(error) else f"{damping:.5g} ± {1.96 * error:.2g}"
+    return (
+        f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\nmoving mass {exciter.moving_mass_kg:.4g} kg, "
+        f"suspension {exciter.suspension_stiffness_n_m:.4g} N/m, damping (suspension and back-EMF) {known} N s/m"
+        + ("" if exciter.lines is not None else "; the file holds no measured lines")
     )
-    title(page, f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\n{facts}")
 
 
 def _draws(exciter: Exciter) -> list[Exciter]:

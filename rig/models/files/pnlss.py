@@ -1,13 +1,24 @@
 """Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one experiment."""
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from identification import ErrorSpectra, Features, IdentificationError, PnlssFit, PnlssModel, SimulatedRun
+from identification import (
+    ErrorSpectra,
+    Experiment,
+    Features,
+    IdentificationError,
+    OutputStretch,
+    PnlssFit,
+    PnlssModel,
+    SimulatedRun,
+    error_spectra,
+    output_stretch,
+)
 from identification.packing import pack_all, unpack_all
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
@@ -30,6 +41,8 @@ class IdentifiedPnlss(Result):
         Every experiment as simulated by the model, and by the linear start; the latter may be empty.
     spectra
         Spectra of one periodic experiment, of validation data if there is any; None if there is no periodic experiment.
+    stretch
+        A short stretch of one experiment over time, of validation data if there is any; None if it was not kept.
     seconds
         Wall time of the identification; NaN if unknown.
     notes
@@ -45,10 +58,19 @@ class IdentifiedPnlss(Result):
     runs: tuple[SimulatedRun, ...] = ()
     linear_runs: tuple[SimulatedRun, ...] = ()
     spectra: ErrorSpectra | None = None
+    stretch: OutputStretch | None = None
     seconds: float = float("nan")
     notes: tuple[str, ...] = ()
     data: str = ""
     uses: Mapping[str, str] = field(default_factory=dict)
+
+    def on(self, training: Sequence[Experiment], validation: Sequence[Experiment]) -> "IdentifiedPnlss":
+        """Return it with spectra and a stretch over time of the last experiment, preferably periodic and of validation data."""
+        every = [*training, *validation]
+        periodic = [one for one in validation if one.period_samples] or [one for one in training if one.period_samples]
+        linear = None if self.fit is None else self.fit.linear
+        spectra = error_spectra(self.model, linear, periodic[-1]) if periodic else None
+        return replace(self, spectra=spectra, stretch=output_stretch(self.model, (periodic or every)[-1]))
 
 
 def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attributes]:
@@ -67,8 +89,9 @@ def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attri
         "data": found.data,
         "uses": dict(found.uses),
     }
-    spectra = () if found.spectra is None else (found.spectra,)
-    for name, things in (("runs", found.runs), ("linear_runs", found.linear_runs), ("spectra", spectra)):
+    kept_runs = {"runs": found.runs, "linear_runs": found.linear_runs}
+    ones = {"spectra": found.spectra, "stretch": found.stretch}
+    for name, things in (kept_runs | {name: () if one is None else (one,) for name, one in ones.items()}).items():
         inside, of_things = pack_all(name, things)
         arrays, out = arrays | inside, out | of_things
     return arrays, out
@@ -83,11 +106,13 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
     kinds: dict[str, type] = {"runs": SimulatedRun, "linear_runs": SimulatedRun, "spectra": ErrorSpectra}
     parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in kinds.items()}
     spectra = parts.pop("spectra")
+    stretch = unpack_all(OutputStretch, "stretch", arrays, attributes) if "stretch" in attributes else ()
     return IdentifiedPnlss(
         model=PnlssModel.from_arrays(inside, attributes[head]) if fit is None else fit.model,
         fit=fit,
         **parts,
         spectra=spectra[0] if spectra else None,
+        stretch=stretch[0] if stretch else None,
         seconds=float(attributes["seconds"]),
         notes=tuple(attributes["notes"]),
         data=str(attributes.get("data", "")),

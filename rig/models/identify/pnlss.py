@@ -11,7 +11,6 @@ from identification import (
     FitProgress,
     FitSettings,
     PnlssFit,
-    error_spectra,
     fit_pnlss,
     identify_pnlss,
     simulated_run,
@@ -89,7 +88,7 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssD
 
 
 def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPnlss:
-    """Add to a fit its errors on all data, and the spectra of the last periodic experiment, preferably of validation data."""
+    """Add to a fit its errors on all data, and what is drawn of the data."""
     every = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
     begins = iter(fit.initial_states)
     states = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every]
@@ -106,17 +105,14 @@ def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPn
     )
     linear = fit.linear
     linear_runs = () if linear is None else tuple(simulated_run(linear, one, use=use) for one, use in both)
-    periodic = [one for one in data.validation if one.period_samples]
-    periodic = periodic or [one for one in data.training if one.period_samples]
-    spectra = error_spectra(fit.model, linear, periodic[-1]) if periodic else None
-    return IdentifiedPnlss(
+    found = IdentifiedPnlss(
         model=fit.model,
         fit=fit,
         runs=runs,
         linear_runs=linear_runs,
-        spectra=spectra,
         seconds=seconds,
         notes=(*data.notes, *still),
         data=data.fingerprint,
         uses=uses_of(data.training, data.validation),
     )
+    return found.on(data.training, data.validation)
