@@ -9,6 +9,7 @@ from identification import (
     ConstantForceCurve,
     ForceSurface,
     FrequencyResponse,
+    Predictions,
     ResponseBand,
     SteadyPrediction,
     SweepPrediction,
@@ -17,19 +18,20 @@ from identification.channels import MOTION_UNIT
 from rig.drawing.style import MAIN, REJECTED, SECOND, shade, title, unit_text
 from rig.figures.axes import branches, length_factor
 from rig.models.files.frequency_responses_figure import draw_responses
+from rig.models.files.predictions_figure import draw_predictions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = [
+    "as_predictions",
     "draw_band",
     "draw_comparison",
     "draw_constant_force",
+    "draw_prediction",
     "draw_response",
-    "draw_steady",
     "draw_surface",
-    "draw_sweep_prediction",
 ]
 
 _FREQUENCY, _LAG = "frequency, Hz", "phase lag of displacement, deg"
@@ -93,21 +95,16 @@ def draw_comparison(page: "Figure", compared: Comparison) -> None:
     title(page, f"{known.specimen or 'specimen'}: {compared.error.name}, {compared.error.verdict}")
 
 
-def draw_steady(page: "Figure", predicted: SteadyPrediction) -> None:
-    """Draw amplitude and lag over the frequency with the folds; unstable parts are dotted."""
-    size, lag = page.subplots(1, 2)
-    factor, unit = length_factor(predicted.amplitude_m())
-    for number in np.unique(predicted.branch):
-        one = predicted.branch == number
-        label = "stable" if number == 0 else f"detached branch {number}"
-        frequency, amplitude = predicted.frequency_hz[one], factor * predicted.amplitude_m()[one]
-        branches(size, frequency, amplitude, predicted.stable[one], label=label, color=MAIN)
-        branches(lag, frequency, predicted.phase_lag_deg()[one], predicted.stable[one], label=label, color=MAIN)
-    folds = predicted.fold_frequency_hz
-    if folds.size:
-        size.plot(folds, factor * predicted.fold_amplitude_m, "o", mfc="w", color=SECOND, label="fold")
-    _label(size, lag, unit)
-    title(page, f"predicted: {predicted.name}")
+def as_predictions(one: SteadyPrediction | SweepPrediction) -> Predictions:
+    """Return predictions with this one alone, without a reference."""
+    if isinstance(one, SweepPrediction):
+        return Predictions(sweeps=(one,), sweep_references=(None,), sweep_errors=(None,))
+    return Predictions(steady=(one,), steady_references=(None,), steady_errors=(None,), steady_bands=(None,))
+
+
+def draw_prediction(page: "Figure", one: SteadyPrediction | SweepPrediction) -> None:
+    """Draw a single prediction as a file of predictions is drawn."""
+    draw_predictions(page, as_predictions(one))
 
 
 def draw_band(page: "Figure", found: ResponseBand) -> None:
@@ -119,17 +116,6 @@ def draw_band(page: "Figure", found: ResponseBand) -> None:
     size.set(xlabel=_LAG, ylabel=f"displacement amplitude, {unit}")
     frequency.set(xlabel=_LAG, ylabel=_FREQUENCY)
     title(page, f"95 % of {found.draws} draws")
-
-
-def draw_sweep_prediction(page: "Figure", sweep: SweepPrediction) -> None:
-    """Draw displacement of the drive point and force over time."""
-    size, force = page.subplots(1, 2, sharex=True)
-    factor, unit = length_factor(np.abs(sweep.drive_m))
-    size.plot(sweep.time_s, factor * np.abs(sweep.drive_m), color=MAIN)
-    size.set(xlabel="time, s", ylabel=f"displacement amplitude, {unit}")
-    force.plot(sweep.time_s, np.abs(sweep.force), color=MAIN)
-    force.set(xlabel="time, s", ylabel="force amplitude, N")
-    title(page, f"predicted sweep: {sweep.origin}")
 
 
 def _label(size: "Axes", lag: "Axes", unit: str) -> None:

@@ -62,6 +62,7 @@ def draw_transient(page: "Figure", sweep: Transient) -> None:
     for axis, channel, values in zip(axes, sweep.channels, np.abs(sweep.fundamentals), strict=False):
         axis.plot(sweep.time_s, values, color=MAIN)
         axis.set(ylabel=f"{channel.name}, {unit_text(channel.unit)}")
+        axis.set_ylim(bottom=0.0)
     axes[-1].plot(sweep.time_s, sweep.frequency_hz, color=MAIN)
     axes[-1].set(ylabel="frequency, Hz", xlabel="time, s")
     title(page, f"fundamentals over time, averaged over {sweep.window_periods} periods")

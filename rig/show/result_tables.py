@@ -12,7 +12,6 @@ from identification import (
     DistortionLevels,
     ForceSurface,
     FrequencyResponse,
-    Predictions,
     ResponseBand,
     StabilisationDiagram,
     SteadyPrediction,
@@ -20,6 +19,7 @@ from identification import (
 )
 from rig.check import report as checks
 from rig.check.assessment import Assessment
+from rig.figures.responses import as_predictions
 from rig.models.files.predictions import PREDICTIONS
 from rig.recording.reader import Recording
 from rig.show.summary import summarise_recording
@@ -132,14 +132,8 @@ def _say_comparison(found: Comparison) -> None:
     )
 
 
-def _say_steady(found: SteadyPrediction) -> None:
-    one = Predictions(steady=(found,), steady_references=(None,), steady_errors=(None,), steady_bands=(None,))
-    PREDICTIONS.say(PREDICTIONS.summarise(one))
-
-
-def _say_sweep(found: SweepPrediction) -> None:
-    one = Predictions(sweeps=(found,), sweep_references=(None,), sweep_errors=(None,))
-    PREDICTIONS.say(PREDICTIONS.summarise(one))
+def _say_prediction(found: SteadyPrediction | SweepPrediction) -> None:
+    PREDICTIONS.say(PREDICTIONS.summarise(as_predictions(found)))
 
 
 def _say_band(found: ResponseBand) -> None:
@@ -185,8 +179,8 @@ SAY: Mapping[str, Callable[[Any], None]] = {
     "ContinuousBackbone": _say_continuous,
     "DistortionLevels": _say_distortion,
     "Comparison": _say_comparison,
-    "SteadyPrediction": _say_steady,
-    "SweepPrediction": _say_sweep,
+    "SteadyPrediction": _say_prediction,
+    "SweepPrediction": _say_prediction,
     "ResponseBand": _say_band,
     "StabilisationDiagram": _say_stabilisation,
     "PeriodicResponses": _say_periodic,

@@ -12,11 +12,11 @@ from rig.rehearsal.rehearsal import rehearse
 
 bench = rig.load_bench("magnet-beam")
 plan = rig.load_plan("magnet-beam/continuous-backbone")  # which says what is known of the plant
-plan = plan.model_copy(update={"levels_m": plan.levels_m[2:12:3]})
-rehearsal = rehearse(request_for(Subject(plan=plan, bench=bench, draws=6)), jobs=2)
+plan = plan.model_copy(update={"levels_m": plan.levels_m[2:12:4]})
+rehearsal = rehearse(request_for(Subject(plan=plan, bench=bench, draws=4)), jobs=2)
 rehearsal
 
 # %%
-# Six twins are few: the interval of a share is as wide as it says. A plan for a real bench is rehearsed on two hundred.
+# Four twins are few: the interval of a share is as wide as it says. A plan for a real bench is rehearsed on two hundred.
 
 rehearsal.plot()

@@ -9,10 +9,10 @@ plan.
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rig.tuning import tune
+from rig.tuning import TuningRequest, tune
 
 with TemporaryDirectory() as folder:
-    tuned = tune("magnet-beam", Path(folder) / "tuned.h5")
+    tuned = tune("magnet-beam", Path(folder) / "tuned.h5", TuningRequest(level_rms_v=0.01, points=5))
 tuned
 
 # %%

@@ -2,7 +2,7 @@
 A specimen that is a little different each time
 ===============================================
 
-Twenty-four rigs whose frequencies and damping scatter, drawn from a seed, on two processes. How much do their backbones differ?
+Sixteen rigs whose frequencies and damping scatter, drawn from a seed, on two processes. How much do their backbones differ?
 """
 
 import matplotlib.pyplot as plt
@@ -23,7 +23,7 @@ def backbone(seed):
     return found.modal_frequency_hz, 100 * found.damping_ratio
 
 
-frequency, damping = np.array([result for _, result in ensemble(range(24), backbone, n_jobs=2)]).swapaxes(0, 1)
+frequency, damping = np.array([result for _, result in ensemble(range(16), backbone, n_jobs=2)]).swapaxes(0, 1)
 nominal = phase_resonance_backbone(VirtualRig.shipped("magnet-beam"), amplitudes_m=AMPLITUDES_M)
 
 figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
@@ -32,7 +32,7 @@ for axis, values, known, name in (
     (axes[1], damping, 100 * nominal.damping_ratio, "modal damping ratio, %"),
 ):
     axis.plot(1e3 * AMPLITUDES_M, values.T, color="0.75", lw=0.8)
-    axis.plot(1e3 * AMPLITUDES_M, values.mean(axis=0), "o-", label="mean of 24")
+    axis.plot(1e3 * AMPLITUDES_M, values.mean(axis=0), "o-", label="mean of 16")
     axis.plot(1e3 * AMPLITUDES_M, known, "k--", label="nominal")
     axis.set(xlabel="displacement amplitude, mm", ylabel=name)
 axes[0].legend()

@@ -91,15 +91,15 @@ def test_a_response_draws_amplitude_and_lag_over_the_frequency():
     assert len(figures.plot((one, one))) == len(axes)
 
 
-def test_a_prediction_marks_its_folds_and_dots_what_is_unstable(hardening):
+def test_a_prediction_marks_its_folds_and_draws_what_is_unstable_otherwise(hardening):
     predicted = identification.frequency_response(hardening, 0.3)
     axes = predicted.plot()
     assert predicted.fold_frequency_hz.size == 2
     assert holds(axes, predicted.fold_frequency_hz, figures_unit(predicted.fold_amplitude_m))
-    dotted = [line for line in axes[0].lines if line.get_linestyle() == ":"]
-    assert len(dotted) == 1
-    seen = np.isfinite(dotted[0].get_ydata())
-    assert 0 < seen.sum() <= (~predicted.stable).sum() + 2
+    solid = [line for line in axes[0].lines if line.get_linestyle() == "-" and np.size(line.get_xdata()) > 9]
+    seen = np.isfinite(solid[0].get_ydata())
+    assert seen[predicted.stable].all()
+    assert 0 < (~seen).sum() <= (~predicted.stable).sum()
 
 
 def test_harmonic_balance_draws_its_curve_with_the_lag_of_the_displacement():
