@@ -11,14 +11,13 @@ Begin with `plot`: it draws a file, a run, a recording, or a result of identific
 
 from typing import TYPE_CHECKING
 
+from rig.drawing.style import restyle
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from rig.drawing.style import restyle
+    from rig.figures.curves import View
     from rig.figures.results import plot
 else:
-    from rig.drawing.style import restyle
+    __getattr__, __dir__ = on_use(__name__, {"View": "curves", "plot": "results"})
 
-    __getattr__, __dir__ = on_use(__name__, {"plot": "results"})
-
-__all__ = ["plot", "restyle"]
+__all__ = ["View", "plot", "restyle"]

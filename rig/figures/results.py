@@ -6,8 +6,8 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from identification import FrequencyResponse
-from rig.drawing.style import STYLE
-from rig.figures.files import drawing
+from rig.drawing.style import STYLE, page_in
+from rig.figures.files import drawing_of
 from rig.models.files.kinds import as_kept, kind_of_file_for
 from rig.recording.reader import Recording
 
@@ -47,7 +47,7 @@ RESULTS = {
 """By the name of the type: results that no file of ours holds. For others see `rig.models.files.kinds`."""
 
 
-def plot(thing: Any, *, page: "Figure | None" = None, **options: Any) -> "tuple[Axes, ...]":
+def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Any) -> "tuple[Axes, ...]":
     """Draw a result, a file or a run; return the axes of the figure, from the top left to the bottom right.
 
     Parameters
@@ -55,10 +55,13 @@ def plot(thing: Any, *, page: "Figure | None" = None, **options: Any) -> "tuple[
     thing
         Path of a file that ``rig plot`` draws; a `rig.Run` or `rig.Recording`; a result of identification, of an analysis of a
         virtual rig, of tuning, rehearsal or check; or several `identification.FrequencyResponse` in one tuple.
+    others
+        Further files, runs or recordings, whose curves are laid over those of the first.
     page
         Empty figure to draw on. Default: a new figure of pyplot, in the size of ``rig plot``.
     options
-        Of files, runs and recordings: those of ``rig plot``, such as ``lateness=True``.
+        Of files, runs and recordings: ``labels``, names in the legend; ``view``, a `rig.figures.View` with the axes, the
+        channel and the harmonic; ``lateness=True`` for the timing of the control loop.
 
     Raises
     ------
@@ -69,26 +72,26 @@ def plot(thing: Any, *, page: "Figure | None" = None, **options: Any) -> "tuple[
     """
     import matplotlib as mpl
 
-    size_in, draw = _drawing_of(thing, options)
+    size_in, draw = _drawing_of((thing, *others), options)
     style = {key: value for key, value in STYLE.items() if key != "figure.dpi"}  # that of the screen
     with mpl.rc_context(style):
         if page is None:
             from matplotlib import pyplot
 
-            page = pyplot.figure(figsize=size_in, layout="constrained")
+            page = pyplot.figure(figsize=page_in(size_in), layout="constrained")
         draw(page)
     return tuple(page.axes)
 
 
-def _drawing_of(thing: Any, options: dict[str, Any]) -> tuple[tuple[float, float], Callable[[Any], None]]:
+def _drawing_of(things: tuple[Any, ...], options: dict[str, Any]) -> tuple[tuple[float, float], Callable[[Any], None]]:
     """Return the size of the page, inches, and what draws on it."""
-    if isinstance(thing, str | Path):
-        return drawing(Path(thing), **options)
-    recording = getattr(thing, "recording", thing)  # of a run
-    if isinstance(recording, Recording):
-        return drawing(recording.path, **options)
-    if options:
-        raise TypeError(f"plot: {', '.join(options)}: allowed for files, runs and recordings alone")
+    files = [found for found in map(_file_of, things) if found is not None]
+    if len(files) == len(things):
+        return drawing_of(files, **options)
+    if options or len(things) > 1:
+        given = ", ".join(options) or f"{len(things)} things"
+        raise TypeError(f"plot: {given}: allowed for files, runs and recordings alone")
+    (thing,) = things
     draw_on = getattr(thing, "draw_on", None)  # of an analysis
     if draw_on is not None:
         return thing.figure_in, draw_on
@@ -99,3 +102,11 @@ def _drawing_of(thing: Any, options: dict[str, Any]) -> tuple[tuple[float, float
     if kind is None or (isinstance(thing, tuple) and not all(isinstance(one, FrequencyResponse) for one in thing)):
         raise TypeError(f"plot: no figure for {type(thing).__name__}; allowed are files, runs, recordings and results")
     return kind.figure_in, lambda page: resolve_name(kind.draw)(page, as_kept(kind, thing))
+
+
+def _file_of(thing: Any) -> Path | None:
+    """Return the file of a path, a run or a recording; None for anything else."""
+    if isinstance(thing, str | Path):
+        return Path(thing)
+    recording = getattr(thing, "recording", thing)  # of a run
+    return recording.path if isinstance(recording, Recording) else None

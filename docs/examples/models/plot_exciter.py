@@ -14,7 +14,7 @@ from rig.drivers import make_daq
 
 plan = rig.load_plan("magnet-beam/exciter").model_copy(update={"realisations": 2, "resolution_hz": 0.2})
 (spectra,) = rig.run(plan).spectra().values()
-exciter = identification.identify_exciter(spectra, sample_rate_hz=5000.0)
+exciter = identification.identify_exciter(spectra, sample_rate_hz=5000.0, source="magnet beam")
 exciter
 
 # %%

@@ -28,5 +28,5 @@ for values, label in (
 ):
     axis.semilogy(spectra.frequency_hz, values[0], ".", ms=3, label=label)
 axis.set(xlabel="frequency, Hz", ylabel="acceleration, m/s²", xlim=(0, 85), ylim=(1e-4, None))
-axis.legend(loc="lower right", markerscale=3)
+axis.legend(loc="upper right", markerscale=3)
 plt.show()

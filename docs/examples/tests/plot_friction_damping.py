@@ -19,7 +19,7 @@ truth = phase_resonance_backbone(virtual, amplitudes_m=mode.amplitude_m[2::4])
 figure, (damping, loop) = plt.subplots(1, 2, figsize=(9, 3.8), layout="constrained")
 x = 1e6 * mode.amplitude_m
 damping.errorbar(x, 100 * mode.damping_ratio, 100 * mode.bound_95("damping_ratio"), fmt="o", label="test, 95 %")
-damping.plot(1e6 * truth.amplitude_m, 100 * truth.damping_ratio, "s-", mfc="w", label="harmonic balance")
+damping.plot(1e6 * truth.amplitude_m, 100 * truth.damping_ratio, "s", ms=8, mfc="none", label="harmonic balance")
 damping.set(xlabel="displacement amplitude, µm", ylabel="modal damping ratio, %", xscale="log")
 damping.legend()
 

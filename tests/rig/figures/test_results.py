@@ -20,6 +20,7 @@ from identification import (
 )
 from rig import figures
 from rig.figures.results import RESULTS
+from rig.models.files.files import save
 from rig.models.files.kinds import KINDS
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
@@ -178,6 +179,27 @@ def test_what_has_no_figure_is_named():
 def test_options_of_files_are_refused_for_results(mode):
     with pytest.raises(TypeError, match="lateness"):
         mode.plot(lateness=True)
+    with pytest.raises(TypeError, match="2 things"):
+        figures.plot(mode, mode)
+
+
+def test_files_and_runs_are_laid_over_one_another(tmp_path, mode):
+    for name in ("one.h5", "two.h5"):
+        save(mode, tmp_path / name)
+    one = figures.plot(tmp_path / "one.h5")
+    both = figures.plot(tmp_path / "one.h5", str(tmp_path / "two.h5"), labels=("first", "second"))
+    assert holds(one, figures_unit(mode.amplitude_m), mode.modal_frequency_hz)
+    inside = [legend for axis in both if (legend := axis.get_legend()) is not None]
+    legends = [*inside, *both[0].get_figure().legends]
+    assert {"first", "second"} <= {text.get_text() for legend in legends for text in legend.get_texts()}
+
+
+def test_a_narrow_page_is_asked_for_once_for_all_figures(mode):
+    figures.restyle("paper")
+    try:
+        assert mode.plot()[0].get_figure().get_figwidth() == pytest.approx(85.0 / 25.4)
+    finally:
+        figures.restyle()
 
 
 def test_every_line_of_the_table_names_a_function():
