@@ -9,7 +9,8 @@ import numpy as np
 from rig.analysis.levels import By, level_range, samples_for
 from rig.analysis.study import Study, length_unit, roomy
 from rig.analysis.subject import Subject, refusing
-from rig.drawing.style import MAIN, SECOND
+from rig.drawing.areas import areas, is_narrow
+from rig.drawing.style import COLOURS, MAIN, SECOND
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import (
@@ -147,25 +148,23 @@ def draw_backbone(
     joints: Sequence[FrictionSite],
 ) -> None:
     """Draw four panels over the level, and one more panel per level that has loops."""
-    upper: Figure | SubFigure = page
-    lower: SubFigure | None = None
-    if loops:
-        upper, lower = page.subfigures(2, 1, squeeze=False, height_ratios=(2.0, 1.05))[:, 0]
-    (frequency, damping), (amplitude, harmonics) = upper.subplots(2, 2)
+    upper, *below = areas(page, (4, len(loops) + 1) if loops else (4,), (2.0, 1.15) if loops else (1.0,))
+    axes = upper.subplots(4, 1) if is_narrow(page) else upper.subplots(2, 2)
+    frequency, damping, amplitude, harmonics = axes.ravel()
     scale, unit = length_unit(float(np.max(found.amplitude_m)))
     x = scale * found.amplitude_m
-    frequency.plot(x, found.modal_frequency_hz, "o-", ms=4, color=MAIN)
+    frequency.plot(x, found.modal_frequency_hz, "o-", color=MAIN)
     frequency.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
-    damping.plot(x, 100 * found.damping_ratio, "o-", ms=4, color=MAIN, label="active power of the fundamental")
+    damping.plot(x, 100 * found.damping_ratio, "o-", color=MAIN, label="from the fundamental's power")
     total = 100 * found.damping_ratio_total_power
-    damping.plot(x, total, "s--", ms=3.5, color=SECOND, label="active power of all harmonics")
-    damping.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping ratio, %")
+    damping.plot(x, total, "s--", color=SECOND, label="from the power of all harmonics")
+    damping.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
     roomy(damping, np.concatenate([100 * found.damping_ratio, total]), 0.2)
-    damping.legend(fontsize=8, loc="best")
-    amplitude.plot(found.force_n, x, "o-", ms=4, color=MAIN)
-    amplitude.set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement amplitude, {unit}")
+    damping.legend(loc="best")
+    amplitude.plot(found.force_n, x, "o-", color=MAIN)
+    amplitude.set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement, {unit}")
     _draw_harmonics(harmonics, found)
-    if lower is not None:
+    for lower in below:
         _draw_loops(lower, found, loops, joints)
 
 
@@ -173,14 +172,14 @@ def _draw_harmonics(axis: "Axes", found: PeriodicResponses) -> None:
     for harmonic, marker, colour in ((2, "^", MAIN), (3, "v", SECOND)):
         if harmonic < found.force_harmonics_n.shape[1]:
             ratio = found.force_harmonic_ratio(harmonic)
-            axis.plot(found.force_n, ratio, marker + "-", ms=4, color=colour, label=f"|F{harmonic}|/|F1|")
-    axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of the force")
+            axis.plot(found.force_n, ratio, marker + "-", color=colour, label=f"|F{harmonic}|/|F1|")
+    axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of force")
     axis.set_ylim(bottom=0.0)
-    axis.legend(fontsize=8)
+    axis.legend()
 
 
 def _draw_loops(
-    part: "Figure | SubFigure",
+    part: Any,
     found: PeriodicResponses,
     loops: dict[int, tuple[HysteresisLoop, ...]],
     joints: Sequence[FrictionSite],
@@ -189,7 +188,8 @@ def _draw_loops(
 
     The loops of the second half of the joints are dashed, because pairs of loops may coincide.
     """
-    axes = np.atleast_1d(part.subplots(1, len(loops)))
+    narrow = is_narrow(part.get_figure(root=True))
+    axes = np.atleast_1d(part.subplots(len(loops), 1) if narrow else part.subplots(1, len(loops)))
     for axis, (point, several) in zip(axes, loops.items(), strict=True):
         largest = max(float(np.max(np.abs(loop.coordinate))) for loop in several)
         scale, words, force = _units(joints, largest)
@@ -199,14 +199,14 @@ def _draw_loops(
                 loop.force,
                 lw=1.2,
                 ls="-" if 2 * place < len(joints) else (0, (4, 3)),
-                color=f"C{place % 10}",
+                color=COLOURS[place % len(COLOURS)],
                 label=joint.at,
             )
-        axis.set_title(f"at {found.force_n[point]:.3g} N", fontsize=9)
+        axis.set_title(f"at {found.force_n[point]:.3g} N")
         axis.set_xlabel(words)
         axis.locator_params(nbins=5)
-    axes[0].set_ylabel(force)
-    part.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=8, fontsize=8)
+        axis.set_ylabel(force if narrow or axis is axes[0] else "")
+    part.legend(*axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=3 if narrow else 6)
 
 
 def _units(joints: Sequence[FrictionSite], largest: float) -> tuple[float, str, str]:

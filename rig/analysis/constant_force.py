@@ -8,9 +8,12 @@ import numpy as np
 
 from rig.analysis.backbone import neglected
 from rig.analysis.levels import highest_resonance, most_points, samples_for
-from rig.analysis.study import Study, length_unit, level_colour
+from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive, refusing
-from rig.drawing.style import REJECTED, SECOND
+from rig.drawing.areas import legend_below
+from rig.drawing.page import grid
+from rig.drawing.steady_curve import UNSTABLE
+from rig.drawing.style import REJECTED, SECOND, shade
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import (
@@ -129,32 +132,32 @@ def draw_curves(page: "Figure", curves: dict[float, PeriodicResponses], resonanc
     """Draw amplitude above phase lag, over the frequency."""
     from matplotlib.lines import Line2D
 
-    top, bottom = page.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    top, bottom = grid(page, 2, 1, sharex=True, height_ratios=(2.0, 1.0))[:, 0]
     scale, unit = length_unit(max(float(np.max(curve.amplitude_m)) for curve in curves.values()))
     handles = []
     for place, (force, curve) in enumerate(curves.items()):
-        colour = level_colour(place, len(curves))
+        colour = shade(place, len(curves))
         _branches(top, curve, scale * curve.amplitude_m, colour)
         _branches(bottom, curve, curve.phase_lag_deg, colour)
         handles.append(Line2D([], [], color=colour, label=f"{force:.4g} N"))
     if any(curve.stable is not None and not np.all(curve.stable) for curve in curves.values()):
-        handles.append(Line2D([], [], color=REJECTED, ls=(0, (4, 2)), label="unstable"))
-    top.plot(resonances.frequency_hz, scale * resonances.amplitude_m, "o-", ms=3.5, lw=0.9, color=SECOND)
-    handles.append(Line2D([], [], color=SECOND, marker="o", ms=3.5, lw=0.9, label="phase resonance"))
-    top.set_ylabel(f"displacement amplitude, {unit}")
+        handles.append(Line2D([], [], color=REJECTED, ls=UNSTABLE, label="unstable"))
+    top.plot(resonances.frequency_hz, scale * resonances.amplitude_m, "o-", lw=0.9, color=SECOND)
+    handles.append(Line2D([], [], color=SECOND, marker="o", lw=0.9, label="phase resonance"))
+    top.set_ylabel(f"displacement, {unit}")
     top.set_ylim(bottom=0.0)
     bottom.axhline(-90.0, color=SECOND, lw=0.9)
-    bottom.set(xlabel="frequency, Hz", ylabel="lag of acceleration, deg", yticks=(-180, -90, 0), ylim=(-185, 5))
-    page.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=8)
+    bottom.set(xlabel="frequency, Hz", ylabel="acceleration lag, deg", yticks=(-180, -90, 0), ylim=(-185, 5))
+    legend_below(page, {str(handle.get_label()): handle for handle in handles})
 
 
 def _branches(axis: "Axes", curve: PeriodicResponses, values: np.ndarray, colour: object) -> None:
-    """Draw stable parts solid and unstable parts dashed; the dashes extend to the neighbouring stable points."""
+    """Draw stable parts solid and unstable parts dotted; the dots extend to the neighbouring stable points."""
     stable = np.ones(values.size, bool) if curve.stable is None else curve.stable
-    for kind, style in ((True, "-"), (False, (0, (4, 2)))):
+    for kind, style in ((True, "-"), (False, UNSTABLE)):
         mine = stable == kind
-        if kind is False:  # the dashes reach to the folds
+        if kind is False:  # the dots reach to the folds
             mine = mine | np.append(mine[1:], False) | np.append(False, mine[:-1])
         axis.plot(
-            np.where(mine, curve.frequency_hz, np.nan), np.where(mine, values, np.nan), ls=style, color=colour, lw=1.3
+            np.where(mine, curve.frequency_hz, np.nan), np.where(mine, values, np.nan), ls=style, color=colour
         )

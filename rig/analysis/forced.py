@@ -11,6 +11,8 @@ from rig.analysis.backbone import neglected
 from rig.analysis.levels import highest_resonance, most_points, samples_for
 from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive, refusing
+from rig.drawing.areas import legend_below
+from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
@@ -199,7 +201,7 @@ def _extremes(way: PeriodicResponses) -> dict[str, float]:
 
 def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses | None) -> None:
     """Draw three panels over the frequency; the falling direction is drawn only if it differs."""
-    force, response, lag = page.subplots(3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.0))
+    force, response, lag = grid(page, 3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.4))[:, 0]
     scale, unit = length_unit(float(np.max(up.amplitude_m)))
     ways: list[tuple[PeriodicResponses, Any, str, str]] = [
         (up, "-", MAIN, "frequency rising" if down is not None else "either direction")
@@ -210,13 +212,14 @@ def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses |
         force.plot(way.frequency_hz, way.force_n, ls=style, color=colour, label=label)
         response.plot(way.frequency_hz, scale * way.amplitude_m, ls=style, color=colour)
         lag.plot(way.frequency_hz, way.phase_lag_deg, ls=style, color=colour)
-    force.set_ylabel("force (fundamental), N")
+    force.set_ylabel("force, N")
     response.set_ylabel(f"displacement, {unit}")
     for axis in (force, response):
         axis.set_ylim(bottom=0.0)
     lag.axhline(-90.0, color=REJECTED, lw=0.8)
-    lag.set(xlabel="frequency, Hz", ylabel="lag of accel., deg", yticks=(-180, -90, 0), ylim=(-190, 10))
-    page.legend(*force.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8)
+    lag.set(xlabel="frequency, Hz", ylabel="accel. lag, deg", yticks=(-180, -90, 0), ylim=(-190, 10))
+    handles, labels = force.get_legend_handles_labels()
+    legend_below(page, dict(zip(labels, handles, strict=True)))
 
 
 def turned(way: PeriodicResponses) -> PeriodicResponses:

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from rig.analysis.levels import most_points
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
-from rig.drawing.style import MAIN
+from rig.drawing.areas import is_narrow, legend_below
+from rig.drawing.page import grid
+from rig.drawing.style import COLOURS, MAIN
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import FrequencyResponses, frequency_response
@@ -130,22 +132,22 @@ def draw_responses(
     """Draw three columns; each channel has the same colour in all of them."""
     from matplotlib.ticker import MultipleLocator
 
-    axes = page.subplots(2, 3, sharex=True)
+    axes = grid(page, 2, 3, sharex=True)
     columns = (
-        ("force per voltage, N/V", {"force": force}),
-        ("acceleration per voltage, (m/s²)/V", per_v),
-        ("acceleration per force, (m/s²)/N", per_n),
+        ("force, N/V", {"force": force}),
+        ("acceleration, (m/s²)/V", per_v),
+        ("acceleration, (m/s²)/N", per_n),
     )
     for (magnitude, phase), (title, curves) in zip(axes.T, columns, strict=True):
         for place, (name, curve) in enumerate(curves.items()):
-            colour = MAIN if len(curves) == 1 and name == "force" else f"C{place % 10}"
+            colour = MAIN if len(curves) == 1 and name == "force" else COLOURS[place % len(COLOURS)]
             magnitude.plot(frequency_hz, np.abs(curve), color=colour, lw=1.0, label=name)
             phase.plot(frequency_hz, np.degrees(np.unwrap(np.angle(curve))), color=colour, lw=1.0)
         magnitude.set(xscale="log", yscale="log")
-        magnitude.set_title(title, fontsize=9, loc="left")
+        magnitude.set_ylabel(title)
+        phase.set_ylabel(f"its phase, deg" if not is_narrow(page) else f"phase of {title.split(',')[0]}, deg")
         phase.set_xlabel("frequency, Hz")
         low, high = phase.get_ylim()
         phase.yaxis.set_major_locator(MultipleLocator(90.0 if high - low < 900.0 else 360.0))
-    axes[0, 0].set_ylabel("magnitude")
-    axes[1, 0].set_ylabel("phase, deg")
-    page.legend(*axes[0, 1].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8)
+    handles, labels = axes[0, 1].get_legend_handles_labels()
+    legend_below(page, dict(zip(labels, handles, strict=True)))

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject
-from rig.drawing.style import MAIN, REJECTED
+from rig.drawing.areas import legend_below
+from rig.drawing.page import grid
+from rig.drawing.style import COLOURS, MAIN, REJECTED
 from rig.text.console import number, print_table
 from simulators.modes import LinearModes
 from simulators.structures.meshed import MeshedBeam
@@ -111,7 +113,8 @@ def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
     """Draw one panel per mode, for the lowest eight modes at most."""
     count = min(_MOST, modes.frequency_hz.size)
     rows = (count + 1) // 2
-    panels = page.subplots(rows, min(2, count), sharex=True, squeeze=False).ravel()
+    axes = grid(page, rows, min(2, count), sharex=True)
+    panels = axes.ravel()
     for k, axis in enumerate(panels):
         if k >= count:
             axis.set_axis_off()
@@ -122,14 +125,17 @@ def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
         else:
             _at_the_points(axis, rig, modes, k)
         text = f"mode {k + 1}: {modes.frequency_hz[k]:.5g} Hz, {100 * modes.damping_ratio[k]:.3g} %"
-        axis.set_title(text, fontsize=9, loc="left")
+        axis.set_title(text)
         if k % 2 == 0:
             axis.set_ylabel("shape, kg$^{-1/2}$")
     if isinstance(rig.structure, MeshedBeam):
         for axis in panels[max(0, count - 2) : count]:
             axis.set_xlabel("position along the beam, m")
             axis.tick_params(labelbottom=True)
-    page.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    handles, labels = panels[0].get_legend_handles_labels()
+    legend_below(page, dict(zip(labels, handles, strict=True)))
+    if count < modes.frequency_hz.size:
+        page.text(0.99, 0.01, f"the lowest {count} of {modes.frequency_hz.size} modes", ha="right", color=REJECTED)
 
 
 def _along_the_beam(axis: "Axes", rig: VirtualRig, beam: MeshedBeam, modes: LinearModes, k: int) -> None:
@@ -139,14 +145,14 @@ def _along_the_beam(axis: "Axes", rig: VirtualRig, beam: MeshedBeam, modes: Line
     for place, (at, label) in enumerate(_attached(rig).items()):
         if at in beam.points_m:
             height = modes.at(rig.shape(at))[k]
-            marker, colour = _MARKERS[place % len(_MARKERS)], f"C{place % 10}"
-            axis.plot(beam.points_m[at], height, marker, ms=5, color=colour, label=label)
+            marker, colour = _MARKERS[place % len(_MARKERS)], COLOURS[(place + 1) % len(COLOURS)]
+            axis.plot(beam.points_m[at], height, marker, color=colour, label=label)
 
 
 def _at_the_points(axis: "Axes", rig: VirtualRig, modes: LinearModes, k: int) -> None:
     names = rig.structure.points
     axis.bar(names, [modes.at(rig.shape(at))[k] for at in names], width=0.5, color=MAIN, label="named points")
-    axis.tick_params(axis="x", labelsize=8, labelrotation=30)
+    axis.tick_params(axis="x", labelrotation=30)
 
 
 def _attached(rig: VirtualRig) -> dict[str, str]:

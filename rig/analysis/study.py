@@ -21,12 +21,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
-    "LEVEL_COLOURS",
     "Study",
     "check_ending",
     "draw",
     "length_unit",
-    "level_colour",
     "plain",
     "points_of",
     "roomy",
@@ -137,11 +135,12 @@ class Study(Result, ABC):
 def draw(study: Study, figure: Path) -> None:
     """Draw an analysis into ``figure`` (png, pdf or svg, by its suffix); raise `RecordingError` if it cannot be written."""
     from rig.drawing.page import page_for
+    from rig.drawing.style import title
 
     check_ending(figure)
     with page_for(figure, study.figure_in) as page:
         study.draw_on(page)
-        page.suptitle(f"{study.subject.bench.specimen.name}: {study.title}", fontsize=11, x=0.01, ha="left")
+        title(page, f"{study.subject.bench.specimen.name}: {study.title}")
 
 
 def check_ending(figure: Path) -> None:
@@ -150,19 +149,9 @@ def check_ending(figure: Path) -> None:
         raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
 
 
-LEVEL_COLOURS = "viridis"
-
-
 def length_unit(largest_m: float) -> tuple[float, str]:
     """Return factor and name of the unit for displacements up to ``largest_m``."""
     return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
-
-
-def level_colour(number: int, count: int) -> tuple[float, float, float, float]:
-    """Return the colour of one of several levels, from dark to light."""
-    from matplotlib import colormaps
-
-    return colormaps[LEVEL_COLOURS](0.85 * number / max(1, count - 1))
 
 
 def roomy(axis: "Axes", values: NDArray[np.float64], least_share: float) -> None:

@@ -7,7 +7,9 @@ import numpy as np
 
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
 from identification.response_control.levels import LevelFit
-from rig.drawing.style import REJECTED, engineering, title
+from rig.drawing.page import grid
+from rig.drawing.steady_curve import UNSTABLE
+from rig.drawing.style import COLOURS, REJECTED, engineering, plain_log, shade, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +20,6 @@ __all__ = ["draw_force_surface", "draw_measured_surface"]
 _CURVES = 4
 _SECTIONS_DEG = (30.0, 90.0, 150.0)
 _MOST_NAMED = 8
-_ROOM = 1.4
 
 
 def draw_force_surface(
@@ -28,24 +29,23 @@ def draw_force_surface(
 
     ``page`` is an empty figure, about 11 by 7 inches. Without a ``surface`` the right half is left out.
     """
-    from matplotlib import colormaps
-
     columns = 1 if surface is None else 2
-    axes = page.subplots(2, columns, squeeze=False)
+    axes = grid(page, 2, columns)
     unit = engineering(np.concatenate([response.amplitude_m for response in responses]))[1]
     scale = {"mm": 1e3, "µm": 1e6}[unit]
     levels = sorted({response.level for response in responses})
     for response in responses:
-        colour = colormaps["viridis"](levels.index(response.level) / max(1, len(levels) - 1) * 0.9)
+        colour = shade(levels.index(response.level), len(levels))
         _points(axes[0, 0], axes[1, 0], response, scale, colour, _name(response, levels, scale, unit))
     fits = () if surface is None else surface.levels
     for index, fit in enumerate(fits):
-        colour = colormaps["viridis"](index / max(1, len(fits) - 1) * 0.9)
+        colour = shade(index, len(fits))
         _fit(axes[0, 0], axes[1, 0], fit, scale, colour)
-    axes[0, 0].set(ylabel=f"receptance, {unit}/N", yscale="log")
-    axes[0, 0].set_ylim(top=_ROOM * axes[0, 0].get_ylim()[1])
-    axes[0, 0].legend(fontsize=7, ncols=2, title="displacement held")
-    axes[1, 0].set(xlabel="frequency, Hz", ylabel="phase lag of displacement, deg")
+    axes[0, 0].set(xlabel="frequency, Hz", ylabel=f"receptance, {unit}/N", yscale="log")
+    plain_log(axes[0, 0])
+    above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "alignment": "left"}
+    axes[0, 0].legend(ncols=3, title="displacement held", handlelength=1.0, **above)
+    axes[1, 0].set(xlabel="frequency, Hz", ylabel="phase lag, deg")
     axes[1, 0].axhline(90.0, color=REJECTED, lw=0.8)
     if surface is not None:
         _curves(axes[0, 1], surface, scale, unit)
@@ -70,8 +70,8 @@ def _points(
     size: "Axes", lag: "Axes", response: FrequencyResponse, scale: float, colour: Any, name: str | None
 ) -> None:
     receptance = scale * response.amplitude_m / response.force_n
-    size.plot(response.frequency_hz, receptance, ".", color=colour, ms=4, label=name)
-    lag.plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour, ms=4)
+    size.plot(response.frequency_hz, receptance, ".", color=colour, label=name)
+    lag.plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour)
 
 
 def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: Any) -> None:
@@ -85,21 +85,31 @@ def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: Any) ->
 
 def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
     """Draw amplitude over frequency at forces within the surface; unstable parts are dotted."""
-    from matplotlib import colormaps
-
     found = _within(surface)
     for index, curve in enumerate(found):
-        response, colour = curve.response, colormaps["plasma"](0.85 * index / max(1, len(found) - 1))
-        for which, line in ((curve.stable, "-"), (~curve.stable, ":")):
+        response, colour = curve.response, shade(index, len(found))
+        for which, line in ((curve.stable, "-"), (~curve.stable, UNSTABLE)):
             near = which | np.concatenate([which[1:], [False]])
             shown = np.where(near, scale * response.amplitude_m, np.nan)
-            axis.plot(response.frequency_hz, shown, line, color=colour, label=response.label if line == "-" else None)
+            axis.plot(response.frequency_hz, shown, ls=line, color=colour, label=response.label if line == "-" else None)
+        ends = [0, -1]
+        axis.plot(response.frequency_hz[ends], scale * response.amplitude_m[ends], "s", color=colour)
     resonance = surface.at_lag(90.0)
     axis.plot(resonance.frequency_hz, scale * resonance.amplitude_m, "--", color=REJECTED, lw=0.9, label="resonance")
     if any(not curve.stable.all() for curve in found):
-        axis.plot([], [], ":", color=REJECTED, label="unstable at constant force")
-    axis.set(xlabel="frequency, Hz", ylabel=f"displacement amplitude, {unit}")
-    axis.legend(fontsize=7, title="constant force, cut from the surface")
+        axis.plot([], [], ls=UNSTABLE, color=REJECTED, label="unstable")
+    if found:
+        axis.plot([], [], "s", color=REJECTED, label="end of the levels")
+    axis.set(xlabel="frequency, Hz", ylabel=f"displacement, {unit}")
+    axis.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=2,
+        borderaxespad=0.2,
+        handlelength=1.0,
+        alignment="left",
+        title="constant force, cut from the surface",
+    )
 
 
 def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
@@ -123,11 +133,17 @@ def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
 
 def _sections(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
     """Draw the force over displacement at three lags, with one point per level."""
-    for lag, marker in zip(_SECTIONS_DEG, ("v", "o", "^"), strict=True):
+    from matplotlib.ticker import LogLocator
+
+    for lag, marker, colour in zip(_SECTIONS_DEG, ("v", "o", "^"), COLOURS, strict=False):
         try:
             section = surface.at_lag(lag)
         except IdentificationError:
             continue
-        axis.plot(scale * section.amplitude_m, section.force_n, marker + "-", ms=3, lw=0.9, label=f"lag {lag:g} deg")
-    axis.set(xlabel=f"displacement amplitude, {unit}", ylabel="force, N", xscale="log", yscale="log")
-    axis.legend(fontsize=7)
+        axis.plot(scale * section.amplitude_m, section.force_n, marker + "-", color=colour, label=f"lag {lag:g} deg")
+    axis.set(xlabel=f"displacement, {unit}", ylabel="force, N", xscale="log", yscale="log")
+    plain_log(axis)
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
+    axis.legend()

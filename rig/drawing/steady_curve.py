@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import SteadyPrediction
+from rig.drawing.areas import broad
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +39,7 @@ def draw_curve(
             label = None
         beyond = np.where(response.range_use[on] > BEYOND, values[on], np.nan)
         if np.isfinite(beyond).any():
-            axis.plot(response.frequency_hz[on], beyond, color=colour, lw=5.0, alpha=0.25)
+            axis.plot(response.frequency_hz[on], beyond, color=colour, lw=broad(), alpha=0.25)
 
 
 def draw_ends(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: Any) -> None:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import Verdict, verdict_of
@@ -14,17 +15,17 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_rehearsal"]
 
-MOST_LIMITS, MOST_INFLUENCES = 8, 8
+MOST_LIMITS, MOST_INFLUENCES = 5, 5
 ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"
 
 
 def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
     """Draw six panels on an empty page."""
     verdict = verdict_of(rehearsal)
-    axes = page.subplots(2, 3)
+    axes = grid(page, 2, 3)
     facts = rehearsal.facts
     _draw_backbones(axes[0, 0], axes[0, 1], rehearsal)
-    _draw_points(axes[0, 2], verdict, facts["plan"])
+    _draw_points(axes[0, 2], verdict)
     _draw_margins(axes[1, 0], verdict)
     _draw_times(axes[1, 1], rehearsal)
     _draw_influences(axes[1, 2], verdict)
@@ -61,12 +62,12 @@ def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) ->
         axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.xaxis.set_major_formatter("{x:g}")
         axis.xaxis.set_minor_formatter("")
-    frequency.legend(fontsize=8)
-    frequency.set(xlabel="amplitude of the drive point, mm", ylabel="modal frequency, Hz")
-    damping.set(xlabel="amplitude of the drive point, mm", ylabel="damping as reported, %")
+    frequency.legend()
+    frequency.set(xlabel="displacement, mm", ylabel="modal frequency, Hz")
+    damping.set(xlabel="displacement, mm", ylabel="modal damping, %")
 
 
-def _draw_points(axis: "Axes", verdict: Verdict, plan: dict[str, Any]) -> None:
+def _draw_points(axis: "Axes", verdict: Verdict) -> None:
     if not verdict.points:
         say_why_empty(axis, "no point was begun")
         return
@@ -76,11 +77,11 @@ def _draw_points(axis: "Axes", verdict: Verdict, plan: dict[str, Any]) -> None:
     missing = np.array([point.qualities.get("not begun", 0) for point in verdict.points]) / n
     axis.bar(x, 100.0 * accepted, color=ACCEPTED, label="accepted")
     axis.bar(
-        x, 100.0 * (1.0 - accepted - missing), bottom=100.0 * accepted, color=FAILED, label="refused or interrupted"
+        x, 100.0 * (1.0 - accepted - missing), bottom=100.0 * accepted, color=FAILED, label="refused"
     )
     axis.bar(x, 100.0 * missing, bottom=100.0 * (1.0 - missing), color=MISSING, label="not begun")
-    axis.set(xlabel=f"point of the plan ({plan['kind']})", ylabel="draws, %", ylim=(0.0, 119.0))
-    axis.legend(fontsize=8, ncols=2, loc="upper left")
+    axis.set(xlabel="point of the plan", ylabel="draws, %", ylim=(0.0, 101.0))
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
 
 
 def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
@@ -90,12 +91,21 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
         return
     for row, (_, band) in enumerate(shown):
         axis.plot([100.0 * band.low, 100.0 * band.high], [row, row], color=MAIN, lw=4.0, solid_capstyle="butt")
-        axis.plot(100.0 * band.middle, row, "o", color="w", mec=MAIN, ms=6)
-        axis.plot(100.0 * band.largest, row, "|", color=SECOND, ms=10, mew=2.0)
+        axis.plot(100.0 * band.middle, row, "o", color="w", mec=MAIN)
+        axis.plot(100.0 * band.largest, row, "|", color=SECOND, mew=2.0)
     axis.axvline(100.0, color=SECOND, lw=0.8, ls="--")
-    axis.set_yticks(range(len(shown)), [name for name, _ in shown], fontsize=8)
-    axis.set(xlabel="largest value over its limit, %: 5 to 95 % of draws, median, largest", xlim=(0.0, None))
-    axis.xaxis.label.set_fontsize(8)
+    axis.set_yticks(range(len(shown)), [name.replace(" ", "\n", 1) for name, _ in shown])
+    axis.set(xlabel="largest value over its limit, %", xlim=(0.0, None))
+    axis.plot([], [], color=MAIN, lw=4.0, label="5 to 95 % of draws")
+    axis.plot([], [], "o", color="w", mec=MAIN, label="median")
+    axis.plot([], [], "|", color=SECOND, mew=2.0, label="largest")
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.2, title=_closest(verdict), alignment="left")
+
+
+def _closest(verdict: Verdict) -> str | None:
+    """Say how many of the limits are drawn, if not all."""
+    count = len(verdict.margins)
+    return f"the closest {MOST_LIMITS} of {count} limits" if count > MOST_LIMITS else None
 
 
 def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
@@ -104,15 +114,16 @@ def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
     edges = np.linspace(0.0, max(float(times.max()), 1e-9) * 1.001, 25).tolist()
     axis.hist([times[done], times[~done]], edges, stacked=True, color=[MAIN, SECOND], label=["ends well", "does not"])
     axis.set(xlabel="test time, s", ylabel="draws")
-    axis.legend(fontsize=8)
+    axis.legend()
 
 
 def _draw_influences(axis: "Axes", verdict: Verdict) -> None:
     shown = verdict.influences[:MOST_INFLUENCES][::-1]
     if not shown:
-        say_why_empty(axis, "no unknown matters more than by chance")
+        axis.set_axis_off()
+        say_why_empty(axis, "no unknown matters\nmore than by chance")
         return
     axis.barh(range(len(shown)), [one.correlation for one in shown], color=MAIN)
-    axis.set_yticks(range(len(shown)), [f"{one.unknown}\nfor {one.outcome}" for one in shown], fontsize=7)
+    axis.set_yticks(range(len(shown)), [f"{one.unknown}\nfor {one.outcome}" for one in shown])
     axis.axvline(0.0, color="k", lw=0.6)
     axis.set(xlabel="rank correlation", xlim=(-1.0, 1.0))

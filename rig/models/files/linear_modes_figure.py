@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
-from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title
+from rig.drawing.areas import areas
+from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, say_why_empty, shade, title, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,7 +25,7 @@ def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
     ``page`` is an empty figure, about 11 by 8 inches.
     """
     modes, responses, stabilisation = found.modes, found.responses, found.stabilisation
-    left, right = np.asarray(page.subfigures(1, 2, width_ratios=(1.35, 1.0)))
+    left, right = areas(page, (3, 4), (1.35, 1.0), beside=True)
     responses_on(left, modes, responses)
     top, middle, bottom = right.subplots(3, 1, height_ratios=(1.1, 1.0, 1.0))
     _stabilisation(top, modes, stabilisation, responses)
@@ -48,14 +49,13 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
     every = slice(None, None, max(1, frequency.size // _MOST_DOTS))
     known = {channel.name for channel in modes.channels}
     errors = responses.total_std if np.isfinite(responses.total_std).any() else responses.noise_std
-    colours = (MAIN, SECOND, "#4f8f4f", "#8064a2")
-    for row, (channel, colour) in enumerate(zip(responses.outputs[:_MOST_OUTPUTS], colours, strict=False)):
+    for row, (channel, colour) in enumerate(zip(responses.outputs[:_MOST_OUTPUTS], COLOURS, strict=False)):
         measured = responses.value[every, row, 0]
-        label = f"{channel.name}, {_unit(channel.unit, responses.inputs[0].unit)}"
-        size.semilogy(frequency[every], np.abs(measured), ".", ms=2.5, color=colour, alpha=0.5, label=label)
+        label = f"{channel.name}, {unit_text(f'{channel.unit}/{responses.inputs[0].unit}')}"
+        size.semilogy(frequency[every], np.abs(measured), ".", color=colour, alpha=0.5, label=label)
         if np.isfinite(errors[:, row, 0]).any():
             size.semilogy(frequency[every], _smooth(errors[:, row, 0])[every], color=colour, lw=0.6, alpha=0.6, ls="--")
-        phase.plot(frequency[every], np.degrees(np.angle(measured)), ".", ms=2.5, color=colour, alpha=0.5)
+        phase.plot(frequency[every], np.degrees(np.angle(measured)), ".", color=colour, alpha=0.5)
         if channel.name in known:
             model = fitted.path(channel.name)
             size.semilogy(fitted.frequency_hz, np.abs(model), color=colour, lw=1.0)
@@ -63,14 +63,9 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
     size.plot([], [], color=REJECTED, lw=1.0, label="model")
     size.plot([], [], color=REJECTED, lw=0.6, ls="--", label="standard error")
     size.set(ylabel=f"frequency response ({responses.estimator})")
-    size.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=6, handlelength=1.2, columnspacing=1.2)
+    size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, handlelength=1.2, borderaxespad=0.2)
     size.tick_params(labelbottom=False)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
-
-
-def _unit(output: str, source: str) -> str:
-    """Return the unit of a response as it is printed."""
-    return f"({output.replace('^2', '2').replace('s2', 's²')})/{source}"
 
 
 def _smooth(errors: np.ndarray) -> np.ndarray:
@@ -110,18 +105,18 @@ def _stabilisation(
         axis.patch.set_visible(False)
     kinds = (
         (~diagram.frequency_stable, ".", REJECTED, "new"),
-        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "frequency"),
-        (diagram.stable, "o", MAIN, "frequency, damping and shape stable"),
+        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "stable in frequency"),
+        (diagram.stable, "o", MAIN, "stable in all"),
     )
     for which, marker, colour, label in kinds:
         at = which & diagram.physical
         axis.plot(
-            diagram.frequency_hz[at], diagram.order[at], marker, ms=3, mfc="none", ls="", color=colour, label=label
+            diagram.frequency_hz[at], diagram.order[at], marker, mfc="none", ls="", color=colour, label=label
         )
     for frequency in modes.frequency_hz:
         axis.axvline(frequency, color=MAIN, lw=0.5, alpha=0.4)
     axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.05 * diagram.orders.max()))
-    _legend_above(axis, 3)
+    _legend_above(axis, 2)
 
 
 def _shapes(axis: "Axes", modes: LinearModes) -> None:
@@ -132,13 +127,13 @@ def _shapes(axis: "Axes", modes: LinearModes) -> None:
     for mode in range(count):
         label = f"{modes.frequency_hz[mode]:.2f} Hz, {100 * modes.damping_ratio[mode]:.3f} %"
         error = 1.96 * np.nan_to_num(modes.shapes_std[:, mode])
-        colour = _shade(mode, count)
+        colour = shade(mode, count)
         x = at + (mode - 0.5 * (count - 1)) * width
         axis.bar(x, modes.shapes[:, mode], 0.9 * width, yerr=error, color=colour, label=label, capsize=2)
     axis.axhline(0.0, color=REJECTED, lw=0.8)
     axis.set_xticks(at, [channel.name for channel in modes.channels])
-    axis.set_ylabel("mode shape, kg$^{-1/2}$")
-    _legend_above(axis, min(count, 3))
+    axis.set_ylabel("shape, kg$^{-1/2}$")
+    _legend_above(axis, min(count, 2))
 
 
 def _mac(axis: "Axes", modes: LinearModes) -> None:
@@ -151,28 +146,14 @@ def _mac(axis: "Axes", modes: LinearModes) -> None:
     axis.set_yticks(range(len(names)), names)
     axis.set(xlabel="mode, Hz", ylabel="mode, Hz")
     axis.grid(False)
-    axis.set_title("MAC of the modes at these sensors", fontsize=9)
+    axis.set_title("MAC at these sensors")
     for (row, column), value in np.ndenumerate(mac):
         colour = "white" if value > 0.6 else "black"
         axis.text(
-            column, row, f"{value:.2f}", ha="center", va="center", fontsize=8 if len(mac) < 9 else 6, color=colour
+            column, row, f"{value:.2f}", ha="center", va="center", fontsize="small" if len(mac) < 9 else "xx-small", color=colour
         )
 
 
 def _legend_above(axis: "Axes", columns: int) -> None:
     """Put the legend above the panel, where it hides nothing."""
-    axis.legend(
-        fontsize=7,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        ncols=columns,
-        handletextpad=0.3,
-        columnspacing=1.0,
-        handlelength=1.2,
-    )
-
-
-def _shade(index: int, count: int) -> Any:
-    from matplotlib import colormaps
-
-    return colormaps["viridis"](0.9 * index / max(1, count - 1))
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, handlelength=1.2, borderaxespad=0.2)

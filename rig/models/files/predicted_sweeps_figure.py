@@ -6,6 +6,7 @@ import numpy as np
 
 from identification import Predictions, SweepPrediction, Transient
 from identification.prediction.sweep_prediction import as_recorded
+from rig.drawing.areas import broad
 from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
     unit = engineering(np.array([top]))[1]
     scale = {"mm": 1e3, "µm": 1e6}[unit]
     if recorded is not None:
-        wide: dict[str, Any] = {"color": REJECTED, "lw": 4.0, "alpha": 0.5}
+        wide: dict[str, Any] = {"color": REJECTED, "lw": broad(), "alpha": 0.5}
         axes[0].plot(recorded.frequency_hz, scale * measured, label="recorded", **wide)
         axes[1].plot(recorded.frequency_hz, np.abs(recorded.force), **wide)
         _differences(axes[2], sweep, recorded)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Predictions, ResponseBand
-from rig.drawing.areas import areas, is_narrow
+from rig.drawing.areas import areas, broad, is_narrow
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends
 from rig.drawing.style import MARKERS, REJECTED, engineering, shade, title
 from rig.models.files.predicted_runs_figure import draw_runs
@@ -159,7 +159,7 @@ def _explain(size: "Axes", predictions: Predictions) -> None:
     if any(response.fold_frequency_hz.size for response in predictions.steady):
         size.plot([], [], "x", color=REJECTED, mew=1.5, label="fold: a sweep jumps here")
     if any(response.range_use.max() > BEYOND for response in predictions.steady):
-        size.plot([], [], color=REJECTED, lw=5.0, alpha=0.25, label="beyond the identified range")
+        size.plot([], [], color=REJECTED, lw=broad(), alpha=0.25, label="beyond the identified range")
     if any(band is not None for band in predictions.steady_bands):
         size.fill([], [], color=REJECTED, alpha=0.25, lw=0, label="95 % by the model's errors")
     alone = zip(predictions.steady, predictions.steady_references, strict=True)

@@ -5,32 +5,52 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification import FrequencyResponseMatrix
-from rig.drawing.style import MAIN, SECOND, title
+from rig.drawing.areas import is_narrow
+from rig.drawing.page import grid
+from rig.drawing.style import COLOURS, REJECTED, title, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = ["draw_response_matrix"]
 
-_COLOURS = (MAIN, SECOND, "#4f8f4f", "#8064a2")
 _LINES = ("-", "--", ":", "-.")
+_POOLED_LINES = 21
 
 
 def draw_response_matrix(page: "Figure", matrix: FrequencyResponseMatrix) -> None:
     """Draw one colour per output and one line style per input; thin lines are standard errors."""
-    size, phase = page.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
+    size, phase = grid(page, 2, 1, sharex=True, height_ratios=(2.0, 1.0))[:, 0]
+    known = False
     errors = matrix.noise_std if matrix.total_covariance is None else matrix.total_std
     for row, output in enumerate(matrix.outputs):
         for column, source in enumerate(matrix.inputs):
-            colour, line = _COLOURS[row % len(_COLOURS)], _LINES[column % len(_LINES)]
+            colour, line = COLOURS[row % len(COLOURS)], _LINES[column % len(_LINES)]
             value = matrix.value[:, row, column]
-            label = f"{output.name} over {source.name}, {output.unit}/{source.unit}"
-            size.semilogy(matrix.frequency_hz, np.abs(value), line, color=colour, lw=1.0, label=label)
-            phase.plot(matrix.frequency_hz, np.degrees(np.angle(value)), line, color=colour, lw=0.8)
+            label = f"{output.name} over {source.name}, {unit_text(f'{output.unit}/{source.unit}')}"
+            size.semilogy(matrix.frequency_hz, np.abs(value), line, color=colour, label=label)
+            phase.plot(matrix.frequency_hz, _broken(np.degrees(np.angle(value))), line, color=colour)
             if np.isfinite(errors[:, row, column]).any():
-                size.semilogy(matrix.frequency_hz, errors[:, row, column], line, color=colour, lw=0.4, alpha=0.6)
+                known = True
+                error = _smooth(errors[:, row, column])
+                size.semilogy(matrix.frequency_hz, error, line, color=colour, lw=0.7, alpha=0.6)
     size.set(ylabel="frequency response")
-    size.legend(fontsize=8)
+    if known:
+        size.plot([], [], color=REJECTED, lw=0.7, label="thin: standard error")
+    size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1 if is_narrow(page) else 2, borderaxespad=0.2)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
     estimator = f", {matrix.estimator}" if matrix.estimator else ""
     title(page, f"{matrix.specimen or 'specimen'}: frequency responses{estimator}")
+
+
+def _smooth(errors: np.ndarray) -> np.ndarray:
+    """Root mean square over neighbouring lines; the scatter of a standard error from line to line is meaningless."""
+    window = np.ones(min(_POOLED_LINES, errors.size))
+    power = np.convolve(errors**2, window, mode="same") / np.convolve(np.ones(errors.size), window, mode="same")
+    return np.asarray(np.sqrt(power))
+
+
+def _broken(angle_deg: np.ndarray) -> np.ndarray:
+    """Replace an angle by NaN where it wraps from 180 to -180, so that no vertical line is drawn there."""
+    jump = np.abs(np.diff(angle_deg, prepend=angle_deg[:1])) > 180.0
+    return np.where(jump, np.nan, angle_deg)
