@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rig.drawing.style import STYLE, height_is_free, page_in, rc
+from rig.drawing.style import STYLE, height_is_free, lines_on, page_in, points
 from rig.errors import RecordingError
 
 if TYPE_CHECKING:
@@ -110,14 +110,14 @@ def legend_below(page: "Figure", *panels: "Axes", handles: Sequence["Artist"] = 
     legend = page.legend(handles=[entries[name] for name in names], loc="outside lower left", ncols=columns)
     for text in legend.get_texts():
         text.set_parse_math(False)
-    _grow(page, 1.6 * _points("legend.fontsize") / 72.0 * -(-len(names) // columns))
+    _grow(page, 1.6 * points("legend.fontsize") / 72.0 * -(-len(names) // columns))
 
 
 def text_below(page: "Figure", text: str) -> None:
     """Write a text below all panels, in as many lines as it needs."""
-    page.supxlabel(text, x=0.01, ha="left", parse_math=False, wrap=True)
-    points = _points("figure.labelsize")
-    _grow(page, 1.4 * points / 72.0 * np.ceil(0.55 * points / 72.0 * len(text) / page.get_figwidth()))
+    shown = lines_on(page, text, "figure.labelsize")
+    page.supxlabel(shown, x=0.01, ha="left", parse_math=False)
+    _grow(page, 1.4 * points("figure.labelsize") / 72.0 * (1 + shown.count("\n")))
 
 
 def _grow(page: "Figure", by_in: float) -> None:
@@ -128,15 +128,8 @@ def _grow(page: "Figure", by_in: float) -> None:
 
 def columns_for(names: Sequence[str], width_in: float) -> int:
     """Return how many entries of a legend fit beside one another into a width (inches)."""
-    entry_in = _points("legend.fontsize") * (0.55 * max(map(len, names)) + 5.0) / 72.0
+    entry_in = points("legend.fontsize") * (0.55 * max(map(len, names)) + 5.0) / 72.0
     return min(len(names), max(1, int(width_in / entry_in)))
-
-
-def _points(setting: str) -> float:
-    """Return a size of fonts, points."""
-    from matplotlib.font_manager import FontProperties
-
-    return float(FontProperties(size=rc(setting)).get_size_in_points())
 
 
 def _lay_out(page: "Figure") -> None:

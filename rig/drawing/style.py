@@ -6,10 +6,11 @@ function passes no ``fontsize``, so that `restyle` reaches all text. Curves that
 as a level, take their colour from viridis without its yellow end (`shade`).
 """
 
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,18 +32,17 @@ __all__ = [
     "TRACE_BINS",
     "Preset",
     "engineering",
-    "from_zero",
     "height_is_free",
-    "log_axis",
+    "lines_on",
     "page_in",
     "plain_log",
+    "points",
     "rc",
     "restyle",
     "say_why_empty",
     "shade",
     "title",
     "unit_text",
-    "widen",
 ]
 
 MAIN, SECOND, THIRD = "#0072b2", "#d55e00", "#009e73"
@@ -53,6 +53,8 @@ COLOURS = (MAIN, SECOND, THIRD, "#e69f00", "#cc79a7", "#56b4e9", "#000000")
 MARKERS = "os^Dv<>P"
 """Markers of things beside one another: with a marker of its own, each can also be told apart in black and white."""
 
+_LETTER = 0.56
+"""Mean width of a letter over the size of its font (DejaVu Sans)."""
 TRACE_BINS = 1200
 _MM_PER_IN = 25.4
 
@@ -225,14 +227,29 @@ def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
 
 def say_why_empty(axis: "Axes", text: str) -> None:
     """Write into a panel why it is empty."""
-    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, wrap=True)
+    axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, parse_math=False)
     axis.set(xticks=[], yticks=[])
 
 
 def title(page: "Figure", text: str) -> None:
     """Write a title at the top left, in as many lines as it needs, unless the text is empty."""
     if text:
-        page.suptitle(text, x=0.01, ha="left", parse_math=False, wrap=True)
+        page.suptitle(lines_on(page, text, "figure.titlesize"), x=0.01, ha="left", parse_math=False)
+
+
+def lines_on(page: "Figure", text: str, setting: str) -> str:
+    """Return a text in lines as long as a page is wide, for the font size of a setting such as ``figure.titlesize``.
+
+    Matplotlib's own wrapping would read ``$`` as the beginning of a formula.
+    """
+    return textwrap.fill(text, max(20, int(0.98 * 72.0 * page.get_figwidth() / (_LETTER * points(setting)))))
+
+
+def points(setting: str) -> float:
+    """Return a font size of the style, points, by the name of its setting."""
+    from matplotlib.font_manager import FontProperties
+
+    return float(FontProperties(size=rc(setting)).get_size_in_points())
 
 
 def unit_text(unit: str) -> str:
@@ -242,45 +259,6 @@ def unit_text(unit: str) -> str:
         return written[unit]
     over, slash, under = unit.rpartition("/")
     return f"({written[over]})/{under}" if slash and over in written else unit
-
-
-def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
-    """Make an axis logarithmic that spans at least a factor, with plain numbers at 1, 2, 5 where it spans few decades.
-
-    To be called after the data are drawn.
-    """
-    from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter, NullLocator, StrMethodFormatter
-
-    axis.set(**{f"{which}scale": "log"})
-    low, high = getattr(axis, f"get_{which}lim")()
-    if high < least_span * low:
-        factor = np.sqrt(least_span * low / high)
-        low, high = low / factor, high * factor
-        axis.set(**{f"{which}lim": (low, high)})
-    ticks = getattr(axis, f"{which}axis")
-    ticks.set_minor_formatter(NullFormatter())
-    if high < 6.0 * low:
-        ticks.set_major_locator(AutoLocator())
-        ticks.set_minor_locator(NullLocator())
-    elif high < 300.0 * low:
-        ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    if low >= 1e-3 and high <= 1e4:
-        ticks.set_major_formatter(StrMethodFormatter("{x:g}"))
-
-
-def from_zero(axis: "Axes", *values: np.ndarray) -> None:
-    """Let an axis of amplitudes begin at zero, with room above the largest of the values."""
-    largest = max((float(np.nanmax(one)) for one in values if np.isfinite(one).any()), default=0.0)
-    if largest > 0.0:
-        axis.set_ylim(0.0, 1.08 * largest)
-
-
-def widen(axis: "Axes", least: float) -> None:
-    """Let the vertical axis span at least a part ``least`` of its middle value, so that scatter does not look like a trend."""
-    low, high = axis.get_ylim()
-    middle = 0.5 * (low + high)
-    half = max(0.5 * (high - low), 0.5 * least * abs(middle))
-    axis.set_ylim(middle - half, middle + half)
 
 
 def plain_log(axis: "Axes") -> None:

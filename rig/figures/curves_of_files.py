@@ -21,6 +21,8 @@ from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.evaluation.vibrations import channels_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.multisine.points import recorded_response_matrices
+from rig.campaigns.stepped_phase.figure import asked_lags, gaps
+from rig.campaigns.stepped_sine.figure import jumps
 from rig.campaigns.sweep.points import recorded_sweeps
 from rig.check.recorded import is_check
 from rig.drawing.folding import folds_back
@@ -107,7 +109,10 @@ def _backbones(source: Recording | NonlinearMode | Backbone, view: View) -> Curv
 
 
 def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) -> Curves:
-    """Amplitude over frequency, and the phase lag of the fundamental; what folds back at constant force is told apart."""
+    """Amplitude over frequency, and the phase lag of the fundamental; what folds back at constant force is told apart.
+
+    Lines are interrupted where the amplitude jumps, or where a lag that was asked for is missing.
+    """
     if not isinstance(source, Recording):
         view.only(of=ONE_AMPLITUDE)
         traces = tuple(
@@ -132,14 +137,22 @@ def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) ->
         lag = np.degrees(np.angle(-harmonics[:, force, 1] / drive))
         held = some[0].level_unit in ("N", "N RMS") and source.kind == "stepped-phase"
         folded = _points_between(folds_back(frequency_hz, lag)) if held else None
-        lines = [Line(frequency_hz, amplitude, None, folded)]
+        breaks = gaps(lag, asked_lags(points)) if source.kind == "stepped-phase" else np.array([], np.intp)
+        breaks = jumps(amplitude) if source.kind == "stepped-sine" else breaks
+        lines = [_broken(Line(frequency_hz, amplitude, None, folded), breaks)]
         panels = (Panel(FREQUENCY, across, log=some[0].level_unit == "m"),)
         if view.harmonic == 1 and channels[row].role in ("drive", "response"):
             turned = np.degrees(np.angle(-harmonics[:, force, 1] / harmonics[:, row, 1]))
-            lines.append(Line(frequency_hz, turned, None, folded))
+            lines.append(_broken(Line(frequency_hz, turned, None, folded), breaks))
             panels = (*panels, Panel(FREQUENCY, LAG._replace(text="phase lag of displacement")))
         found.append(Trace(label, tuple(lines)))
     return Curves(panels, tuple(found), specimen_of(source), refused(points))
+
+
+def _broken(line: Line, breaks: np.ndarray) -> Line:
+    """Interrupt a line before some points."""
+    folded = None if line.folded is None else np.insert(line.folded, breaks, False)
+    return Line(np.insert(line.x, breaks, np.nan), np.insert(line.y, breaks, np.nan), None, folded)
 
 
 def _per_force(across: Quantity, amplitude: np.ndarray, force_n: np.ndarray) -> tuple[Quantity, np.ndarray]:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import COLOURS, MARKERS, REJECTED, engineering, shade, title
+from rig.drawing.style import COLOURS, MARKERS, REJECTED, engineering, rc, shade, title
 from rig.errors import RecordingError
 from rig.figures.curves import Curves, Panel, Quantity, Trace, View
 from rig.figures.curves_of_files import curves_of, family_of
@@ -34,6 +35,8 @@ class _Look:
     colour: Any
     marker: str
     line: str
+    size: float = 1.0
+    """Of its markers, over the usual size: earlier files have larger ones, which later ones do not hide."""
 
 
 def overlay(
@@ -93,6 +96,7 @@ def _check_limits(path: Path, curves: Curves, view: View) -> None:
     if view.frequency_hz is None:
         return
     frequencies = np.concatenate([_frequency(trace, curves.panels) for trace in curves.traces])
+    frequencies = frequencies[np.isfinite(frequencies)]
     low, high = view.frequency_hz
     if not np.any((frequencies >= low) & (frequencies <= high)):
         least, most = frequencies.min(), frequencies.max()
@@ -137,7 +141,8 @@ def _look(number: int, level: int, files: int, levels: int, dense: bool) -> _Loo
     kind = level if levels > 1 else number
     if dense:
         return _Look(colour, "", LINES[kind % len(LINES)] if files > 1 else "-")
-    return _Look(colour, MARKERS[kind] if kind < len(MARKERS) else ".", "-")
+    size = 1.0 + 0.6 * (files - 1 - number) / max(1, files - 1)
+    return _Look(colour, MARKERS[kind] if kind < len(MARKERS) else ".", "-", size)
 
 
 def _line(
@@ -151,12 +156,14 @@ def _line(
     x = np.where(inside, _shown(panel.x, line.x, view, unit), np.nan)
     y = _shown(panel.y, line.y, view, unit)
     style: dict[str, Any] = {"color": look.colour, "marker": look.marker, "ls": look.line}
+    style["markersize"] = look.size * rc("lines.markersize")
     if line.half_95 is not None and np.isfinite(line.half_95).any():
         axis.errorbar(x, y, line.half_95, **style)
         return
     axis.plot(x, y, **style)
     if line.folded is not None and line.folded.any():
-        axis.plot(x[line.folded], y[line.folded], look.marker, ls="", mfc="white", color=look.colour, zorder=3)
+        style |= {"ls": "", "mfc": "white", "zorder": 3}
+        axis.plot(x[line.folded], y[line.folded], **style)
 
 
 def _shown(quantity: Quantity, values: np.ndarray, view: View, unit: str) -> np.ndarray:
@@ -175,7 +182,7 @@ def _axes(axis: "Axes", panel: Panel, view: View, unit: str) -> None:
             shown = unit + quantity.unit[1:]
         axis.set(**{f"{name}label": f"{quantity.text}, {shown}"})
         if quantity.role == "amplitude" and (view.amplitude == "log" or (view.amplitude is None and panel.log)):
-            axis.set(**{f"{name}scale": "log"})
+            log_axis(axis, "x" if name == "x" else "y")
         elif quantity.role == "amplitude" and view.amplitude != "dB" and name == "y":
             axis.set_ylim(bottom=0.0)
         if quantity.role == "frequency" and view.frequency_hz is not None:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 from identification import IdentificationError, nonlinear_mode
 from rig.campaigns.backbone.points import recorded_backbone
 from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading
+from rig.drawing.axes import widen
 from rig.drawing.nonlinear_mode import draw_properties
 from rig.drawing.page import grid
-from rig.drawing.style import widen
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, O
 from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_none
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
+from rig.drawing.axes import log_axis, widen
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, log_axis, say_why_empty, widen
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, say_why_empty
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

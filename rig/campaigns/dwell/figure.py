@@ -7,8 +7,9 @@ import numpy as np
 from rig.campaigns.dwell.points import DwellResult, recorded_course
 from rig.campaigns.evaluation.figure import heading
 from rig.campaigns.evaluation.recorded import points_of
+from rig.drawing.axes import widen
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, widen
+from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from identification import IdentificationError, InstrumentResponse, PeriodicSpec
 from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.multisine.points import recorded_spectra
+from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, log_axis, rc, say_why_empty, unit_text
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, rc, say_why_empty, unit_text
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 

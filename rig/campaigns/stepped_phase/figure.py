@@ -1,7 +1,7 @@
 """Figure of a stepped-phase test: responses at constant level, drawn along their branches."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from identification import FrequencyResponse
 from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
+from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.recorded import points_of
+from rig.drawing.axes import from_zero
 from rig.drawing.folding import folds_back
 from rig.drawing.page import NARROW_IN, grid, legend_below
-from rig.drawing.style import REJECTED, from_zero, rc, shade
+from rig.drawing.style import REJECTED, rc, shade
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_stepped_phase"]
+__all__ = ["asked_lags", "draw", "draw_stepped_phase", "gaps"]
 
 _THIN = 0.7
 NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant
@@ -32,7 +34,7 @@ def draw(page: "Figure", recording: Recording) -> None:
         page,
         recorded_frequency_responses(recording),
         title=describe(recording, "stepped phase"),
-        lags_deg=sorted({(point.asked_phase_lag_deg or 0.0) + 180.0 for point in points_of(recording)}),
+        lags_deg=asked_lags(points_of(recording)),
     )
 
 
@@ -54,11 +56,11 @@ def draw_stepped_phase(
     micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
     scale = 1e6 if micro else 1e3
     for number, item in enumerate(responses):
-        colour, gaps = shade(number, len(responses)), _gaps(item, lags_deg)
+        colour, breaks = shade(number, len(responses)), gaps(item.phase_lag_deg, lags_deg)
         label = item.label or f"{item.level:g} {item.level_unit}"
-        _branch(amplitude, item, item.amplitude_m * scale, colour, gaps, label)
-        _branch(lag, item, item.phase_lag_deg, colour, gaps)
-        _branch(force, item, item.force_n, colour, gaps)
+        _branch(amplitude, item, item.amplitude_m * scale, colour, breaks, label)
+        _branch(lag, item, item.phase_lag_deg, colour, breaks)
+        _branch(force, item, item.force_n, colour, breaks)
         if item.controlled == "force":
             force.axhline(item.level, color=colour, lw=_THIN * rc("lines.linewidth"), ls="--")
     if any(folds_back(item.frequency_hz, item.phase_lag_deg).any() for item in responses):
@@ -91,12 +93,17 @@ def _panels(page: "Figure") -> tuple["Axes", "Axes", "Axes"]:
     return axes["amplitude"], axes["lag"], axes["force"]
 
 
-def _gaps(item: FrequencyResponse, lags_deg: Sequence[float]) -> NDArray[np.intp]:
-    """Return int[k]: the points before which at least one requested lag is missing."""
+def asked_lags(points: Sequence[Point[Any]]) -> list[float]:
+    """Return the lags of the displacement that the plan asks for, deg, rising."""
+    return sorted({(point.asked_phase_lag_deg or 0.0) + 180.0 for point in points})
+
+
+def gaps(phase_lag_deg: NDArray[np.float64], lags_deg: Sequence[float]) -> NDArray[np.intp]:
+    """Return int[k]: the points before which at least one requested lag is missing. Both are lags of the displacement."""
     if not len(lags_deg):
         return np.array([], dtype=np.intp)
     asked = np.sort(lags_deg)
-    nearest = np.argmin(np.abs(np.subtract.outer(item.phase_lag_deg, asked)), axis=1)
+    nearest = np.argmin(np.abs(np.subtract.outer(phase_lag_deg, asked)), axis=1)
     return np.flatnonzero(np.abs(np.diff(nearest)) > 1) + 1
 
 
@@ -105,14 +112,14 @@ def _branch(
     item: FrequencyResponse,
     values: NDArray[np.float64],
     colour: object,
-    gaps: NDArray[np.intp],
+    interruptions: NDArray[np.intp],
     label: str | None = None,
 ) -> None:
     """Draw one level in the order of measurement: dotted where it folds back, with its resonant point filled."""
     folded = np.flatnonzero(folds_back(item.frequency_hz, item.phase_lag_deg)) + 1
     stable = np.setdiff1d(np.arange(1, values.size), folded)
     for line, elsewhere in (("-", folded), (":", stable)):
-        breaks = np.union1d(gaps, elsewhere).astype(np.intp)
+        breaks = np.union1d(interruptions, elsewhere).astype(np.intp)
         axis.plot(np.insert(item.frequency_hz, breaks, np.nan), np.insert(values, breaks, np.nan), line, color=colour)
     axis.plot(item.frequency_hz, values, "o", mfc="white", color=colour)
     if label is not None:

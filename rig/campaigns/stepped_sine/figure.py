@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from identification import FrequencyResponse
 from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
+from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import REJECTED, log_axis, shade
+from rig.drawing.style import REJECTED, shade
 from rig.drawing.style import title as heading
 from rig.recording.reader import Recording
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_stepped_sine"]
+__all__ = ["draw", "draw_stepped_sine", "jumps"]
 
 Float = NDArray[np.float64]
 
@@ -66,8 +67,12 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
 def _stepped(axis: "Axes", measured: FrequencyResponse, values: Float, **style: Any) -> None:
     """Draw points in the order of measurement. Two points between which the amplitude jumps are joined by a dotted line."""
     frequency_hz, amplitude_m = measured.frequency_hz, measured.amplitude_m
-    jumps = np.flatnonzero(np.abs(np.diff(np.log(amplitude_m))) > np.log(_JUMP)) + 1
-    gaps = np.full(jumps.size, np.nan)
-    axis.plot(np.insert(frequency_hz, jumps, gaps), np.insert(values, jumps, gaps), **style)
-    for k in jumps:
+    at = jumps(amplitude_m)
+    axis.plot(np.insert(frequency_hz, at, np.nan), np.insert(values, at, np.nan), **style)
+    for k in at:
         axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", color=style["color"])
+
+
+def jumps(amplitude_m: Float) -> NDArray[np.intp]:
+    """Return int[k]: the points before which the amplitude, float[n], jumps."""
+    return np.flatnonzero(np.abs(np.diff(np.log(amplitude_m))) > np.log(_JUMP)) + 1

@@ -108,6 +108,16 @@ def test_multisines_show_the_ratio_of_their_spectra(recordings, drawn):
     assert size.get_yscale() == "log"
 
 
+def test_a_jump_of_a_stepped_sine_is_no_line(recordings, drawn):
+    path = recordings["stepped-sine"]
+    (amplitude,) = points(path, amplitude_m=1.0)
+    jumps = np.flatnonzero(np.abs(np.diff(np.log(amplitude))) > np.log(1.5)) + 1
+    assert jumps.size
+    for axis in drawn(overlay([path], view=View("log"))).axes:
+        at = np.flatnonzero(np.isnan(axis.get_lines()[0].get_ydata()))
+        np.testing.assert_array_equal(at, jumps + np.arange(jumps.size))
+
+
 def test_frequency_limits_end_the_axis_and_the_curves(recordings, drawn):
     page = drawn(overlay([recordings["sweep"]], view=View(frequency_hz=(20.0, 30.0))))
     for axis in page.axes:
