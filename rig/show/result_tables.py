@@ -12,10 +12,12 @@ from identification import (
     DistortionLevels,
     ForceSurface,
     FrequencyResponse,
+    PeriodicSpectra,
     ResponseBand,
     StabilisationDiagram,
     SteadyPrediction,
     SweepPrediction,
+    Transient,
 )
 from rig.check import report as checks
 from rig.check.assessment import Assessment
@@ -163,6 +165,30 @@ def _say_periodic(found: PeriodicResponses) -> None:
     )
 
 
+def _say_spectra(found: PeriodicSpectra) -> None:
+    realisations, periods, _, lines = found.spectra.shape
+    print(
+        f"spectra of {realisations} realisations, {periods} periods each; {found.excited.sum()} of {lines} lines excited"
+    )
+    print_table(
+        ("channel", "RMS", "unit"),
+        [(channel.name, f"{found.rms(channel.name):.4g}", channel.unit) for channel in found.channels],
+    )
+
+
+def _say_transient(found: Transient) -> None:
+    first, last = found.frequency_hz[[0, -1]]
+    print(f"fundamentals from {first:.4g} to {last:.4g} Hz in {found.time_s[-1] - found.time_s[0]:.4g} s")
+    rows = zip(found.channels, np.abs(found.fundamentals), strict=True)
+    print_table(
+        ("channel", "smallest", "largest", "at Hz", "unit"),
+        [
+            (one.name, f"{size.min():.4g}", f"{size.max():.4g}", f"{found.frequency_hz[size.argmax()]:.4f}", one.unit)
+            for one, size in rows
+        ],
+    )
+
+
 def _say_tuning(found: Tuning) -> None:
     for line in lines(summary(found)):
         print(line)
@@ -184,6 +210,8 @@ SAY: Mapping[str, Callable[[Any], None]] = {
     "ResponseBand": _say_band,
     "StabilisationDiagram": _say_stabilisation,
     "PeriodicResponses": _say_periodic,
+    "PeriodicSpectra": _say_spectra,
+    "Transient": _say_transient,
     "Tuning": _say_tuning,
     "Assessment": _say_check,
 }

@@ -8,11 +8,11 @@ import pytest
 
 import identification
 import rig
-from identification import FrequencyResponse
+from identification import FrequencyResponse, Transient
 from rig.show import as_html, as_text
 from rig.show.result_tables import SAY
 from rig.tuning import Tuning
-from tests.identification.rigs import one_mode_point
+from tests.identification.rigs import CHANNELS, one_mode_point
 
 VOID = {"br", "hr", "img"}
 
@@ -45,6 +45,15 @@ def read(html: str) -> Reader:
     reader.feed(html)
     assert not reader.open
     return reader
+
+
+@pytest.fixture(autouse=True)
+def pyplot():
+    """Figures without a screen, closed after the test."""
+    found = pytest.importorskip("matplotlib.pyplot")
+    found.switch_backend("agg")
+    yield found
+    found.close("all")
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +99,23 @@ def test_a_run_shows_its_points_with_their_quality():
     assert {"quality", "frequency Hz"} <= set(cells)
     for point in run.recording.points:
         assert f"{point['frequency_hz']:.4f}" in cells
+
+
+def test_an_analysis_of_a_bench_shows_its_modes_and_draws_them():
+    from rig.analysis.modes import modes
+    from rig.analysis.subject import subject_of
+
+    found = modes(subject_of("magnet-beam"))
+    cells = read(found._repr_html_()).cells
+    assert all(f"{frequency:.4f}" in cells for frequency in found.structure.frequency_hz)
+    curves = [line.get_ydata() for axis in found.plot() for line in axis.lines]
+    assert any(np.allclose(np.abs(one).max(), shape, rtol=0.2) for one in curves for shape in found.point_shapes["tip"])
+
+
+def test_a_sweep_shows_the_largest_of_every_channel_and_where():
+    time = np.linspace(0.0, 1.0, 11)
+    found = Transient(CHANNELS, time, 20.0 + time, np.array([np.full(11, 0.2 + 0j), (1.0 + time) * 1j]), 5)
+    assert {"0.2", "2", "21.0000", "m/s2"} <= set(read(found._repr_html_()).cells)
 
 
 def test_what_has_no_table_is_left_to_its_text():
