@@ -58,6 +58,7 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "download_all_examples": False,
     "write_computation_times": False,
+    "min_reported_time": 600,
     "thumbnail_size": (480, 300),
     "log_level": {"backreference_missing": "info"},
 }
