@@ -47,8 +47,8 @@ class Experiment:
         Lowest and highest excited frequency; None if unknown. Frequencies that the structure generates, such as harmonics in
         a measured force, do not count as excited.
     output_noise
-        float[n_outputs, n_lines], standard errors of the amplitudes (peak) of the outputs' lines 1, 2, ... below half the sample
-        rate, from the scatter of periods that were averaged; None if unknown.
+        float[n_outputs, n_lines], standard errors of the amplitudes (peak) of the outputs' lines 1, 2, ... below half the
+        sample rate, from the scatter of periods that were averaged; None if unknown.
 
     Raises
     ------

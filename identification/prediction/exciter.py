@@ -107,7 +107,9 @@ class ExciterLines:
             kind = np.complex128 if "per_volt" in name else np.float64
             object.__setattr__(self, name, finite_array(name, getattr(self, name), kind, 1))
             if getattr(self, name).shape != self.frequency_hz.shape:
-                raise IdentificationError(f"{name}: {getattr(self, name).size} values for {self.frequency_hz.size} lines")
+                raise IdentificationError(
+                    f"{name}: {getattr(self, name).size} values for {self.frequency_hz.size} lines"
+                )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

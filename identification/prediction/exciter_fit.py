@@ -199,7 +199,7 @@ class _Lines:
         return np.concatenate([scaled.real.ravel(), scaled.imag.ravel()])
 
     def kept(self, p: Float) -> ExciterLines:
-        """Return force and acceleration per volt, means over the realisations, and the noise of the force left over by ``p``."""
+        """Return force and acceleration per volt, means over realisations, and the noise of the force that ``p`` leaves."""
         x = self.coefficients(p)
         force, acceleration, voltage = self.signals
         power = np.sum(np.abs(voltage) ** 2, axis=0)

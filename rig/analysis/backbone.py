@@ -24,7 +24,7 @@ from simulators.sites.friction import FrictionSite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 __all__ = ["Backbone", "backbone", "draw_backbone", "neglected"]
 

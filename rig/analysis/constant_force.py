@@ -158,6 +158,4 @@ def _branches(axis: "Axes", curve: PeriodicResponses, values: np.ndarray, colour
         mine = stable == kind
         if kind is False:  # the dots reach to the folds
             mine = mine | np.append(mine[1:], False) | np.append(False, mine[:-1])
-        axis.plot(
-            np.where(mine, curve.frequency_hz, np.nan), np.where(mine, values, np.nan), ls=style, color=colour
-        )
+        axis.plot(np.where(mine, curve.frequency_hz, np.nan), np.where(mine, values, np.nan), ls=style, color=colour)

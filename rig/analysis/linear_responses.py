@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rig.analysis.levels import most_points
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
-from rig.drawing.areas import is_narrow, legend_below
+from rig.drawing.areas import legend_below
 from rig.drawing.page import grid
 from rig.drawing.style import COLOURS, MAIN
 from rig.errors import ConfigurationError
@@ -145,7 +145,7 @@ def draw_responses(
             phase.plot(frequency_hz, np.degrees(np.unwrap(np.angle(curve))), color=colour, lw=1.0)
         magnitude.set(xscale="log", yscale="log")
         magnitude.set_ylabel(title)
-        phase.set_ylabel(f"its phase, deg" if not is_narrow(page) else f"phase of {title.split(',')[0]}, deg")
+        phase.set_ylabel(f"phase of {title.split(', ')[1]}, deg")
         phase.set_xlabel("frequency, Hz")
         low, high = phase.get_ylim()
         phase.yaxis.set_major_locator(MultipleLocator(90.0 if high - low < 900.0 else 360.0))

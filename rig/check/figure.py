@@ -157,7 +157,12 @@ def _draw_force(axis: "Axes", found: Assessment) -> None:
         return
     index = found.bench.index_of("force")
     frequency, name = found.responses.frequency_hz, found.responses.names[index]
-    axis.semilogy(frequency, np.abs(found.responses.per_volt[index]), color=MAIN, label=f"{name}: dead" if name in _dead(found) else "now")
+    axis.semilogy(
+        frequency,
+        np.abs(found.responses.per_volt[index]),
+        color=MAIN,
+        label=f"{name}: dead" if name in _dead(found) else "now",
+    )
     if found.reference is not None and name in found.reference.names:
         known = on_lines_of(frequency, found.reference)[found.reference.names.index(name)]
         axis.semilogy(frequency, np.abs(known), "--", color=SECOND, label="reference")
@@ -172,7 +177,8 @@ def _say_findings(axis: "Axes", found: Assessment, rows: int, columns: int) -> N
     from matplotlib.transforms import ScaledTranslation
 
     axis.set_axis_off()
-    page = axis.figure
+    page = axis.get_figure(root=True)
+    assert page is not None
     size_pt = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points()
     narrow = is_narrow(page)
     width = int(page.get_figwidth() * (0.75 if narrow else 0.85 / columns) * 72.0 / (_LETTER * size_pt))

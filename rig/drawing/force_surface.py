@@ -91,7 +91,9 @@ def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> Non
         for which, line in ((curve.stable, "-"), (~curve.stable, UNSTABLE)):
             near = which | np.concatenate([which[1:], [False]])
             shown = np.where(near, scale * response.amplitude_m, np.nan)
-            axis.plot(response.frequency_hz, shown, ls=line, color=colour, label=response.label if line == "-" else None)
+            axis.plot(
+                response.frequency_hz, shown, ls=line, color=colour, label=response.label if line == "-" else None
+            )
         ends = [0, -1]
         axis.plot(response.frequency_hz[ends], scale * response.amplitude_m[ends], "s", color=colour)
     resonance = surface.at_lag(90.0)

@@ -61,7 +61,9 @@ def ends_within(response: SteadyPrediction) -> np.ndarray:
     found = []
     for branch in np.unique(response.branch):
         on = np.flatnonzero(response.branch == branch)
-        closed = np.isclose(*response.frequency_hz[on[[0, -1]]], rtol=_SAME) and np.isclose(*amplitude[on[[0, -1]]])
+        closed = bool(np.allclose(response.frequency_hz[on[0]], response.frequency_hz[on[-1]], rtol=_SAME)) and bool(
+            np.allclose(amplitude[on[0]], amplitude[on[-1]])
+        )
         for end in () if closed else (on[0], on[-1]):
             at_edge = any(abs(response.frequency_hz[end] - edge) <= _SAME * edge for edge in band)
             if not at_edge and amplitude[end] > _VISIBLE * amplitude.max():

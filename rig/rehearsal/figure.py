@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_rehearsal"]
 
-MOST_LIMITS, MOST_INFLUENCES = 5, 5
+MOST_LIMITS, MOST_INFLUENCES = 4, 5
 ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"
 
 
@@ -76,9 +76,7 @@ def _draw_points(axis: "Axes", verdict: Verdict) -> None:
     accepted = np.array([point.accepted.count for point in verdict.points]) / n
     missing = np.array([point.qualities.get("not begun", 0) for point in verdict.points]) / n
     axis.bar(x, 100.0 * accepted, color=ACCEPTED, label="accepted")
-    axis.bar(
-        x, 100.0 * (1.0 - accepted - missing), bottom=100.0 * accepted, color=FAILED, label="refused"
-    )
+    axis.bar(x, 100.0 * (1.0 - accepted - missing), bottom=100.0 * accepted, color=FAILED, label="refused")
     axis.bar(x, 100.0 * missing, bottom=100.0 * (1.0 - missing), color=MISSING, label="not begun")
     axis.set(xlabel="point of the plan", ylabel="draws, %", ylim=(0.0, 101.0))
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2)
@@ -99,13 +97,14 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
     axis.plot([], [], color=MAIN, lw=4.0, label="5 to 95 % of draws")
     axis.plot([], [], "o", color="w", mec=MAIN, label="median")
     axis.plot([], [], "|", color=SECOND, mew=2.0, label="largest")
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.2, title=_closest(verdict), alignment="left")
+    axis.legend()
+    axis.set_title(_closest(verdict))
 
 
-def _closest(verdict: Verdict) -> str | None:
+def _closest(verdict: Verdict) -> str:
     """Say how many of the limits are drawn, if not all."""
     count = len(verdict.margins)
-    return f"the closest {MOST_LIMITS} of {count} limits" if count > MOST_LIMITS else None
+    return f"the closest {MOST_LIMITS} of {count} limits" if count > MOST_LIMITS else ""
 
 
 def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:

@@ -62,7 +62,8 @@ def _errors(page: "Figure", study: Study) -> None:
     axes[0].set_ylabel(f"error of {study.table.output}, %")
     legend_below(page, _handles(axes))
     models = sum(len({row.model for row in study.table.tests if row.training_set == one}) for one in sets)
-    title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of {models} model{'' if models == 1 else 's'}{_few(study)}")
+    count = f"{models} model{'' if models == 1 else 's'}"
+    title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of {count}{_few(study)}")
 
 
 def _tested(table: ErrorTable, test: str) -> bool:
@@ -87,7 +88,13 @@ def _tests(axis: Any, tables: Mapping[str, ErrorTable], training_set: str, tests
             at = column + shift + random.uniform(-0.3, 0.3, errors.size) * (errors.size > 1) / len(tables)
             axis.plot(at, errors, mark, color=colour, alpha=0.6, label=None if column else name)
             if errors.size > 1:
-                axis.plot([column + shift - 0.4 / len(tables), column + shift + 0.4 / len(tables)], 2 * [errors.mean()], color=SECOND, zorder=3, label="mean")
+                axis.plot(
+                    [column + shift - 0.4 / len(tables), column + shift + 0.4 / len(tables)],
+                    2 * [errors.mean()],
+                    color=SECOND,
+                    zorder=3,
+                    label="mean",
+                )
             elif errors.size:
                 axis.annotate(f"{errors[0]:.3g} %", (column + shift, errors[0]), (0, 6), ha="center", **_POINTS)
             if errors.size < len(rows):
@@ -145,10 +152,14 @@ def _rig(axis: Any, truth: Truth) -> None:
     if truth.held == "pure-sine":
         backbone: dict[str, Any] = {"color": "black", "ls": "--", "label": "rig: backbone"}
         axis.plot(responses.frequency_hz, 1e3 * responses.amplitude_m, **backbone)
-        axis.plot(truth.frequency_hz, 1e3 * truth.amplitude_m, "k*", ms=2.0 * rcParams["lines.markersize"], label="rig: peak")
+        axis.plot(
+            truth.frequency_hz, 1e3 * truth.amplitude_m, "k*", ms=2.0 * rcParams["lines.markersize"], label="rig: peak"
+        )
     else:
         label = f"rig: {_HELD[truth.held]}"
-        axis.plot(responses.frequency_hz, 1e3 * responses.amplitude_m, color=REJECTED, lw=broad(), alpha=0.5, label=label)
+        axis.plot(
+            responses.frequency_hz, 1e3 * responses.amplitude_m, color=REJECTED, lw=broad(), alpha=0.5, label=label
+        )
 
 
 def _explain(page: "Figure", axes: np.ndarray, study: Study, reasons: Sequence[str]) -> None:
@@ -200,10 +211,20 @@ def _envelopes(axis: Any, shown: Sequence[SweepResult], colours: Mapping[str, An
         left = np.flatnonzero(np.isfinite(simulated) & (simulated <= _MOST_OF_UNBOUNDED * top))
         if one.unbounded_at_s is not None and left.size:
             label = "unbounded from here on"
-            axis.plot(one.frequency_hz[left[-1]], simulated[left[-1]], "X", color=colour, mec="black", ms=1.8 * size, label=label)
+            axis.plot(
+                one.frequency_hz[left[-1]],
+                simulated[left[-1]],
+                "X",
+                color=colour,
+                mec="black",
+                ms=1.8 * size,
+                label=label,
+            )
     bounded = [float(np.max(one.simulated)) for one in shown if one.unbounded_at_s is None]
     highest = max([top, *bounded])
-    axis.set_ylim(0.0, 1.15 * min(highest, _MOST_SHOWN * top) if len(bounded) == len(shown) else _MOST_OF_UNBOUNDED * top)
+    axis.set_ylim(
+        0.0, 1.15 * min(highest, _MOST_SHOWN * top) if len(bounded) == len(shown) else _MOST_OF_UNBOUNDED * top
+    )
     if highest > _MOST_SHOWN * top:
         axis.text(0.99, 0.95, "cut off above", ha="right", va="top", transform=axis.transAxes)
 

@@ -24,8 +24,8 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
     """Draw measurement and model over the band in which the exciter was identified, with amplitude above phase.
 
     From left to right: force per volt on the rig, as measured and as the model gives it for the measured motion, with the
-    residual and its noise; blocked force per volt; dynamic stiffness of the armature. The dots of the last two are what the measured force
-    says of the one if the other is as fitted. A file without measured lines has no first column and no dots.
+    residual and its noise; blocked force per volt; dynamic stiffness of the armature. The dots of the last two are what the
+    measured force says of the one if the other is as fitted. A file without measured lines has no first column and no dots.
     """
     from matplotlib.ticker import LogLocator
 
@@ -112,10 +112,11 @@ def _explain(axis: "Axes", band: bool, dots: bool) -> None:
 def _title(exciter: Exciter, low: float, high: float) -> str:
     damping, error = exciter.damping_n_s_m
     known = f"{damping:.5g}" if not np.isfinite(error) else f"{damping:.5g} ± {1.96 * error:.2g}"
+    missing = "" if exciter.lines is not None else "; the file holds no measured lines"
     return (
-        f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\nmoving mass {exciter.moving_mass_kg:.4g} kg, "
-        f"suspension {exciter.suspension_stiffness_n_m:.4g} N/m, damping (suspension and back-EMF) {known} N s/m"
-        + ("" if exciter.lines is not None else "; the file holds no measured lines")
+        f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\n"
+        f"moving mass {exciter.moving_mass_kg:.4g} kg, suspension {exciter.suspension_stiffness_n_m:.4g} N/m, "
+        f"damping (suspension and back-EMF) {known} N s/m{missing}"
     )
 
 

@@ -110,9 +110,7 @@ def _stabilisation(
     )
     for which, marker, colour, label in kinds:
         at = which & diagram.physical
-        axis.plot(
-            diagram.frequency_hz[at], diagram.order[at], marker, mfc="none", ls="", color=colour, label=label
-        )
+        axis.plot(diagram.frequency_hz[at], diagram.order[at], marker, mfc="none", ls="", color=colour, label=label)
     for frequency in modes.frequency_hz:
         axis.axvline(frequency, color=MAIN, lw=0.5, alpha=0.4)
     axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.05 * diagram.orders.max()))
@@ -150,7 +148,13 @@ def _mac(axis: "Axes", modes: LinearModes) -> None:
     for (row, column), value in np.ndenumerate(mac):
         colour = "white" if value > 0.6 else "black"
         axis.text(
-            column, row, f"{value:.2f}", ha="center", va="center", fontsize="small" if len(mac) < 9 else "xx-small", color=colour
+            column,
+            row,
+            f"{value:.2f}",
+            ha="center",
+            va="center",
+            fontsize="small" if len(mac) < 9 else "xx-small",
+            color=colour,
         )
 
 

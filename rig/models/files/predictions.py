@@ -4,7 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from identification import FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, SweepPrediction, Transient
+from identification import (
+    FrequencyResponse,
+    PredictionError,
+    Predictions,
+    ResponseBand,
+    SteadyPrediction,
+    SweepPrediction,
+    Transient,
+)
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -12,10 +20,14 @@ __all__ = ["CUT", "PREDICTIONS"]
 
 CUT = "the response from "
 """Beginning of the note on a response that was cut off. The note on the first path precedes that on the second."""
+_ERRORS = ("peak %", "frequency %", "envelope %")
 
 
 def _steady(
-    response: SteadyPrediction, band: ResponseBand | None, reference: FrequencyResponse | None
+    response: SteadyPrediction,
+    band: ResponseBand | None,
+    reference: FrequencyResponse | None,
+    error: PredictionError | None,
 ) -> dict[str, Any]:
     peak, reached = response.peak(), response.peak_reached()
     return {
@@ -33,6 +45,7 @@ def _steady(
         "folds_hz": response.fold_frequency_hz.tolist(),
         "detached_branches": int(response.branch.max()) if response.complete else 0,
         "range_use": float(response.range_use[response.branch == 0].max()),
+        "error": None if error is None else error.row(),
         "notes": sorted(response.notes, key=lambda note: not note.startswith(CUT)),
     }
 
@@ -53,7 +66,8 @@ def _sweep(sweep: SweepPrediction, recorded: Transient | None, name: str) -> dic
 
 
 def _summarise(predictions: Predictions) -> dict[str, Any]:
-    steady = zip(predictions.steady, predictions.steady_bands, predictions.steady_references, strict=True)
+    known = (predictions.steady_bands, predictions.steady_references, predictions.steady_errors)
+    steady = zip(predictions.steady, *known, strict=True)
     compared = zip(predictions.sweeps, predictions.sweep_errors, strict=True)
     names = [error.name if error else sweep.origin for sweep, error in compared]
     return {
@@ -68,9 +82,15 @@ def _summarise(predictions: Predictions) -> dict[str, Any]:
 
 def _say(summary: dict[str, Any]) -> None:
     if summary["frequency_responses"]:
+        compared = any(r["error"] for r in summary["frequency_responses"])
         print("frequency responses; +- are 95 % by the model's own errors")
+        if compared:
+            print("errors: predicted over reference, minus one")
         print_table(
-            ("response", "force N", "peak mm", "+-", "at Hz", "+-", "lag deg", "folds at Hz", "range use"),
+            (
+                *("response", "force N", "peak mm", "+-", "at Hz", "+-", "lag deg", "folds at Hz", "range use"),
+                *(_ERRORS if compared else ()),
+            ),
             [
                 (
                     r["name"],
@@ -82,6 +102,7 @@ def _say(summary: dict[str, Any]) -> None:
                     number(r["peak_phase_lag_deg"], ".1f"),
                     ", ".join(f"{fold:.4f}" for fold in r["folds_hz"]) or "none",
                     number(r["range_use"], ".2f"),
+                    *(_errors(r["error"]) if compared else ()),
                 )
                 for r in summary["frequency_responses"]
             ],
@@ -120,20 +141,19 @@ def _say(summary: dict[str, Any]) -> None:
         lost = sum(r["unbounded"] for r in summary["multisines"])
         if lost:
             print(f"{lost} of {len(summary['multisines'])} runs unbounded")
-    if summary["errors"]:
+    of_sweeps = summary["errors"][sum(bool(r["error"]) for r in summary["frequency_responses"]) :]
+    if of_sweeps:
         print("errors: predicted over reference, minus one")
         print_table(
-            ("prediction", "peak %", "frequency %", "envelope %", "range use", ""),
+            ("prediction", *_ERRORS, "range use", ""),
             [
                 (
                     e["name"],
-                    number(e["peak_error"], "+.2f", 100.0),
-                    number(e["peak_frequency_error"], "+.3f", 100.0),
-                    number(e["envelope_error"], ".2f", 100.0),
+                    *_errors(e),
                     "-" if e["verdict"] == "unbounded" else number(e["range_use"], ".2f"),
                     e["verdict"],
                 )
-                for e in summary["errors"]
+                for e in of_sweeps
             ],
         )
     shown = set()
@@ -142,6 +162,17 @@ def _say(summary: dict[str, Any]) -> None:
             if note not in shown:
                 print(f"note: {part['name']}: {note}")
             shown.add(note)
+
+
+def _errors(error: dict[str, Any] | None) -> tuple[str, str, str]:
+    """Return the errors of one prediction as they are printed."""
+    if error is None:
+        return "-", "-", "-"
+    return (
+        number(error["peak_error"], "+.2f", 100.0),
+        number(error["peak_frequency_error"], "+.3f", 100.0),
+        number(error["envelope_error"], ".2f", 100.0),
+    )
 
 
 PREDICTIONS = FileKind(

@@ -47,7 +47,8 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
     _check(request, model, path)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
     held = cast(Held, request.held or default_held(model, exciter))
-    alone = request.forces_without_reference([one.measured for one in references], default_held(model, exciter))
+    references_held = default_held(model, exciter)
+    alone = request.forces_without_reference([one.measured for one in references], references_held)
     steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
         (pnlss_frequency_response(model, level, force=one, exciter=exciter), None, None)
         for one, levels in ((held, alone), ("voltage", request.voltages_v))

@@ -81,14 +81,14 @@ class PredictionRequest:
         if self.zero_crossings is not None and not self.sweeps:
             raise ConfigurationError("`zero_crossings`: is for recorded sweeps; add `sweeps`, or leave it out")
 
-    def forces_without_reference(self, references: Iterable[FrequencyResponse], held: str) -> list[float]:
+    def forces_without_reference(self, references: Iterable[FrequencyResponse], held: str) -> tuple[float, ...]:
         """Return the requested forces, N, at which no reference was held: the others are predicted with their reference.
 
         ``held`` is the quantity at which references of constant force are predicted.
         """
         if (self.held or held) != held:
-            return list(self.forces_n)
+            return self.forces_n
         known = [reference.level for reference in references if reference.controlled == "force"]
-        return [
+        return tuple(
             force for force in self.forces_n if not any(math.isclose(force, level, rel_tol=1e-6) for level in known)
-        ]
+        )

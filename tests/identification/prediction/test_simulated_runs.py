@@ -15,6 +15,7 @@ from identification import (
     PnlssModel,
     error_spectra,
     estimated_initial_state,
+    output_stretch,
     simulated_run,
 )
 from identification.linear.subspace import StateSpace
@@ -97,9 +98,31 @@ def test_spectra_of_a_sine_are_its_amplitude_and_that_of_the_error():
     at = int(np.argmin(np.abs(found.frequency_hz - 2.5)))
     np.testing.assert_allclose(found.measured[:, at], 1.1 * np.abs(response), rtol=1e-9)
     np.testing.assert_allclose(found.error[:, at], 0.1 * np.abs(response), rtol=1e-6)
+    np.testing.assert_allclose(found.model[:, at], np.abs(response), rtol=1e-6)
+    assert np.isnan(found.noise).all()
+    known = replace(sine, output_noise=np.full((2, 99), 0.01))
+    assert (error_spectra(model(), None, known).noise == 0.01).all()
     assert np.isnan(found.linear_error).all()
     with pytest.raises(IdentificationError, match="not periodic"):
         error_spectra(model(), None, experiment())
+
+
+def test_a_stretch_lies_around_the_largest_output_and_has_what_scipy_simulates():
+    measured = experiment(wrong=(0.25, 0.0), counted_from=50)
+    found = output_stretch(model(), measured, samples=60)
+    top = 50 + int(np.argmax(np.abs(measured.outputs[0, 50:])))
+    assert found.time_s.size == 60
+    assert found.time_s[0] <= top / 100.0 <= found.time_s[-1]
+    first = round(found.time_s[0] * 100.0)
+    np.testing.assert_array_equal(found.measured, measured.outputs[:, first : first + 60])
+    np.testing.assert_allclose(found.simulated, experiment().outputs[:, first : first + 60], atol=1e-9)
+
+
+def test_a_stretch_of_a_run_that_leaves_all_bounds_ends_there():
+    cubic = model().with_features(Features.monomials(2, 1, [3], of=range(2)))
+    found = output_stretch(replace(cubic, e=np.full(cubic.e.shape, 5.0)), experiment(), samples=400)
+    assert np.isnan(found.simulated[:, -1]).all()
+    assert np.isfinite(found.measured).all()
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,16 @@ def backbone():
         yield run
 
 
+def test_the_noise_of_a_mean_is_the_scatter_of_its_periods(multisine):
+    (mean, _), (whole, _) = multisine.experiments(), multisine.experiments(periods="all")
+    periods = whole.counted_outputs.reshape(len(whole.outputs), 3, 1600)
+    lines = np.fft.rfft(periods)[..., 1:800] * 2.0 / 1600
+    scatter = np.std(lines, axis=1, ddof=1) / np.sqrt(3.0)
+    assert mean.output_noise.shape == scatter.shape
+    np.testing.assert_allclose(mean.output_noise[:, 5:700], scatter[:, 5:700], rtol=1e-6)
+    assert whole.output_noise is None
+
+
 def test_a_period_of_a_multisine_has_the_lines_that_its_spectra_have(multisine):
     measured = spectra(multisine.recording)[0.2]
     made = multisine.experiments()

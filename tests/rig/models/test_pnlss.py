@@ -211,23 +211,35 @@ def test_with_an_exciter_a_force_driven_model_follows_the_voltage(there, force_m
     assert told["sweeps"][2]["peak_m"] == pytest.approx(told["sweeps"][0]["peak_m"], rel=2e-3)
 
 
-def test_a_figure_shows_spectra_course_and_range_of_what_the_file_holds(there, force_model, recordings):
+def test_a_figure_shows_spectra_time_course_and_range_of_what_the_file_holds(there, force_model, recordings):
     assert there("plot F.h5 -o F.png").status == 0
     found = load(force_model)
     page = Figure(figsize=(12.0, 7.5), layout="constrained")
     draw_pnlss(page, found)
-    spectra, history, runs = page.axes
-    measured, linear, model = spectra.get_lines()[:3]
-    np.testing.assert_allclose(measured.get_ydata(), found.spectra.measured[0])
-    assert model.get_ydata().max() < 0.8 * linear.get_ydata().max() < 0.2 * measured.get_ydata().max()
+    spectra, time, history, runs = page.axes
+    lines = {line.get_label(): np.asarray(line.get_ydata()) for line in spectra.get_lines()}
+    np.testing.assert_allclose(lines["measured"], found.spectra.measured[0])
+    assert (
+        lines["residual, this model"].max()
+        < 0.8 * lines["residual, linear model"].max()
+        < 0.2 * lines["measured"].max()
+    )
+    top = int(np.argmax(lines["measured"]))
+    assert lines["this model"][top] == pytest.approx(lines["measured"][top], rel=0.05)
+    assert 0.0 < np.median(lines["noise"]) < 0.1 * lines["residual, this model"].max()
+    measured, model, residual = (np.asarray(line.get_ydata()) for line in time.get_lines())
+    assert np.abs(measured).max() == np.abs(found.stretch.measured[0]).max()
+    np.testing.assert_allclose(residual, model - measured)
+    assert np.linalg.norm(residual) < 0.05 * np.linalg.norm(measured)
     lengths = [len(line.get_xdata()) for line in history.get_lines()]
     assert lengths.count(found.fit.history.iterations + 1) == 2  # training, validation
     drawn = np.concatenate([line.get_xydata() for line in runs.get_lines() if len(line.get_xdata()) <= 3])
     for run in found.runs:
         assert np.any(np.isclose(drawn, run.range_use)), run.name
     page.clear()
-    draw_pnlss(page, replace(found, runs=(), linear_runs=(), spectra=None))
+    draw_pnlss(page, replace(found, runs=(), linear_runs=(), spectra=None, stretch=None))
     assert len(page.axes) == 1  # the course alone, no empty panels
+    assert "not in the file: spectra, time series, errors of experiments" in page.get_suptitle()
 
 
 def test_a_response_that_is_cut_off_has_no_peak(there, force_model):

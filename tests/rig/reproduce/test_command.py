@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from rig.bench import load_bench
 from rig.models.files.files import load
 from rig.models.files.pnlss import IdentifiedPnlss
+from rig.models.files.pnlss_figure import draw_pnlss
 from rig.reproduce.options import Options
 from rig.reproduce.specimens import specimen_of
 from rig.reproduce.steady import steady
@@ -89,6 +91,40 @@ def test_models_know_which_realisations_they_were_identified_with_whatever_the_f
     done = typed(f"predict {path} --multisine {other} -o {tmp_path / 'P.h5'} --json")
     uses = [run["use"] for run in json.loads(done.out)["multisines"]]
     assert uses == ["test", "validation", "training", "training", "training"]
+
+
+def test_figures_of_a_small_study_say_what_is_missing_and_why_curves_end(folder, monkeypatch):
+    pages = {}
+
+    def keep(study, name, draw, size):
+        pages[name] = Figure(figsize=size, layout="constrained")
+        draw(pages[name], study)
+
+    monkeypatch.setattr("rig.reproduce.figures._write", keep)
+    assert typed(f"{SMALL} -o {folder}").status == 0
+    errors, steady_page = pages["errors"], pages["steady"]
+    assert "tests of 1 model; 2 of 3 levels not recorded" in errors.get_suptitle()
+    (axis,) = errors.axes
+    drawn = [line for line in axis.get_lines() if np.size(line.get_xdata()) == 1]
+    table = json.loads((folder / "force" / "table.json").read_text())["errors"]
+    wanted = {name: 100.0 * row["mean"] for name, (row, *_) in table.items()}
+    assert {line.get_label(): pytest.approx(line.get_ydata()[0]) for line in drawn} == wanted
+    assert len(wanted) == 4
+    (legend,) = steady_page.legends
+    texts = [text.get_text().replace("\n", " ") for text in legend.get_texts()]
+    assert "ends here: the states are beyond 3 times those of the training data" in texts
+    assert len(texts) == len(set(texts))
+    for axis in steady_page.axes:
+        assert [line for line in axis.get_lines() if line.get_marker() == "s" and np.size(line.get_xdata()) == 2]
+
+
+def test_models_of_a_study_are_drawn_with_spectrum_and_time(folder):
+    (path,) = (folder / "force" / "models").glob("*01.h5")
+    found = load(path)
+    page = Figure(figsize=(12.0, 7.5), layout="constrained")
+    draw_pnlss(page, found)
+    assert [axis.get_xlabel() for axis in page.axes if axis.axison] == ["frequency, Hz", "time, s", "iteration"]
+    assert np.median(found.spectra.noise) < np.median(found.spectra.error)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rig
 from identification import nonlinear_mode
+from rig.arming.run_options import RunOptions, Silent
 from rig.bench import Bench
 from rig.campaigns.plans import load_plan
 from rig.cli import main
@@ -17,6 +19,7 @@ from rig.errors import ConfigurationError
 from rig.measurements import spectra
 from rig.recording.reader import Recording
 from rig.tuning import TuningError, TuningRequest, tune
+from rig.tuning.figure import draw_on
 from rig.tuning.plant import compared_with_bench
 from rig.tuning.report import summary
 from simulators.analysis import phase_resonance_backbone
@@ -176,6 +179,42 @@ def test_a_level_that_leaves_little_room_is_said_to(magnet, tmp_path):
     tuned = tune("magnet-beam", tmp_path / "test.h5", TuningRequest(level_rms_v=0.05, to_m=0.0037, points=3))
     assert [note for note in tuned.notes if "out of reach where the damping rises beyond 1.7" in note]
     assert not magnet.notes
+
+
+def test_the_figure_names_what_a_test_engineer_looks_for(magnet):
+    page = Figure(figsize=(11.0, 6.8), layout="constrained")
+    draw_on(page, magnet)
+    plant, gain, _, phase, loop_phase, _ = page.axes
+    legend = {text.get_text() for text in gain.get_legend().get_texts()}
+    margins = magnet.chosen.design.frequency_margins
+    decibels = 20.0 * math.log10(margins.gain_margin)
+    assert f"frequency loop: {decibels:.0f} dB, {margins.phase_margin_deg:.0f} deg" in legend
+    assert len(legend) == 2
+    curve = gain.get_lines()[0]
+    crossover = np.interp(0.0, -np.log(curve.get_ydata()), curve.get_xdata())  # the gain falls through one
+    assert crossover == pytest.approx(margins.crossover_rad_s / (2.0 * math.pi), rel=0.02)
+    margin = 180.0 + np.interp(crossover, *loop_phase.get_lines()[0].get_data())
+    assert margin == pytest.approx(margins.phase_margin_deg, abs=1.0)
+    (coherence,) = phase.child_axes
+    for line, known in zip(coherence.get_lines(), magnet.test.coherence, strict=True):
+        seen = np.asarray(line.get_ydata())
+        assert np.median(seen) > known - 1e-3  # of the mean over several periods, at most as noisy as one
+        assert seen.max() <= 1.0
+    measured = next(line for line in plant.get_lines() if line.get_marker() == ".")
+    np.testing.assert_allclose(measured.get_ydata(), np.abs(magnet.test.responses.value[:, 0, 0]))
+
+
+def test_a_remark_on_the_bench_is_made_once(tmp_path):
+    said = []
+
+    class Listening(Silent):
+        def remark(self, text):
+            said.append(text)
+
+    odd = bench_with({"specimen": {"drive_mode_shape": 0.7}})
+    tune(odd, tmp_path / "odd.h5", TuningRequest(level_rms_v=0.02, points=3), RunOptions(progress=Listening()))
+    assert len(said) == 1
+    assert "drive_mode_shape = 0.7" in said[0]
 
 
 def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp_path, monkeypatch, capsys):
