@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
@@ -48,7 +48,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     beyond.set(
         xscale="log", yscale="log", xlabel="time, µs (dashed: deadline)", ylabel="share of blocks that took longer"
     )
-    beyond.legend(loc="lower left")
+    legend_below(page, beyond)
     overruns = sum(loop["overruns"] for loop in loops)
     specimen = recording.configuration["bench"]["specimen"]["name"]
     title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")
