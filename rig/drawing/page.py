@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -135,12 +136,13 @@ def columns_for(names: Sequence[str], width_in: float) -> int:
 def _lay_out(page: "Figure") -> None:
     """Lay out the page once; with a layout engine, savefig would draw all of it a second time.
 
-    Labels that are longer than their axes are broken into two lines, which takes a second time.
+    Labels that are longer than their axes are broken into two lines, and ticks whose numbers touch are thinned out; this takes
+    a second time.
     """
     engine = page.get_layout_engine()
     if engine is not None and page.axes:
         engine.execute(page)
-        if _break_labels(page):
+        if _break_labels(page) | _thin_ticks(page):
             engine.execute(page)
     page.set_layout_engine(None)
 
@@ -159,3 +161,24 @@ def _break_labels(page: "Figure") -> bool:
         label.set_text("\n".join(min(lines, key=lambda pair: max(map(len, pair)))))
         broken = True
     return broken
+
+
+def _thin_ticks(page: "Figure") -> bool:
+    """Take fewer ticks where their numbers along x touch; return whether there were any."""
+    from matplotlib.axes import Axes
+    from matplotlib.ticker import MaxNLocator
+
+    thinned = False
+    for axis in page.findobj(Axes):
+        locator = axis.xaxis.get_major_locator()
+        low, high = sorted(axis.get_xlim())
+        shown = [
+            label.get_window_extent()
+            for label in axis.get_xticklabels()
+            if label.get_text() and label.get_visible() and low <= label.get_position()[0] <= high
+        ]
+        gap = 0.5 * points("xtick.labelsize") / 72.0 * page.dpi
+        if isinstance(locator, MaxNLocator) and any(b.x0 - a.x1 < gap for a, b in pairwise(shown)):
+            locator.set_params(nbins=max(2, len(shown) // 2))
+            thinned = True
+    return thinned

@@ -8,6 +8,7 @@ import numpy as np
 
 from identification import (
     Backbone,
+    ContinuousBackbone,
     FrequencyResponse,
     FrequencyResponseMatrix,
     IdentificationError,
@@ -36,7 +37,7 @@ from rig.recording.reader import Recording
 __all__ = ["FAMILIES", "curves_of", "family_of"]
 
 FREQUENCY = Quantity("frequency", "Hz", "frequency")
-LAG = Quantity("phase lag", "deg")
+LAG = Quantity("phase lag of displacement", "deg")
 FORCE = Quantity("fundamental force", "N", "amplitude")
 DISPLACEMENT = Quantity("displacement amplitude", "m", "amplitude")
 ONE_AMPLITUDE = "the file holds the fundamental of the drive point alone"
@@ -85,27 +86,40 @@ def family_of(path: Path) -> _Family:
 
 
 def _backbones(source: Recording | NonlinearMode | Backbone, view: View) -> Curves:
-    """Modal frequency and damping over the amplitude, with 95 % intervals."""
-    omitted = refused(points_of(source)) if isinstance(source, Recording) else ""
-    measured = CAMPAIGNS[source.kind].measurements[Backbone](source) if isinstance(source, Recording) else source
-    mode = nonlinear_mode(measured) if isinstance(measured, Backbone) else measured
-    if isinstance(measured, Backbone):
-        harmonics = np.array([point.harmonics for point in measured.points])
-        across, amplitude = peak(measured.points[0].channels, harmonics, measured.frequency_hz, view)
-    else:
-        view.only(of=ONE_AMPLITUDE)
-        across, amplitude = DISPLACEMENT, mode.amplitude_m
-    order = np.argsort(mode.amplitude_m)
-    properties = (("modal_frequency_hz", 1.0), ("damping_ratio", 100.0))
-    lines = tuple(
-        Line(amplitude[order], scale * getattr(mode, name)[order], scale * mode.bound_95(name)[order])
-        for name, scale in properties
-    )
+    """Modal frequency and damping over the amplitude, with 95 % intervals; a continuous backbone has one curve per repeat."""
+    traces, across, modes = [], DISPLACEMENT, _modes(source)
+    for number, (measured, mode) in enumerate(modes, 1):
+        amplitude = mode.amplitude_m
+        if measured is None:
+            view.only(of=ONE_AMPLITUDE)
+        else:
+            harmonics = np.array([point.harmonics for point in measured.points])
+            across, amplitude = peak(measured.points[0].channels, harmonics, measured.frequency_hz, view)
+        order = np.argsort(mode.amplitude_m)
+        lines = tuple(
+            Line(amplitude[order], scale * getattr(mode, name)[order], scale * mode.bound_95(name)[order])
+            for name, scale in (("modal_frequency_hz", 1.0), ("damping_ratio", 100.0))
+        )
+        traces.append(Trace(f"repeat {number}" if len(modes) > 1 else "", lines))
     panels = (
         Panel(across, Quantity("modal frequency", "Hz", "frequency")),
         Panel(across, Quantity("modal damping ratio", "%")),
     )
-    return Curves(panels, (Trace("", lines),), mode.specimen, omitted)
+    omitted = refused(points_of(source)) if isinstance(source, Recording) else ""
+    return Curves(panels, tuple(traces), modes[0][1].specimen, omitted)
+
+
+def _modes(source: Recording | NonlinearMode | Backbone) -> list[tuple[Backbone | None, NonlinearMode]]:
+    """Return the modes of a file, with the backbones that they were identified from where the file holds these."""
+    if isinstance(source, NonlinearMode):
+        return [(None, source)]
+    if isinstance(source, Backbone):
+        return [(source, nonlinear_mode(source))]
+    measurements = CAMPAIGNS[source.kind].measurements
+    if ContinuousBackbone in measurements:  # half of what lies between its ways is in the standard errors
+        return [(ways.backbone, ways.nonlinear_mode()) for ways in measurements[ContinuousBackbone](source)]
+    measured = measurements[Backbone](source)
+    return [(measured, nonlinear_mode(measured))]
 
 
 def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) -> Curves:
@@ -114,15 +128,7 @@ def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) ->
     Lines are interrupted where the amplitude jumps, or where a lag that was asked for is missing.
     """
     if not isinstance(source, Recording):
-        view.only(of=ONE_AMPLITUDE)
-        traces = tuple(
-            Trace(
-                one.label or f"{one.level:g} {one.level_unit}",
-                (Line(one.frequency_hz, one.amplitude_m), Line(one.frequency_hz, one.phase_lag_deg)),
-            )
-            for one in source
-        )
-        return Curves((Panel(FREQUENCY, DISPLACEMENT), Panel(FREQUENCY, LAG)), traces, source[0].specimen)
+        return _stored_responses(source, view)
     channels, found = channels_from(source.channels), []
     panels: tuple[Panel, ...] = ()
     force, row = [channel.role for channel in channels].index("force"), channel_of(channels, view)
@@ -144,9 +150,22 @@ def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) ->
         if view.harmonic == 1 and channels[row].role in ("drive", "response"):
             turned = np.degrees(np.angle(-harmonics[:, force, 1] / harmonics[:, row, 1]))
             lines.append(_broken(Line(frequency_hz, turned, None, folded), breaks))
-            panels = (*panels, Panel(FREQUENCY, LAG._replace(text="phase lag of displacement")))
+            panels = (*panels, Panel(FREQUENCY, LAG))
         found.append(Trace(label, tuple(lines)))
     return Curves(panels, tuple(found), specimen_of(source), refused(points))
+
+
+def _stored_responses(responses: tuple[FrequencyResponse, ...], view: View) -> Curves:
+    """Amplitude and phase lag of responses from a file, over frequency."""
+    view.only(of=ONE_AMPLITUDE)
+    traces = tuple(
+        Trace(
+            one.label or f"{one.level:g} {one.level_unit}",
+            (Line(one.frequency_hz, one.amplitude_m), Line(one.frequency_hz, one.phase_lag_deg)),
+        )
+        for one in responses
+    )
+    return Curves((Panel(FREQUENCY, DISPLACEMENT), Panel(FREQUENCY, LAG)), traces, responses[0].specimen)
 
 
 def _broken(line: Line, breaks: np.ndarray) -> Line:

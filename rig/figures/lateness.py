@@ -39,7 +39,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
         if not edges.size:
             continue
         label = f"{TIMES[key]}, largest {max(loop[f'{key}_us']['largest'] for loop in loops):.0f} µs"
-        counts.step(edges, blocks, where="mid", color=colour)
+        counts.plot(edges, blocks, ".", color=colour)  # a line would fill bins that hold nothing
         beyond.step(edges, exceedance(blocks), where="post", color=colour, label=label)
     for deadline_us in sorted({loop["deadline_us"] for loop in loops}):
         for axis in (counts, beyond):

@@ -66,8 +66,10 @@ def draw_failure(page: "Figure", recording: Recording) -> None:
     draw_history(axes[0], axes[1] if phase else None, recording)
     heading(page, recording)
     why = f"Nothing else to draw: {why_none(points_of(recording))}"
-    ended = [str(part.end["text"]) for part in recording.parts if part.end is not None and part.end.get("text")]
-    text_below(page, why if not ended or ended[-1] in why else f"{why}; the run ended: {ended[-1]}")
+    last = recording.parts[-1] if recording.parts else None
+    if last is not None and last.end is not None and last.end.get("text") and last.end.get("reason") != "completed":
+        why += f"; the run ended: {last.end['text']}"
+    text_below(page, why)
 
 
 def draw_history(frequency: "Axes", error: "Axes | None", recording: Recording) -> None:

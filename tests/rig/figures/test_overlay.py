@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 
+from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.multisine.points import recorded_spectra
 from rig.drawing.style import COLOURS
 from rig.errors import RecordingError
@@ -46,6 +47,13 @@ def test_two_backbones_lie_where_their_points_are(recordings, drawn, tmp_path):
         for path, data in zip((one, other), drawn_here, strict=True):
             amplitude, values = points(path, amplitude_m=1e3, **{key: scale})
             np.testing.assert_allclose(data, np.transpose([amplitude, values])[np.argsort(amplitude)], rtol=1e-9)
+    half, *_ = (
+        bars.get_segments()
+        for bars in damping.collections
+        if len(bars.get_segments()) == len(points(one, level=1.0)[0])
+    )
+    stored = 196.0 * points(one, damping_ratio_std=1.0)[0]
+    np.testing.assert_allclose([0.5 * (high[1] - low[1]) for low, high in half], stored, rtol=0.1)
     said = texts(page)
     for text in ("continuous-backbone", "backbone", "modal frequency, Hz", "modal damping ratio, %"):
         assert text in said
@@ -62,6 +70,16 @@ def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, 
     assert {"measured", "50 $ model"} <= set(texts(page))
     with pytest.raises(RecordingError, match=r"model.h5: `channel` acc_magnet: the file holds the fundamental"):
         overlay([path, tmp_path / "model.h5"], view=View(channel="acc_magnet"))
+
+
+def test_responses_from_elsewhere_lie_over_a_stepped_sine(recordings, drawn, tmp_path):
+    path = recordings["stepped-sine"]
+    with Recording(path) as recording:
+        save(recorded_frequency_responses(recording), tmp_path / "elsewhere.h5")
+    page = drawn(overlay([path, tmp_path / "elsewhere.h5"]))
+    for axis in page.axes[:2]:
+        here, elsewhere = (line.get_xydata() for line in axis.get_lines() if line.get_marker() in ("o", "s"))
+        np.testing.assert_allclose(here[np.isfinite(here[:, 1])], elsewhere, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("channel", "harmonic"), [("", 1), ("acc_magnet", 1), ("acc_magnet", 3), ("force", 2)])

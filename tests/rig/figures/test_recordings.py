@@ -1,6 +1,7 @@
 """Figures of recordings: what is drawn, against what the files hold; what is missing is said."""
 
 import itertools
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -157,3 +158,7 @@ def test_no_text_leaves_the_page_at_any_size(recordings, drawn, kind, look):
     for axis in page.axes:
         assert axis.get_ylabel()
         assert axis.bbox.height > 0.5 * 60  # half an inch at the least
+        low, high = sorted(axis.get_xlim())
+        numbers = [text for text in axis.get_xticklabels() if text.get_text() and low <= text.get_position()[0] <= high]
+        boxes = [text.get_window_extent() for text in numbers if text.get_visible()]
+        assert all(one.x1 < other.x0 for one, other in pairwise(boxes))
