@@ -10,8 +10,7 @@ from rig.analysis.backbone import neglected
 from rig.analysis.levels import highest_resonance, most_points, samples_for
 from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive, refusing
-from rig.drawing.areas import legend_below
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.steady_curve import UNSTABLE
 from rig.drawing.style import REJECTED, SECOND, shade
 from rig.errors import ConfigurationError
@@ -148,7 +147,7 @@ def draw_curves(page: "Figure", curves: dict[float, PeriodicResponses], resonanc
     top.set_ylim(bottom=0.0)
     bottom.axhline(-90.0, color=SECOND, lw=0.9)
     bottom.set(xlabel="frequency, Hz", ylabel="acceleration lag, deg", yticks=(-180, -90, 0), ylim=(-185, 5))
-    legend_below(page, {str(handle.get_label()): handle for handle in handles})
+    legend_below(page, handles=handles)
 
 
 def _branches(axis: "Axes", curve: PeriodicResponses, values: np.ndarray, colour: object) -> None:

@@ -11,8 +11,7 @@ from rig.analysis.backbone import neglected
 from rig.analysis.levels import highest_resonance, most_points, samples_for
 from rig.analysis.study import Study, length_unit
 from rig.analysis.subject import Subject, positive, refusing
-from rig.drawing.areas import legend_below
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, REJECTED, SECOND
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
@@ -218,8 +217,7 @@ def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses |
         axis.set_ylim(bottom=0.0)
     lag.axhline(-90.0, color=REJECTED, lw=0.8)
     lag.set(xlabel="frequency, Hz", ylabel="accel. lag, deg", yticks=(-180, -90, 0), ylim=(-190, 10))
-    handles, labels = force.get_legend_handles_labels()
-    legend_below(page, dict(zip(labels, handles, strict=True)))
+    legend_below(page, force)
 
 
 def turned(way: PeriodicResponses) -> PeriodicResponses:

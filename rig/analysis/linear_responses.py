@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from rig.analysis.levels import most_points
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject, positive, refusing
-from rig.drawing.areas import legend_below
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MAIN
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
@@ -132,7 +131,7 @@ def draw_responses(
     """Draw three columns; each channel has the same colour in all of them."""
     from matplotlib.ticker import MultipleLocator
 
-    axes = grid(page, 2, 3, sharex=True)
+    axes = grid(page, 2, 3, sharex=True, down_columns=True)
     columns = (
         ("force, N/V", {"force": force}),
         ("acceleration, (m/s²)/V", per_v),
@@ -149,5 +148,4 @@ def draw_responses(
         phase.set_xlabel("frequency, Hz")
         low, high = phase.get_ylim()
         phase.yaxis.set_major_locator(MultipleLocator(90.0 if high - low < 900.0 else 360.0))
-    handles, labels = axes[0, 1].get_legend_handles_labels()
-    legend_below(page, dict(zip(labels, handles, strict=True)))
+    legend_below(page, axes[0, 1])

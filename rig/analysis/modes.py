@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject
-from rig.drawing.areas import legend_below
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MAIN, REJECTED
 from rig.text.console import number, print_table
 from simulators.modes import LinearModes
@@ -132,8 +131,7 @@ def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
         for axis in panels[max(0, count - 2) : count]:
             axis.set_xlabel("position along the beam, m")
             axis.tick_params(labelbottom=True)
-    handles, labels = panels[0].get_legend_handles_labels()
-    legend_below(page, dict(zip(labels, handles, strict=True)))
+    legend_below(page, panels[0])
     if count < modes.frequency_hz.size:
         page.text(0.99, 0.01, f"the lowest {count} of {modes.frequency_hz.size} modes", ha="right", color=REJECTED)
 

@@ -1,46 +1,29 @@
 """Areas of a page for parts of a figure that differ in kind; on a narrow page they stand below one another."""
 
-from collections.abc import Mapping, Sequence
-from textwrap import wrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.drawing.style import height_is_free
+from rig.drawing.page import NARROW_IN
+from rig.drawing.style import height_is_free, rc
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["areas", "broad", "is_narrow", "legend_below"]
+__all__ = ["areas", "broad", "is_narrow"]
 
-_NARROW_IN = 5.0
 _PANEL_IN = 1.65
-_LETTERS = 52  # of a legend's line on a narrow page
 
 
 def is_narrow(page: "Figure") -> bool:
     """Return whether a page is as narrow as a paper's column."""
-    return bool(page.get_figwidth() < _NARROW_IN)
+    return bool(page.get_figwidth() < NARROW_IN)
 
 
 def broad(times: float = 3.5) -> float:
     """Return the width (points) of a line that lies behind others."""
-    from matplotlib import rcParams
-
-    return float(times * rcParams["lines.linewidth"])
-
-
-def legend_below(page: "Figure", handles: Mapping[str, Any]) -> None:
-    """Put one legend for all panels below them: handles by label. A page whose height is free grows by it."""
-    from matplotlib import rcParams
-    from matplotlib.font_manager import FontProperties
-
-    narrow = is_narrow(page)
-    if narrow and height_is_free():
-        line_in = 1.5 * FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points() / 72.0
-        page.set_figheight(page.get_figheight() + line_in * (len(handles) + 2))
-    labels = ["\n".join(wrap(label, _LETTERS)) for label in handles] if narrow else list(handles)
-    page.legend(list(handles.values()), labels, loc="outside lower left", ncols=1 if narrow else 3)
+    return float(times * rc("lines.linewidth"))
 
 
 def areas(page: "Figure", panels: Sequence[int], sizes: Sequence[float], *, beside: bool = False) -> list[Any]:

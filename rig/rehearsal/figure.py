@@ -94,11 +94,20 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
     axis.axvline(100.0, color=SECOND, lw=0.8, ls="--")
     axis.set_yticks(range(len(shown)), [name.replace(" ", "\n", 1) for name, _ in shown])
     axis.set(xlabel="largest value over its limit, %", xlim=(0.0, None))
-    axis.plot([], [], color=MAIN, lw=4.0, label="5 to 95 % of draws")
+    axis.plot([], [], color=MAIN, lw=4.0, label="5 to 95 %")
     axis.plot([], [], "o", color="w", mec=MAIN, label="median")
     axis.plot([], [], "|", color=SECOND, mew=2.0, label="largest")
-    axis.legend()
-    axis.set_title(_closest(verdict))
+    axis.set_ylim(-0.6, len(shown) - 0.4)
+    axis.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=3,
+        handlelength=1.0,
+        columnspacing=0.8,
+        borderaxespad=0.2,
+        title=_closest(verdict),
+        alignment="left",
+    )
 
 
 def _closest(verdict: Verdict) -> str:

@@ -7,8 +7,8 @@ import numpy as np
 
 from identification import ErrorTable
 from identification.pnlss.error_table import SAME_LEVEL
-from rig.drawing.areas import broad, legend_below
-from rig.drawing.page import grid, page_for
+from rig.drawing.areas import broad
+from rig.drawing.page import grid, legend_below, page_for
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends
 from rig.drawing.style import COLOURS, MAIN, MARKERS, REJECTED, SECOND, shade, title
 from rig.reproduce.study import VARIANTS, Study
@@ -60,7 +60,7 @@ def _errors(page: "Figure", study: Study) -> None:
         axis.yaxis.set_major_formatter("{x:g}")
         axis.yaxis.set_minor_formatter(_few_numbers)
     axes[0].set_ylabel(f"error of {study.table.output}, %")
-    legend_below(page, _handles(axes))
+    legend_below(page, *axes)
     models = sum(len({row.model for row in study.table.tests if row.training_set == one}) for one in sets)
     count = f"{models} model{'' if models == 1 else 's'}"
     title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of {count}{_few(study)}")
@@ -118,7 +118,7 @@ def _beside(tables: Mapping[str, ErrorTable]) -> list[tuple[str, ErrorTable, Any
 def _steady(page: "Figure", study: Study) -> None:
     """Draw selected models and the rig: one row per held quantity, one column per force.
 
-    For a pure sine, the rig is shown by its backbone and its peak. A square marks where a curve ends, and the legend says why.
+    For a pure sine, the rig is shown by its backbone and its peak. A square marks where a curve ends, and the title says why.
     """
     forces = study.options.specimen.forces_n
     rows = list(dict.fromkeys(truth.held for truth in study.truths))
@@ -140,8 +140,9 @@ def _steady(page: "Figure", study: Study) -> None:
         lost = f"; none for {', '.join(missing)}" if missing else ""
         axis.set_title(f"{_HELD[truth.held]}, {truth.text}{lost}")
         axis.set(xlabel="frequency, Hz", ylabel="drive point, mm")
-    _explain(page, axes, study, list(reasons))
-    title(page, f"{study.options.specimen.name}, models {study.options.variant}: steady responses")
+    ends = f"; at the squares a curve ends, because {'; '.join(reasons)}" if reasons else ""
+    title(page, f"{study.options.specimen.name}, models {study.options.variant}: steady responses{ends}")
+    _explain(page, axes, study, ends=bool(reasons))
 
 
 def _rig(axis: Any, truth: Truth) -> None:
@@ -162,20 +163,20 @@ def _rig(axis: Any, truth: Truth) -> None:
         )
 
 
-def _explain(page: "Figure", axes: np.ndarray, study: Study, reasons: Sequence[str]) -> None:
-    """Put one legend on the page: what is drawn, and why curves end."""
+def _explain(page: "Figure", axes: np.ndarray, study: Study, *, ends: bool) -> None:
+    """Put one legend on the page."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    handles = _handles(axes)
+    more: list[Any] = []
     predicted = [one.prediction for one in study.steady if one.prediction is not None]
     if any(not one.stable.all() for one in predicted):
-        handles["unstable"] = Line2D([], [], color=REJECTED, ls=UNSTABLE)
+        more.append(Line2D([], [], color=REJECTED, ls=UNSTABLE, label="unstable"))
     if any(one.range_use.max() > BEYOND for one in predicted):
-        handles["beyond the training data"] = Patch(color=REJECTED, alpha=0.25, lw=0)
-    for reason in reasons:
-        handles[f"ends here: {reason}"] = Line2D([], [], color=REJECTED, marker="s", ls="none")
-    legend_below(page, handles)
+        more.append(Patch(color=REJECTED, alpha=0.25, lw=0, label="beyond the training data"))
+    if ends:
+        more.append(Line2D([], [], color=REJECTED, marker="s", ls="none", label="the curve ends"))
+    legend_below(page, *axes.ravel(), handles=more)
 
 
 def _sweeps(page: "Figure", study: Study) -> None:
@@ -190,7 +191,7 @@ def _sweeps(page: "Figure", study: Study) -> None:
         gone = ", ".join(f"{one.training_set} at {one.unbounded_at_s:.1f} s" for one in lost)
         axis.set(xlabel="frequency of the plan, Hz", ylabel="drive, m/s²")
         axis.set_title(f"{name}: {f'unbounded: {gone}' if lost else 'all runs bounded'}")
-    legend_below(page, _handles(axes))
+    legend_below(page, *axes)
     title(page, f"{study.options.specimen.name}: sweeps simulated from the measured {study.options.input}")
 
 
@@ -227,15 +228,6 @@ def _envelopes(axis: Any, shown: Sequence[SweepResult], colours: Mapping[str, An
     )
     if highest > _MOST_SHOWN * top:
         axis.text(0.99, 0.95, "cut off above", ha="right", va="top", transform=axis.transAxes)
-
-
-def _handles(axes: np.ndarray) -> dict[str, Any]:
-    """Return the legend entries of all panels by label."""
-    found: dict[str, Any] = {}
-    for axis in axes.ravel():
-        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    return found
 
 
 def _around(axis: Any, truth: Truth, wide: Truth, band_hz: tuple[float, float]) -> None:

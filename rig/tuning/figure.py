@@ -44,7 +44,7 @@ def draw_tuning(tuning: "Tuning", figure: Path) -> None:
 def draw_on(page: "Figure", tuning: "Tuning") -> None:
     """Draw, from left to right: measured rig and fit; open loops with their margins; how the closed loops settle."""
     designs = (tuning.chosen.design, *tuning.chosen.others)
-    axes = grid(page, 2, 3)
+    axes = grid(page, 2, 3, down_columns=True)
     _draw_plant(axes[0, 0], axes[1, 0], tuning)
     _draw_bode(axes[0, 1], axes[1, 1], designs[0])
     _draw_lag(axes[0, 2], designs)

@@ -34,7 +34,7 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
     high = exciter.highest_hz if np.isfinite(exciter.highest_hz) else 500.0
     frequency = np.geomspace(low, high, 400)
     drawn = _draws(exciter)
-    axes = grid(page, 2, 2 if lines is None else 3)
+    axes = grid(page, 2, 2 if lines is None else 3, down_columns=True)
     if lines is not None:
         _on_the_rig(axes[0, 0], axes[1, 0], exciter)
     s = 2j * np.pi * frequency
@@ -114,7 +114,7 @@ def _title(exciter: Exciter, low: float, high: float) -> str:
     known = f"{damping:.5g}" if not np.isfinite(error) else f"{damping:.5g} ± {1.96 * error:.2g}"
     missing = "" if exciter.lines is not None else "; the file holds no measured lines"
     return (
-        f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz\n"
+        f"Exciter of {exciter.source or 'an unnamed rig'}, {low:g} to {high:g} Hz; "
         f"moving mass {exciter.moving_mass_kg:.4g} kg, suspension {exciter.suspension_stiffness_n_m:.4g} N/m, "
         f"damping (suspension and back-EMF) {known} N s/m{missing}"
     )

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification import FrequencyResponse
-from rig.drawing.areas import legend_below
-from rig.drawing.page import grid
+from rig.drawing.page import grid, legend_below
 from rig.drawing.style import REJECTED, engineering, plain_log, shade, title
 
 if TYPE_CHECKING:
@@ -32,6 +31,5 @@ def draw_responses(page: "Figure", responses: tuple[FrequencyResponse, ...]) -> 
     plain_log(top)
     bottom.set(xlabel="frequency, Hz", ylabel="phase lag, deg")
     bottom.axhline(90.0, color=REJECTED, lw=0.8)
-    handles, labels = top.get_legend_handles_labels()
-    legend_below(page, dict(zip(labels, handles, strict=True)))
+    legend_below(page, top)
     title(page, f"{responses[0].specimen or 'specimen'}: stepped-sine responses, {len(responses)} levels")

@@ -62,13 +62,13 @@ def _title(found: "IdentifiedPnlss", kept: list[str]) -> str:
     data = found.spectra or found.stretch
     if data is not None:
         use = next((f" ({run.use})" for run in found.runs if run.name == data.name), "")
-        others = f", {_drawn(model).name} of {len(model.outputs)} outputs" if len(model.outputs) > 1 else ""
+        others = f", {_drawn(model).name}, one of {len(model.outputs)} outputs" if len(model.outputs) > 1 else ""
         lines.append(f"drawn: {data.name}{use}{others}")
     missing = {"spectra": "spectra", "stretch": "time series", "fit": "fit", "runs": "errors of experiments"}
     left_out = [text for name, text in missing.items() if name not in kept]
     if left_out and kept:
         lines.append(f"not in the file: {', '.join(left_out)}")
-    return "\n".join(lines)
+    return "; ".join(lines)
 
 
 def _unit(channel: "Channel") -> str:

@@ -32,7 +32,7 @@ def test_a_check_that_ended_early_shows_how_near_the_channels_came_to_their_limi
         volts[:, column(bench, "drive")] = 9.9
 
     found, page = drawn(high)
-    assert "not played to its end" in page.get_suptitle()
+    assert "not played to its end" in page.get_suptitle().replace("\n", " ")
     bars = page.axes[0]
     names = [label.get_text() for label in bars.get_yticklabels()]
     limits, drive = found.bench.limits, found.bench.channels[names.index("drive")]

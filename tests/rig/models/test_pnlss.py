@@ -239,7 +239,7 @@ def test_a_figure_shows_spectra_time_course_and_range_of_what_the_file_holds(the
     page.clear()
     draw_pnlss(page, replace(found, runs=(), linear_runs=(), spectra=None, stretch=None))
     assert len(page.axes) == 1  # the course alone, no empty panels
-    assert "not in the file: spectra, time series, errors of experiments" in page.get_suptitle()
+    assert "not in the file: spectra, time series, errors of experiments" in page.get_suptitle().replace("\n", " ")
 
 
 def test_a_response_that_is_cut_off_has_no_peak(there, force_model):
