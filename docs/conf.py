@@ -18,8 +18,9 @@ extensions = [
     "reference",
     "sphinx_copybutton",
     "sphinx_design",
+    "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["driver-template", "_build", "_extensions"]
+exclude_patterns = ["driver-template", "_build", "_extensions", "examples"]
 
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_block", "substitution"]
 myst_heading_anchors = 5
@@ -49,3 +50,23 @@ html_theme_options = {
 }
 html_show_sourcelink = False
 html_copy_source = False
+
+# The gallery: `-D plot_gallery=0` makes its pages without running the examples.
+SECTIONS = ("first_steps", "tests", "models", "predictions", "virtual_rigs", "on_a_bench")
+sphinx_gallery_conf = {
+    "examples_dirs": ["examples"],
+    "gallery_dirs": ["gallery"],
+    "filename_pattern": r"plot_",
+    "subsection_order": [f"examples/{name}" for name in SECTIONS],
+    "within_subsection_order": "FileNameSortKey",
+    "remove_config_comments": True,
+    "capture_repr": ("_repr_html_",),
+    "reset_modules": ("gallery_style.apply",),
+    "show_memory": False,
+    "show_signature": False,
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "min_reported_time": 600,
+    "thumbnail_size": (480, 300),
+    "log_level": {"backreference_missing": "info"},
+}

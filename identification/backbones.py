@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
+from vibrolock.results import Result
 
 __all__ = ["Backbone"]
 
@@ -16,7 +17,7 @@ Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Backbone:
+class Backbone(Result):
     """Settled periodic states near phase resonance, in the order they were measured.
 
     Parameters

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.results import Result
 
 __all__ = ["Controlled", "FrequencyResponse", "pack_frequency_responses", "unpack_frequency_responses"]
 
@@ -19,7 +20,7 @@ Controlled = Literal["force", "response", "voltage", "none"]
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Result):
     """Stepped-sine response at one level; fundamental harmonics only.
 
     Parameters

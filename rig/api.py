@@ -27,6 +27,7 @@ from rig.measurements.experiments.periods import Periods
 from rig.measurements.sep005 import time_series
 from rig.measurements.tables import points_table, telemetry
 from rig.recording.reader import Recording
+from vibrolock.results import Result
 
 if TYPE_CHECKING:
     import pandas
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Run", "resume", "run"]
 
 
-class Run:
+class Run(Result):
     """A new recording and its measurements. If no output file was given, the recording is deleted together with this object."""
 
     def __init__(self, recording: Recording, folder: "TemporaryDirectory[str] | None" = None) -> None:

@@ -18,6 +18,7 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.stabilisation import StabilisationDiagram
 from identification.linear.stabilisation import diagram as stability
 from identification.validation import finite_array
+from vibrolock.results import Result
 
 __all__ = ["ModalAnalysis", "linear_modes"]
 
@@ -35,7 +36,7 @@ _START_DAMPING = 0.005
 
 
 @dataclass(frozen=True, eq=False)
-class ModalAnalysis:
+class ModalAnalysis(Result):
     """Result of a linear modal analysis.
 
     Parameters

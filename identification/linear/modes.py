@@ -24,6 +24,7 @@ from identification.errors import IdentificationError
 from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.validation import finite_array
+from vibrolock.results import Result
 
 __all__ = ["LinearModes", "mac_matrix"]
 
@@ -38,7 +39,7 @@ _SCALARS = ("lowest_hz", "highest_hz", "upper_hz", "force_rms_n", "fit_residual"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LinearModes:
+class LinearModes(Result):
     """Linear modes of a structure, lowest frequency first.
 
     Parameters

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
 from identification.validation import finite_array
+from vibrolock.results import Result
 
 __all__ = ["FrequencyResponseMatrix"]
 
@@ -20,7 +21,7 @@ _ARRAYS = ("frequency_hz", "value", "noise_covariance", "total_covariance")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FrequencyResponseMatrix:
+class FrequencyResponseMatrix(Result):
     """Frequency responses ``Y = H U`` line by line.
 
     Parameters

@@ -12,6 +12,7 @@ from identification.linear.errors_in_variables import driven_responses, is_drive
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.subspace import observable_space, telling_rows
 from identification.validation import read_only
+from vibrolock.results import Result
 
 __all__ = ["StabilisationDiagram", "stabilisation"]
 
@@ -26,7 +27,7 @@ _LARGEST_DAMPING = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StabilisationDiagram:
+class StabilisationDiagram(Result):
     """Poles of all orders, one entry per pole, sorted by order and then by frequency.
 
     Parameters

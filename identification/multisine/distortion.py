@@ -22,6 +22,7 @@ from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
+from vibrolock.results import Result
 
 __all__ = ["DistortionLevels", "Lines", "distortion_levels"]
 
@@ -34,7 +35,7 @@ _OTHER_DESIGN = 0.1  # amplitude of the instrument at detection lines against th
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class DistortionLevels:
+class DistortionLevels(Result):
     """Power of signal, distortion and noise of every channel at every line of the band.
 
     A power is the mean square of the peak amplitude in the mean over periods of one realisation, in the square of the

@@ -17,6 +17,7 @@ from identification.errors import IdentificationError
 from identification.multisine.design import MultisineDesign
 from identification.multisine.estimators import estimated_responses
 from identification.validation import finite_array
+from vibrolock.results import Result
 
 __all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
 
@@ -53,7 +54,7 @@ class InstrumentResponse:
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodicSpectra:
+class PeriodicSpectra(Result):
     """Spectra of every channel in every settled period of every realisation.
 
     Parameters

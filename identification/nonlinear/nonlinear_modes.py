@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import read_only
+from vibrolock.results import Result
 
 __all__ = ["QUANTITIES", "STANDARD_ERRORS", "NonlinearMode"]
 
@@ -47,7 +48,7 @@ def _unknown() -> Float:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NonlinearMode:
+class NonlinearMode(Result):
     """Properties of one nonlinear mode, one entry per measured point or level; NaN marks unknown values.
 
     Parameters

@@ -20,6 +20,7 @@ from identification.pnlss.kernels import Matrices, simulate, workspace
 from identification.pnlss.model_arrays import MATRICES, model_arrays, model_values
 from identification.pnlss.simulation import Simulation, use_of
 from identification.validation import finite_array, positive, read_only
+from vibrolock.results import Result
 
 __all__ = ["PnlssModel"]
 
@@ -30,7 +31,7 @@ _UNBOUNDED = 1e4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PnlssModel:
+class PnlssModel(Result):
     """A nonlinear state-space model, in the units of its channels.
 
     Parameters

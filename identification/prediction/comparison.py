@@ -12,6 +12,7 @@ from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.prediction.properties import FLAGGED_BEYOND
 from identification.prediction.steady_prediction import SteadyPrediction, peak_of
+from vibrolock.results import Result
 
 __all__ = ["Comparison", "Over", "PredictionError", "compare", "error_table"]
 
@@ -89,7 +90,7 @@ def error_table(errors: Iterable[PredictionError]) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Result):
     """A predicted response and its reference.
 
     Parameters

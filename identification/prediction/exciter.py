@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.results import Result
 
 __all__ = ["PARAMETERS", "Exciter", "ExciterLines", "VoltagePath"]
 
@@ -112,7 +113,7 @@ class ExciterLines:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Exciter:
+class Exciter(Result):
     """Amplifier, exciter and stinger of one rig; the module docstring has the equations.
 
     Parameters

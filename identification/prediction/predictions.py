@@ -15,6 +15,7 @@ from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.sweep_prediction import SweepPrediction
 from identification.prediction.uncertainty import ResponseBand
 from identification.signals.transients import Transient
+from vibrolock.results import Result
 
 __all__ = ["Predictions"]
 
@@ -33,7 +34,7 @@ _LATER = ("runs",)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Predictions:
+class Predictions(Result):
     """Predicted steady responses and sweeps; references and errors are None where there is no reference.
 
     Parameters

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from vibrolock.results import Result
 
 __all__ = ["Peak", "SteadyPrediction", "peak_of"]
 
@@ -45,7 +46,7 @@ class Peak:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SteadyPrediction:
+class SteadyPrediction(Result):
     """Frequency response at constant force, along its branches: from below resonance over the peak to above.
 
     Parameters

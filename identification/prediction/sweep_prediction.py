@@ -13,6 +13,7 @@ from identification.prediction.comparison import PredictionError
 from identification.prediction.properties import ModalProperties
 from identification.prediction.sweep_inputs import BY_ZERO_CROSSINGS, SweepInput
 from identification.signals.transients import Transient
+from vibrolock.results import Result
 
 __all__ = ["SweepPrediction", "as_recorded", "compare_sweep"]
 
@@ -24,7 +25,7 @@ _ATTRIBUTES = ("largest_identified", "window_periods", "origin", "simulated_rang
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SweepPrediction:
+class SweepPrediction(Result):
     """Fundamentals of a predicted sweep over time, peak values, against the phase of the imposed force or voltage.
 
     Parameters

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.frequency_response import HeldForce, frequency_response
+from vibrolock.results import Result
 
 __all__ = ["ResponseBand", "response_band"]
 
@@ -24,7 +25,7 @@ _LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ResponseBand:
+class ResponseBand(Result):
     """Uncertainty of a predicted response at the drive point.
 
     Parameters

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.validation import positive
+from vibrolock.results import Result
 
 __all__ = ["ConstantForceCurve", "Section", "cut"]
 
@@ -80,7 +81,7 @@ class Section:
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantForceCurve:
+class ConstantForceCurve(Result):
     """A frequency response at constant force cut from a force surface; points in the order of the lag."""
 
     response: FrequencyResponse

@@ -21,6 +21,7 @@ from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.response_control.curves import ConstantForceCurve, Section, cut
 from identification.response_control.levels import LevelFit, LevelPoints, best_degree, check_level, fit_level
+from vibrolock.results import Result
 
 __all__ = ["ForceSurface", "force_surface"]
 
@@ -32,7 +33,7 @@ _LAGS_DEG = np.arange(30.0, 150.5, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ForceSurface:
+class ForceSurface(Result):
     """Force and frequency over response level and phase lag, as fitted level by level; built by `force_surface`."""
 
     levels: tuple[LevelFit, ...]

@@ -18,6 +18,7 @@ from identification.channels import Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.signals.chunks import unwrapped
 from identification.validation import finite_array, positive
+from vibrolock.results import Result
 
 __all__ = ["Transient", "demodulate"]
 
@@ -31,7 +32,7 @@ _MARGIN = 64  # samples beyond a stretch that its splines include
 
 
 @dataclass(frozen=True, eq=False)
-class Transient:
+class Transient(Result):
     """Fundamentals of every channel over time.
 
     Parameters

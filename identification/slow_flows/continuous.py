@@ -19,6 +19,7 @@ from identification.slow_flows.fits import LocalFit, noise_variances
 from identification.slow_flows.resonance import Amplitudes, amplitudes_at, fit_at, resonant_vibration
 from identification.slow_flows.slow_flow import SlowFlow
 from identification.validation import finite_array
+from vibrolock.results import Result
 
 __all__ = ["ContinuousBackbone", "continuous_backbone"]
 
@@ -35,7 +36,7 @@ _WIDEST = 1.0  # in the logarithm of the amplitude
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ContinuousBackbone:
+class ContinuousBackbone(Result):
     """Modal properties over the amplitude, from ramps up and down.
 
     Parameters

@@ -14,6 +14,7 @@ from rig.errors import RecordingError
 from rig.text.printable import printable
 from simulators.analysis import PeriodicResponses
 from simulators.layout import Flag
+from vibrolock.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +70,7 @@ FIGURE_ENDINGS = (".png", ".pdf", ".svg")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Study(ABC):
+class Study(Result, ABC):
     """One analysis of one bench."""
 
     subject: Subject

@@ -24,6 +24,7 @@ from rig.errors import RecordingError
 from rig.measurements import bench_of_recording
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
+from vibrolock.results import Result
 
 __all__ = ["Assessment", "assess", "responses_in"]
 
@@ -32,7 +33,7 @@ CUT_SHORT = "the multisine was not played to its end"
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment:
+class Assessment(Result):
     """Result of a check."""
 
     bench: Bench

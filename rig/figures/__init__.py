@@ -1,1 +1,23 @@
-"""Figures of what is in files and of results in memory."""
+"""Figures of what is in files and of results in memory, as matplotlib axes.
+
+Begin with `plot`: it draws a file, a run, a recording, or a result of identification or analysis::
+
+    import rig
+    from rig import figures
+
+    figures.plot(rig.run("magnet-beam/backbone"))
+    figures.plot("model.h5")
+"""
+
+from typing import TYPE_CHECKING
+
+from rig.drawing.style import restyle
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from rig.figures.curves import View
+    from rig.figures.results import plot
+else:
+    __getattr__, __dir__ = on_use(__name__, {"View": "curves", "plot": "results"})
+
+__all__ = ["View", "plot", "restyle"]

@@ -22,7 +22,7 @@ from rig.recording.reader import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["drawing", "plot"]
+__all__ = ["drawing", "drawing_of", "plot"]
 
 CHECK = "rig.check.figure:draw_recorded_check"
 
@@ -48,12 +48,22 @@ def plot(
         raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
     if figure.exists() and any(one.exists() and figure.samefile(one) for one in sources):
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
+    size_in, draw = drawing_of(sources, lateness=lateness, labels=labels, view=view)
+    with page_for(figure, size_in) as page:
+        draw(page)
+
+
+def drawing_of(
+    sources: Sequence[Path], *, lateness: bool = False, labels: Sequence[str] = (), view: View | None = None
+) -> tuple[tuple[float, float], Callable[["Figure"], None]]:
+    """Return the size (inches) of the page for one or several files, and the function that draws them on an empty page.
+
+    The arguments are those of `plot`.
+    """
     curves = len(sources) > 1 or bool(labels) or view is not None
     if lateness and curves:
         raise RecordingError("`lateness`: is drawn of one recording, without labels and axes of one's own")
-    size_in, draw = overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness)
-    with page_for(figure, size_in) as page:
-        draw(page)
+    return overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness)
 
 
 def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float], Callable[["Figure"], None]]:

@@ -14,6 +14,7 @@ from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.recording.parts import Part
+from vibrolock.results import Result
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
 
@@ -29,7 +30,7 @@ class RecordedPlan(NamedTuple):
     """Numbers in this recording of the points that it asks for, in its order; ``None``: 0, 1, 2 and so on."""
 
 
-class Recording:
+class Recording(Result):
     """The recording ``OUT.h5``: from the HDF5 file, from the journal beside it, or from both; nothing is written.
 
     A context manager that holds the files open; rows are read when asked for, all else at once.

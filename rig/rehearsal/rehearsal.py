@@ -21,6 +21,7 @@ from rig.rehearsal.trial import Trial, TrialPoint, run_trial
 from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
+from vibrolock.results import Result
 
 __all__ = ["Draw", "Rehearsal", "RehearsalRequest", "draws_path", "rehearse"]
 
@@ -106,7 +107,7 @@ class RehearsalRequest:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Rehearsal:
+class Rehearsal(Result):
     """The draws of a rehearsal and what they depend on."""
 
     facts: Mapping[str, Any]

@@ -1,1 +1,12 @@
-"""Show the contents of a file as numbers, as tables or as a figure."""
+"""Show what is in a file, or a result in memory, as numbers and tables."""
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from rig.show.results import as_html, as_text
+else:
+    __getattr__, __dir__ = on_use(__name__, {"as_html": "results", "as_text": "results"})
+
+__all__ = ["as_html", "as_text"]

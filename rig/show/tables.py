@@ -15,7 +15,7 @@ from rig.text.console import number, print_table
 from rig.text.message_pages import where_explained
 from rig.text.printable import printable, printable_strings
 
-__all__ = ["loop_line", "print_findings", "print_rehearsal", "print_summary", "say_how_it_ended"]
+__all__ = ["loop_line", "print_findings", "print_points", "print_rehearsal", "print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
@@ -85,11 +85,11 @@ def print_summary(summary: dict[str, Any]) -> None:
             print(f"note: {note}")
         return
     print(f"bench {summary['bench']}, started {summary['started']}, seed {summary['seed']}")
-    _print_points(summary["kind"], summary["points"])
+    print_points(summary["kind"], summary["points"])
     print_findings(summary)
     if summary["former_points"]:
         print(f"no longer asked for by the plan, and not used: {len(summary['former_points'])}")
-        _print_points(summary["kind"], summary["former_points"])
+        print_points(summary["kind"], summary["former_points"])
     for sensor in summary["sensors"]:
         print(f"sensor of {sensor['channel']}: {_sensor_line(sensor)}")
     print(f"loop: {loop_line(summary['loop'])}")
@@ -188,7 +188,7 @@ def print_rehearsal(rehearsal: Mapping[str, Any] | None, beside: Mapping[str, An
         print("  the run lies within what was foreseen")
 
 
-def _print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
+def print_points(kind: str, tables: Sequence[Mapping[str, Any]]) -> None:
     """Print a table of points, then their warnings. Points are counted from 1."""
     points = points_from(kind, tables)
     columns = shown_columns(kind, points)

@@ -28,6 +28,7 @@ from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
 from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_ratios, plant_of
 from rig.tuning.shifts import frequency_window
+from vibrolock.results import Result
 
 __all__ = ["Tuning", "TuningRequest", "tune"]
 
@@ -76,7 +77,7 @@ class TuningRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class Tuning:
+class Tuning(Result):
     """Result of a tuning."""
 
     bench: Bench

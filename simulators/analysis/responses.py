@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrolock.results import Result
+
 __all__ = ["HysteresisLoop", "NotConvergedError", "PeriodicResponses"]
 
 Real = NDArray[np.float64]
@@ -12,7 +14,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PeriodicResponses:
+class PeriodicResponses(Result):
     """Periodic vibrations under ``u = U cos(theta)``; harmonics Y_h are defined by ``y = Re sum_h Y_h exp(i h theta)``.
 
     All values are true values of the rig in continuous time, without the sensors' high-pass, noise, and the hold of the

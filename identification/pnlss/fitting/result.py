@@ -11,6 +11,7 @@ from identification.errors import IdentificationError
 from identification.pnlss.fitting.settings import FitSettings
 from identification.pnlss.model import PnlssModel
 from identification.validation import read_only
+from vibrolock.results import Result
 
 __all__ = ["FitHistory", "PnlssFit"]
 
@@ -55,7 +56,7 @@ class FitHistory:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PnlssFit:
+class PnlssFit(Result):
     """A fitted model.
 
     Parameters

@@ -16,12 +16,13 @@ from identification import (
 )
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
+from vibrolock.results import Result
 
 __all__ = ["FORCE_SURFACE", "MeasuredSurface"]
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredSurface:
+class MeasuredSurface(Result):
     """Levels of a response-controlled test, the surface through them, and notes on missing points of the plan."""
 
     responses: tuple[FrequencyResponse, ...]

@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.models.files.kind import FileKind
 
-__all__ = ["KINDS", "kind_of_file_for"]
+__all__ = ["KINDS", "as_kept", "kind_of_file_for"]
 
 _DECLARED = {
     "nonlinear-mode": ("nonlinear_mode:NONLINEAR_MODE", ("NonlinearMode",)),
@@ -51,3 +51,9 @@ def kind_of_file_for(thing: Any) -> FileKind | None:
         if types & set(held) and isinstance(thing, KINDS[name].holds):
             return KINDS[name]
     return None
+
+
+def as_kept(kind: FileKind, thing: Any) -> Any:
+    """Return the object as it would be loaded from a file of its kind: linear modes as a modal analysis, for example."""
+    first = kind.holds[0] if isinstance(kind.holds, tuple) else kind.holds
+    return thing if isinstance(thing, first) else kind.unpack(*kind.pack(thing))

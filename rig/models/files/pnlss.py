@@ -22,12 +22,13 @@ from identification import (
 from identification.packing import pack_all, unpack_all
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
+from vibrolock.results import Result
 
 __all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class IdentifiedPnlss:
+class IdentifiedPnlss(Result):
     """A nonlinear state-space model and its origin.
 
     Parameters
