@@ -11,7 +11,7 @@ from rig.reference.entry import Entry
 __all__ = ["MODULES", "documentation", "first_line", "name_entries", "public_names"]
 
 MODULES = (
-    "rig", "rig.bench", "rig.conformance", "rig.daq", "rig.drivers", "rig.errors", "rig.measurements",
+    "rig", "rig.bench", "rig.conformance", "rig.daq", "rig.drivers", "rig.errors", "rig.figures", "rig.measurements",
     "controller", "simulators", "simulators.analysis", "simulators.ensemble", "identification",
 )  # fmt: skip
 """Packages and modules whose names are public."""
