@@ -38,7 +38,8 @@ Nonlinear state-space models (PNLSS)
 Responses and errors of PNLSS models
     pnlss_frequency_response, pnlss_response, pnlss_steady_state, PnlssResponse, SteadyStates, pnlss_coupled_run,
     CoupledRun, simulated_run, SimulatedRun, estimated_initial_state, pnlss_errors, PnlssErrors, error_spectra,
-    ErrorSpectra, ErrorTable, identify_many, ModelJob, IdentifiedModel, realisation_combinations
+    ErrorSpectra, output_stretch, OutputStretch, ErrorTable, identify_many, ModelJob, IdentifiedModel,
+    realisation_combinations
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
