@@ -6,6 +6,7 @@ import numpy as np
 
 from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
 from rig.drawing.areas import areas
+from rig.drawing.lines import pooled, without_wraps
 from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, say_why_empty, shade, title, unit_text
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ __all__ = ["draw_linear_modes"]
 
 _MOST_OUTPUTS = 4
 _MOST_DOTS = 4000
-_POOLED_LINES = 21
 
 
 def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
@@ -54,31 +54,18 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
         label = f"{channel.name}, {unit_text(f'{channel.unit}/{responses.inputs[0].unit}')}"
         size.semilogy(frequency[every], np.abs(measured), ".", color=colour, alpha=0.5, label=label)
         if np.isfinite(errors[:, row, 0]).any():
-            size.semilogy(frequency[every], _smooth(errors[:, row, 0])[every], color=colour, lw=0.6, alpha=0.6, ls="--")
+            size.semilogy(frequency[every], pooled(errors[:, row, 0])[every], color=colour, lw=0.6, alpha=0.6, ls="--")
         phase.plot(frequency[every], np.degrees(np.angle(measured)), ".", color=colour, alpha=0.5)
         if channel.name in known:
             model = fitted.path(channel.name)
             size.semilogy(fitted.frequency_hz, np.abs(model), color=colour, lw=1.0)
-            phase.plot(fitted.frequency_hz, _broken(np.degrees(np.angle(model))), color=colour, lw=1.0)
+            phase.plot(fitted.frequency_hz, without_wraps(np.degrees(np.angle(model))), color=colour, lw=1.0)
     size.plot([], [], color=REJECTED, lw=1.0, label="model")
     size.plot([], [], color=REJECTED, lw=0.6, ls="--", label="standard error")
     size.set(ylabel=f"frequency response ({responses.estimator})")
     size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, handlelength=1.2, borderaxespad=0.2)
     size.tick_params(labelbottom=False)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
-
-
-def _smooth(errors: np.ndarray) -> np.ndarray:
-    """Root mean square over neighbouring lines; the scatter of a standard error from line to line is meaningless."""
-    window = np.ones(min(_POOLED_LINES, errors.size))
-    power = np.convolve(errors**2, window, mode="same") / np.convolve(np.ones(errors.size), window, mode="same")
-    return np.asarray(np.sqrt(power))
-
-
-def _broken(angle_deg: np.ndarray) -> np.ndarray:
-    """Replace an angle by NaN where it wraps from 180 to -180, so that no vertical line is drawn there."""
-    jump = np.abs(np.diff(angle_deg, prepend=angle_deg[:1])) > 180.0
-    return np.where(jump, np.nan, angle_deg)
 
 
 def _around(modes: LinearModes) -> np.ndarray:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.channels import MOTION_UNIT
+from rig.drawing.lines import pooled
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, MARKERS, REJECTED, SECOND, THIRD, plain_log, say_why_empty, title, unit_text
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["draw_pnlss"]
 
 _FLOOR = 0.1  # of the median residual: smaller values are not shown
-_POOLED_LINES = 15
 _USES = {"training": (MAIN, "o"), "validation": (SECOND, "s"), "test": (REJECTED, "^")}
 
 
@@ -93,7 +93,7 @@ def _spectra(axis: "Axes", spectra: "ErrorSpectra", name: str, unit: str) -> Non
         if np.isfinite(values[row]).any():
             axis.semilogy(f, _positive(values[row]), ".", ms=size, color=colour, label=label)
     if np.isfinite(spectra.noise[row]).any():
-        axis.semilogy(f, _positive(_smooth(spectra.noise[row])), "--", color="black", lw=0.9, label="noise")
+        axis.semilogy(f, _positive(pooled(spectra.noise[row], 15)), "--", color="black", lw=0.9, label="noise")
     top = float(spectra.measured[row].max())
     errors = spectra.error[row][spectra.error[row] > 0.0]
     if top > 0.0:
@@ -107,13 +107,6 @@ def _spectra(axis: "Axes", spectra: "ErrorSpectra", name: str, unit: str) -> Non
 def _positive(values: np.ndarray) -> np.ndarray:
     """Replace values that a logarithmic axis cannot show by NaN."""
     return np.where(values > 0.0, values, np.nan)
-
-
-def _smooth(noise: np.ndarray) -> np.ndarray:
-    """Root mean square over neighbouring lines: of a few periods, the scatter at a single line means little."""
-    window = np.ones(min(_POOLED_LINES, noise.size))
-    power = np.convolve(noise**2, window, mode="same") / np.convolve(np.ones(noise.size), window, mode="same")
-    return np.asarray(np.sqrt(power))
 
 
 def _stretch(axis: "Axes", stretch: "OutputStretch", name: str, unit: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from identification import FrequencyResponseMatrix
 from rig.drawing.areas import is_narrow
+from rig.drawing.lines import pooled, without_wraps
 from rig.drawing.page import grid
 from rig.drawing.style import COLOURS, REJECTED, title, unit_text
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 __all__ = ["draw_response_matrix"]
 
 _LINES = ("-", "--", ":", "-.")
-_POOLED_LINES = 21
 
 
 def draw_response_matrix(page: "Figure", matrix: FrequencyResponseMatrix) -> None:
@@ -29,10 +29,10 @@ def draw_response_matrix(page: "Figure", matrix: FrequencyResponseMatrix) -> Non
             value = matrix.value[:, row, column]
             label = f"{output.name} over {source.name}, {unit_text(f'{output.unit}/{source.unit}')}"
             size.semilogy(matrix.frequency_hz, np.abs(value), line, color=colour, label=label)
-            phase.plot(matrix.frequency_hz, _broken(np.degrees(np.angle(value))), line, color=colour)
+            phase.plot(matrix.frequency_hz, without_wraps(np.degrees(np.angle(value))), line, color=colour)
             if np.isfinite(errors[:, row, column]).any():
                 known = True
-                error = _smooth(errors[:, row, column])
+                error = pooled(errors[:, row, column])
                 size.semilogy(matrix.frequency_hz, error, line, color=colour, lw=0.7, alpha=0.6)
     size.set(ylabel="frequency response")
     if known:
@@ -41,16 +41,3 @@ def draw_response_matrix(page: "Figure", matrix: FrequencyResponseMatrix) -> Non
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
     estimator = f", {matrix.estimator}" if matrix.estimator else ""
     title(page, f"{matrix.specimen or 'specimen'}: frequency responses{estimator}")
-
-
-def _smooth(errors: np.ndarray) -> np.ndarray:
-    """Root mean square over neighbouring lines; the scatter of a standard error from line to line is meaningless."""
-    window = np.ones(min(_POOLED_LINES, errors.size))
-    power = np.convolve(errors**2, window, mode="same") / np.convolve(np.ones(errors.size), window, mode="same")
-    return np.asarray(np.sqrt(power))
-
-
-def _broken(angle_deg: np.ndarray) -> np.ndarray:
-    """Replace an angle by NaN where it wraps from 180 to -180, so that no vertical line is drawn there."""
-    jump = np.abs(np.diff(angle_deg, prepend=angle_deg[:1])) > 180.0
-    return np.where(jump, np.nan, angle_deg)
