@@ -2,7 +2,7 @@
 
 from typing import Literal, Self
 
-from pydantic import AliasChoices, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from controller import AmplitudeLaw
 from rig.bench import Bench
@@ -42,9 +42,7 @@ class ContinuousBackbonePlan(LockedPlan):
     bandwidth: float = Field(0.08, gt=0, le=1)
     """Half width of the band of amplitudes that are evaluated together for one level, in the logarithm of the amplitude. A
     bend within the band is smoothed."""
-    accepted_nonharmonic_force: float = Field(
-        0.25, gt=0, le=1, validation_alias=AliasChoices("accepted_nonharmonic_force", "accepted_alien_force")
-    )
+    accepted_nonharmonic_force: float = Field(0.25, gt=0, le=1)
     """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted. The default is
     wider than elsewhere, as oscillations while the lock is gained count too."""
     accepted_detuning: float = Field(0.03, gt=0, le=1)

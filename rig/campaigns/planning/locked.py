@@ -1,8 +1,8 @@
 """Parts shared by all campaigns under a phase lock: known plant, checks and acceptance limits."""
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import AliasChoices, Field
+from pydantic import Field, model_validator
 
 from controller import PhaseLockedLoop
 from rig.bench import Bench
@@ -14,6 +14,9 @@ from rig.tick.sequencer.segments import SettleRule
 
 __all__ = ["LockedPlan", "SettledPlan"]
 
+FORMER_KEYS = {"accepted_alien_force": "accepted_nonharmonic_force"}
+"""Keys of earlier versions, with their names of today."""
+
 
 class LockedPlan(KnownPlant, Plan):
     """Base of the plans whose frequency is controlled to hold a phase lag."""
@@ -24,13 +27,19 @@ class LockedPlan(KnownPlant, Plan):
     """How many times all points are measured."""
     harmonics: int = Field(7, ge=1, le=50)
     """Highest harmonic evaluated."""
-    accepted_nonharmonic_force: float = Field(
-        0.1, gt=0, le=1, validation_alias=AliasChoices("accepted_nonharmonic_force", "accepted_alien_force")
-    )
+    accepted_nonharmonic_force: float = Field(0.1, gt=0, le=1)
     """Largest part of the force's RMS that is neither a harmonic nor noise with which a point is accepted. Its cause is another
     mode or an oscillating control loop."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows a failed point: ``skip`` goes on with the next point, ``stop`` ramps down and ends the run."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _former_keys(cls, table: Any) -> Any:
+        """Take a plan of an earlier version, as recordings hold it."""
+        if not isinstance(table, dict) or FORMER_KEYS.keys().isdisjoint(table):
+            return table
+        return {FORMER_KEYS.get(key, key): value for key, value in table.items()}
 
     @property
     def counts(self) -> dict[str, int]:
