@@ -53,7 +53,7 @@ rig = VirtualRig.model_validate(
 
 # %%
 # The first mode against the closed form of a clamped beam, and the backbone by harmonic balance. In one mode the drag adds
-# :math:`4 b \phi^3 q / 3 \pi` to the damping ratio, with the mode shape :math:`\phi` at the tip and the modal amplitude q.
+# ``4 b phi**3 q / (3 pi)`` to the damping ratio, with the mode shape ``phi`` at the tip and the modal amplitude q.
 
 modes = rig.linear_modes
 speed, radius = math.sqrt(210e9 / 7850.0), 0.008 / math.sqrt(12.0)

@@ -1,6 +1,7 @@
 """The stored form of points: what is written is read again, and files of earlier versions are read, too."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -114,6 +115,12 @@ def test_refused_attempts_are_stored_with_their_point_and_read_again():
     assert point.refused_before == (first, second)
     assert point.attempts == 3
     assert isinstance(point.refused_before[0].quality, Quality)
+
+
+def test_a_key_that_has_another_name_today_is_read():
+    table = stored(replace(made_point(), nonharmonic_force=0.02))
+    table["alien_force"] = table.pop("nonharmonic_force")
+    assert point_from(table).nonharmonic_force == 0.02
 
 
 def test_a_point_without_refused_attempts_is_stored_as_in_earlier_versions():
