@@ -59,7 +59,9 @@ def test_a_scattering_lag_is_warned_of():
         bench_with(noise_scale=18.0),
     )
     assert points[0]["phase_scatter_deg"] > 5.0
-    assert any("the lag scatters by" in warning and "steps of its converter" in warning for warning in points[0]["warnings"])
+    assert any(
+        "the lag scatters by" in warning and "steps of its converter" in warning for warning in points[0]["warnings"]
+    )
     quiet, _ = points_and_end(plan_of("magnet-beam", levels_v=(0.1,)), bench_with())
     assert not any("scatters" in warning for warning in quiet[0]["warnings"])
 

@@ -27,6 +27,7 @@ def test_the_gallery_has_twenty_examples_and_more():
     assert len(EXAMPLES) >= 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs_and_draws(example: Path, figures, tmp_path, monkeypatch):
     if example.name in LIBRARIES:

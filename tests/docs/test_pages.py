@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -78,7 +79,17 @@ def followed(tmp_path_factory):
     return follower(tmp_path_factory.mktemp, folder / "OUT.h5", NEEDS)
 
 
-@pytest.mark.parametrize("page", pages(), ids=name_of)
+SLOW = (
+    "README.md",
+    *(f"docs/how-to/{name}.md" for name in ("tune-a-rig", "rehearse-a-plan", "protect-a-fragile-specimen")),
+)
+
+
+def marked(page: Path) -> Any:
+    return pytest.param(page, id=name_of(page), marks=[pytest.mark.slow] if name_of(page) in SLOW else [])
+
+
+@pytest.mark.parametrize("page", [marked(page) for page in pages()])
 def test_a_page_does_what_it_says(page, followed):
     for library in LIBRARIES.get(name_of(page), ()):
         pytest.importorskip(library, reason=f"{library} is not installed (pip install 'vibrolock[dev]')")

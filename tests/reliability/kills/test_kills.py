@@ -17,7 +17,13 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+ON_WIRES = ("serial", "can")
+
+
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.device in ON_WIRES else []) for case in CASES],
+)
 def test_a_kill_loses_no_row_and_leaves_nothing_behind(tmp_path, case):
     found = carried_out(case, tmp_path)
     assert found.wrong == []

@@ -98,6 +98,7 @@ def test_a_run_is_stopped_from_another_process_and_the_status_says_that_it_is_at
     assert took_s < 30.0
 
 
+@pytest.mark.slow
 def test_of_two_runs_the_named_one_is_stopped_and_then_all(running):
     one, other = running("one.h5"), running("other.h5")
     status, out, _ = said("stop", "one.h5")

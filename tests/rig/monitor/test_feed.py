@@ -140,6 +140,7 @@ def test_a_message_is_made_once_for_all_who_are_as_far(run, server, inside, monk
     assert max(len(texts) for texts in made.values()) > 1
 
 
+@pytest.mark.slow
 def test_who_does_not_read_is_not_waited_for_and_loses_no_point(run, server, inside):
     """A client that stops reading, while another goes on; then it reads again."""
     with inside.feed(max_queue=1) as idle, inside.feed() as busy:

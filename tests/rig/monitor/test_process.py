@@ -122,6 +122,7 @@ def test_a_server_that_is_killed_leaves_the_run_alone_and_another_takes_over(tmp
             assert (run.folder / place.STOP).read_text() == "stopped on the page"
 
 
+@pytest.mark.slow
 def test_a_run_with_a_page_beside_it(tmp_path):
     """The run says where the page is; the page stays after the run and shows its end."""
     (tmp_path / "plan.toml").write_text(PLAN)

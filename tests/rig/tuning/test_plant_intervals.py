@@ -60,7 +60,7 @@ def errors(neighbour, seeds, noise=1e-3):
     return np.array(out)
 
 
-@pytest.mark.parametrize("neighbour", [6.0, 2.0])
+@pytest.mark.parametrize("neighbour", [pytest.param(6.0, marks=pytest.mark.slow), 2.0])
 def test_the_intervals_hold_the_truth_with_a_neighbouring_mode_far_away_and_near(neighbour):
     error, std = np.moveaxis(errors(neighbour, range(6)), 1, 0)
     inside = np.abs(error) < 1.96 * std
