@@ -18,6 +18,10 @@ def _folder() -> Path:
     return Path(str(resources.files("rig.campaigns"))) / "shipped"
 
 
+FORMER_KEYS = {"accepted_alien_force": "accepted_nonharmonic_force"}
+"""Keys of plans of earlier versions, with their names of today."""
+
+
 def shipped_plans() -> list[str]:
     """Return the names ``<bench>/<campaign>`` of the plans that come with the product."""
     return shipped_names(_folder())
@@ -34,6 +38,7 @@ def plan_from(table: dict[str, Any], source: str) -> Plan:
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise ConfigurationError(f"{source}: kind = {shown(kind)}: allowed is {', '.join(map(repr, KINDS))}")
+    table = {FORMER_KEYS.get(key, key): value for key, value in table.items()}
     return validated(KINDS[kind].plan, table, source)
 
 

@@ -1,8 +1,8 @@
 """Parts shared by all campaigns under a phase lock: known plant, checks and acceptance limits."""
 
-from typing import Any, Literal
+from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from controller import PhaseLockedLoop
 from rig.bench import Bench
@@ -13,9 +13,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import SettleRule
 
 __all__ = ["LockedPlan", "SettledPlan"]
-
-FORMER_KEYS = {"accepted_alien_force": "accepted_nonharmonic_force"}
-"""Keys of earlier versions, with their names of today."""
 
 
 class LockedPlan(KnownPlant, Plan):
@@ -32,14 +29,6 @@ class LockedPlan(KnownPlant, Plan):
     mode or an oscillating control loop."""
     on_failure: Literal["skip", "stop"] = "skip"
     """What follows a failed point: ``skip`` goes on with the next point, ``stop`` ramps down and ends the run."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _former_keys(cls, table: Any) -> Any:
-        """Take a plan of an earlier version, as recordings hold it."""
-        if not isinstance(table, dict) or FORMER_KEYS.keys().isdisjoint(table):
-            return table
-        return {FORMER_KEYS.get(key, key): value for key, value in table.items()}
 
     @property
     def counts(self) -> dict[str, int]:

@@ -1,0 +1,17 @@
+"""Plans from tables of any version."""
+
+import pytest
+
+from rig.campaigns.plans import load_plan, plan_from
+from rig.errors import ConfigurationError
+
+
+def test_a_plan_of_an_earlier_version_keeps_what_its_key_said():
+    table = load_plan("magnet-beam/backbone").model_dump(mode="json", exclude_unset=True)
+    table |= {"kind": "backbone", "accepted_alien_force": 0.03}
+    assert plan_from(table, "here").accepted_nonharmonic_force == 0.03
+
+
+def test_an_unknown_kind_is_refused_with_those_that_there_are():
+    with pytest.raises(ConfigurationError, match=r"here: kind = 'backbones': allowed is 'backbone', "):
+        plan_from({"kind": "backbones"}, "here")
