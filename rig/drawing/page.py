@@ -2,6 +2,7 @@
 
 import io
 import re
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
@@ -26,6 +27,10 @@ _WIDE = 1.6
 """On pages whose width is more than this times their height, three rows of two panels become two rows of three."""
 _PANEL_IN, _TITLE_IN, _MOST_IN = 1.6, 0.3, 8.9
 """Heights on a narrow page: of a panel, of the title, and of the column of a journal, which is the most."""
+
+
+COLLAPSED = "constrained_layout not applied"
+"""Beginning of what matplotlib warns of where axes have no room."""
 
 
 @contextmanager
@@ -137,13 +142,23 @@ def _lay_out(page: "Figure") -> None:
     """Lay out the page once; with a layout engine, savefig would draw all of it a second time.
 
     Labels that are longer than their axes are broken into two lines, and ticks whose numbers touch are thinned out; this takes
-    a second time.
+    a second time. Raises `RecordingError` if the page has no room for the axes.
     """
     engine = page.get_layout_engine()
     if engine is not None and page.axes:
-        engine.execute(page)
-        if _break_labels(page) | _thin_ticks(page):
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", COLLAPSED)
             engine.execute(page)
+            changed = _break_labels(page) | _thin_ticks(page)
+            warnings.filterwarnings("error", COLLAPSED)
+            try:
+                if changed or min(min(axis.get_position().size) for axis in page.axes) <= 0.0:
+                    engine.execute(page)
+            except UserWarning:
+                width, height = (25.4 * side for side in page.get_size_inches())
+                raise RecordingError(
+                    f"`size` {width:.0f} x {height:.0f} mm: has no room for this figure; take a larger one, or the style paper"
+                ) from None
     page.set_layout_engine(None)
 
 

@@ -120,6 +120,15 @@ def test_what_is_no_style_is_refused_in_a_line_and_changes_nothing(
     assert before == STYLE
 
 
+def test_a_page_without_room_for_its_axes_is_refused_in_a_line(tmp_path: Path) -> None:
+    with (
+        pytest.raises(RecordingError, match=r"`size` 25 x 25 mm: has no room for this figure; take a larger one"),
+        page_for(tmp_path / "small.png", (1.0, 1.0)) as page,
+    ):
+        page.subplots(3, 3)[1, 1].set_ylabel("a label")
+    assert not (tmp_path / "small.png").exists()
+
+
 def arranged(file: Path, rows: int, columns: int) -> tuple[tuple[float, float], list[tuple[float, float]]]:
     """Size of the page, and left and upper end of each panel, row by row."""
     with page_for(file, (9.0, 6.4)) as page:
