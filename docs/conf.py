@@ -26,6 +26,7 @@ myst_enable_extensions = ["colon_fence", "deflist", "attrs_block", "substitution
 myst_heading_anchors = 5
 
 nitpicky = False
+smartquotes = False  # options of commands keep their two hyphens
 default_role = "py:obj"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
@@ -39,7 +40,7 @@ toc_object_entries = False
 html_theme = "pydata_sphinx_theme"
 html_title = f"vibrolock {release}"
 html_theme_options = {
-    "show_nav_level": 2,
+    "show_nav_level": 1,
     "show_toc_level": 2,
     "navigation_with_keys": False,
     "show_prev_next": True,
