@@ -30,7 +30,7 @@ def resonance(low_hz: float = 8.0, high_hz: float = 12.0, **changes: object) -> 
         fold_amplitude_m=none,
         fold_modal_amplitude=none,
     )
-    return replace(made, **changes)  # type: ignore[arg-type]
+    return replace(made, **changes)
 
 
 def test_a_whole_resonance_ends_nowhere_within_the_figure() -> None:
@@ -71,6 +71,6 @@ def test_a_label_is_given_once_and_unstable_parts_are_lines_of_their_own() -> No
     draw_ends(axis, folded, folded.amplitude_m(), "black")
     assert axis.get_legend_handles_labels()[1] == ["1 N"]
     stable, unstable, ends = axis.get_lines()
-    assert ends.get_xdata().size == 0  # type: ignore[union-attr]
-    assert np.isfinite(unstable.get_ydata()).sum() == np.count_nonzero(~folded.stable) + 1  # type: ignore[arg-type]
-    assert np.isnan(stable.get_ydata()).any()  # type: ignore[arg-type]
+    assert ends.get_xdata().size == 0
+    assert np.isfinite(unstable.get_ydata()).sum() == np.count_nonzero(~folded.stable) + 1
+    assert np.isnan(stable.get_ydata()).any()

@@ -30,7 +30,7 @@ def afterwards_as_before() -> Iterator[None]:
 
 def linear(colour: object) -> np.ndarray:
     """Linear RGB of a colour (IEC 61966-2-1)."""
-    value = np.array(to_rgb(colour))  # type: ignore[arg-type]
+    value = np.array(to_rgb(colour))
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** LIKE_SRGB)
 
 
@@ -172,7 +172,7 @@ def test_a_long_title_takes_more_lines_and_stays_on_the_page(tmp_path: Path) -> 
     with page_for(tmp_path / "figure.png", (9.0, 6.4)) as page:
         axis = page.subplots()
         title(page, "a beam with a very long name: continuous-backbone test, 13 points, 4 not accepted, 2 not measured")
-    box = page.get_suptitle() and page._suptitle.get_window_extent()  # type: ignore[attr-defined]
+    box = page.get_suptitle() and page._suptitle.get_window_extent()
     assert box.x1 <= page.bbox.width
     assert box.y0 >= axis.get_window_extent().y1
 
