@@ -14,8 +14,9 @@ static void text(const char *said)
     crc = vl_crc32(crc, said, strlen(said));
 }
 
-static void number(uint32_t value, uint32_t base, uint32_t digits)
+static void number(uint32_t value, bool is_hexadecimal, uint32_t digits)
 {
+    const uint32_t base = is_hexadecimal ? 16 : 10;
     char said[11];
     uint32_t i = sizeof said - 1;
     said[i] = 0;
@@ -31,7 +32,7 @@ static void begin_message(uint32_t identifier, const char *name)
 {
     if (identifier)
         text("\n");
-    number(identifier, 16, 3);
+    number(identifier, true, 3);
     text(" ");
     text(name);
     place = 0;
@@ -40,7 +41,7 @@ static void begin_message(uint32_t identifier, const char *name)
 static void begin_signals(uint32_t length, bool fd)
 {
     text(" ");
-    number(length, 10, 1);
+    number(length, false, 1);
     text(fd ? " fd" : " classical");
 }
 
@@ -49,7 +50,7 @@ static void end_signal(const char *type, uint32_t n_bytes)
     text(":");
     text(type);
     text("@");
-    number(place, 10, 1);
+    number(place, false, 1);
     place += n_bytes;
 }
 
@@ -91,12 +92,12 @@ static void outputs(const struct vl_can_shape *shape)
     for (uint32_t i = 0; i < messages; i++) {
         begin_message(OUTPUT_ID + FUNCTION * i, "Output");
         if (!shape->fd)
-            text("_"), number(i, 10, 2);
+            text("_"), number(i, false, 2);
         begin_signals(shape->fd ? 64 : 8, shape->fd);
         if (shape->fd)
             byte("sequence"), byte("reserved");
         for (uint32_t row = 0; row < shape->output_rows; row++) {
-            text(" sample_"), number(row, 10, 1);
+            text(" sample_"), number(row, false, 1);
             end_signal("int16", 2);
         }
     }
@@ -108,9 +109,9 @@ static void samples_of(const struct vl_can_shape *shape, uint32_t first, uint32_
         byte("sequence"), byte("flags");
     for (uint32_t row = 0; row < shape->rows; row++) {
         for (uint32_t channel = first; channel < first + width; channel++) {
-            text(" channel_"), number(channel, 10, 1);
+            text(" channel_"), number(channel, false, 1);
             if (shape->fd)
-                text("_sample_"), number(row, 10, 1);
+                text("_sample_"), number(row, false, 1);
             end_signal("int16", 2);
         }
     }
@@ -124,7 +125,7 @@ static void samples(const struct vl_can_shape *shape)
         uint32_t width = rest < shape->channels ? rest : shape->channels;
         uint32_t n_bytes = (shape->fd ? 2 : 0) + 2 * width * shape->rows;
         begin_message(SAMPLES_ID + FUNCTION * i, "Samples_");
-        number(i, 10, 2);
+        number(i, false, 2);
         begin_signals(shape->fd ? vl_can_padded(n_bytes) : n_bytes, shape->fd);
         samples_of(shape, first, width);
     }
