@@ -91,7 +91,7 @@ static bool is_end(const char *text)
     return text != NULL && *text == '\0';
 }
 
-/* A text of 1 to 32 characters, up to `stop` or the end of the line. */
+/* A text of up to 32 characters, up to `stop` or the end of the line. */
 static const char *take_text(const char *text, char stop, char into[PLANT_TEXT])
 {
     size_t n = 0;
@@ -101,7 +101,7 @@ static const char *take_text(const char *text, char stop, char into[PLANT_TEXT])
         into[n] = text[n];
     }
     into[n] = '\0';
-    return n > 0 ? text + n : NULL;
+    return text + n;
 }
 
 static bool take_channel(struct plant *plant, const char *text)
@@ -116,7 +116,7 @@ static bool take_channel(struct plant *plant, const char *text)
     text = text ? take_unsigned(text, &channel->skew_ns) : NULL;
     channel->name = plant->names[number];
     plant->description.n_channels = number + 1;
-    return is_end(text);
+    return is_end(text) && *channel->name != '\0';
 }
 
 static bool take_output(struct plant *plant, const char *text)
