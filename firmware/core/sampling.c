@@ -10,7 +10,7 @@ static volatile bool has_output; /* an output has come since START */
 static volatile uint32_t instants;
 
 static int32_t held;             /* count on the converter */
-static int32_t largest_count;    /* of the converter's range */
+static int32_t lowest_count, highest_count; /* of the converter's range */
 static uint64_t first_expected;  /* no output exists for samples before it */
 static uint8_t seen;             /* flags of the block under way */
 
@@ -25,6 +25,16 @@ static uint8_t *into;            /* where its next row goes; NULL: there is no r
 static _Atomic uint32_t dropped;
 static uint64_t handed_over;
 
+/* The range in counts, to the nearest. Two's complement has one more below zero than above. */
+static void find_range(void)
+{
+    double counts = (double)vl_about->output_range_v / (double)vl_about->output_v_per_count + 0.5;
+    int64_t most = vl_about->bits == 16 ? INT16_MAX : INT32_MAX;
+    int64_t range = counts > (double)most ? most + 1 : (int64_t)counts;
+    lowest_count = (int32_t)-range;
+    highest_count = (int32_t)(range < most ? range : most);
+}
+
 void vl_begin_sampling(void)
 {
     is_on = false;
@@ -33,9 +43,7 @@ void vl_begin_sampling(void)
     atomic_store(&dropped, 0);
     atomic_store(&written, 0);
     atomic_store(&read, 0);
-    double counts = (double)vl_about->output_range_v / (double)vl_about->output_v_per_count;
-    double most = vl_about->bits == 16 ? 32767.0 : 2147483647.0;
-    largest_count = (int32_t)(counts < most ? counts + 0.5 : most);
+    find_range();
 }
 
 void vl_restart_sampling(void)
@@ -43,9 +51,9 @@ void vl_restart_sampling(void)
     vl_clear_outputs();
     held = 0;
     has_output = false;
-    first_expected = (uint64_t)vl_settings.queue * vl_settings.block;
+    first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
-    block_bytes = vl_settings.block * vl_about->n_channels * vl_count_bytes();
+    block_bytes = vl_in_force.block * vl_about->n_channels * vl_count_bytes();
     n_blocks = VL_SAMPLE_BYTES / block_bytes < VL_MOST_BLOCKS ? VL_SAMPLE_BYTES / block_bytes : VL_MOST_BLOCKS;
     atomic_store(&written, 0);
     atomic_store(&read, 0);
@@ -100,15 +108,15 @@ uint64_t vl_handed_over(void)
 
 uint32_t vl_block(void)
 {
-    return vl_settings.block;
+    return vl_in_force.block;
 }
 
 static int32_t clipped(int32_t count)
 {
-    if (count >= -largest_count && count <= largest_count)
+    if (count >= lowest_count && count <= highest_count)
         return count;
     seen |= VL_OUTPUT_CLIPPED;
-    return count < 0 ? -largest_count : largest_count;
+    return count < 0 ? lowest_count : highest_count;
 }
 
 /* The output of an armed device: the one that is due, or the one before. */
@@ -167,9 +175,9 @@ static void end_block(void)
         atomic_fetch_add_explicit(&written, 1, memory_order_release);
     } else {
         vl_counters.dropped_blocks++;
-        atomic_fetch_add(&dropped, vl_settings.block);
+        atomic_fetch_add(&dropped, vl_in_force.block);
     }
-    first += vl_settings.block;
+    first += vl_in_force.block;
     row = 0;
     seen = 0;
 }
@@ -185,7 +193,7 @@ void vl_input(const int32_t counts[], bool overload)
     if (into)
         for (uint32_t channel = 0; channel < vl_about->n_channels; channel++)
             into = vl_put(into, (uint32_t)counts[channel], vl_count_bytes());
-    if (++row == vl_settings.block)
+    if (++row == vl_in_force.block)
         end_block();
 }
 
@@ -196,10 +204,10 @@ const struct vl_samples *vl_oldest_block(void)
 
 void vl_forget_oldest_block(bool was_sent)
 {
-    handed_over = blocks[read_at].first + vl_settings.block;
+    handed_over = blocks[read_at].first + vl_in_force.block;
     if (!was_sent) {
         vl_counters.dropped_blocks++;
-        atomic_fetch_add(&dropped, vl_settings.block);
+        atomic_fetch_add(&dropped, vl_in_force.block);
     }
     read_at = after(read_at);
     atomic_fetch_add_explicit(&read, 1, memory_order_release);
@@ -212,5 +220,5 @@ bool vl_block_is_due(void)
         return false;
     if (next < first_expected || vl_has_next_block())
         return true;
-    return next >= vl_settings.block && vl_is_coming_down(next - vl_settings.block);
+    return next >= vl_in_force.block && vl_is_coming_down(next - vl_in_force.block);
 }
