@@ -1,15 +1,14 @@
-"""The board host as a program: its description, its line, its adapter and its ends, without the process that usually runs it."""
+"""The board host as a program: description, line, adapter and ends, without the process that usually runs it."""
 
 import os
 import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -50,10 +49,8 @@ class Board:
         )
         for one in (input_, output):
             os.close(one)
-        try:
+        with suppress(BrokenPipeError):  # it has ended already
             os.write(self.answers, text.encode("ascii"))
-        except BrokenPipeError:  # it has ended already
-            pass
 
     def began(self) -> "Board":
         """Answer its first request."""
@@ -187,7 +184,10 @@ def test_a_description_that_ends_early_and_bad_arguments_are_refused() -> None:
     with board("model one\n") as one:
         os.close(one.answers)
         one.answers = os.dup(one.requests)
-        assert one.ended()[::2] == (2, "plant: the description ends, or a line of it is too long, before a line 'end'\n")
+        assert one.ended()[::2] == (
+            2,
+            "plant: the description ends, or a line of it is too long, before a line 'end'\n",
+        )
     for arguments in (("--log-output",), ("--speed", "1"), ("--line", "first")):
         with board(None, *arguments) as one:
             status, _, complained = one.ended()
