@@ -125,6 +125,8 @@ static bool find_structure(void)
     return from && to && plant_open(&plant, open(from, O_RDONLY), open(to, O_WRONLY | O_CREAT | O_TRUNC));
 }
 
+#define REFUSED 2 /* status where the description is none for this device */
+
 /* Sleep until the next interrupt, unless one is pending. */
 static void rest_a_while(void)
 {
@@ -137,10 +139,10 @@ static void rest_a_while(void)
 int main(void)
 {
     begin_clock();
-    is_there = find_structure();
-    if (!is_there || plant.description.wire != &vl_serial || !vl_begin(&plant.description, plant.boot))
-        return 1;
+    if (!find_structure() || plant.description.wire != &vl_serial || !vl_begin(&plant.description, plant.boot))
+        return REFUSED;
     uart_begin();
+    is_there = plant_rest(&plant); /* by its first request the structure knows that the device can be reached */
     while (is_there) {
         vl_serve();
         if (vl_block_is_due())

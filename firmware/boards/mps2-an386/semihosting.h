@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#define SEMIHOSTING_WRITE 0x04 /* a text */
 #define SEMIHOSTING_COMMAND_LINE 0x15
 #define SEMIHOSTING_EXIT 0x20
 

@@ -16,19 +16,12 @@ extern uint32_t data_in_flash, data_begin, data_end, bss_begin, bss_end, end, st
 #define PAINT 0xA5A5A5A5u
 #define BELOW_THE_FRAME 16 /* words */
 
+/* A debugger, or a monitor as QEMU's, sees later how deep the stack has been. */
 static void paint_stack(void)
 {
     const uint32_t *top = (uint32_t *)__builtin_frame_address(0) - BELOW_THE_FRAME;
     for (volatile uint32_t *word = &end; word < top; word++)
         *word = PAINT;
-}
-
-size_t stack_used(void)
-{
-    const uint32_t *word = &end;
-    while (*word == PAINT)
-        word++;
-    return (size_t)((const char *)&stack_top - (const char *)word);
 }
 
 void reset(void);
