@@ -138,6 +138,7 @@ static void rest_a_while(void)
 
 int main(void)
 {
+    board_output(0);
     begin_clock();
     if (!find_structure() || plant.description.wire != &vl_serial || !vl_begin(&plant.description, plant.boot))
         return REFUSED;
