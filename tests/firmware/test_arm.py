@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,10 +15,11 @@ from rig.conformance import with_loopback
 from rig.drivers import make_daq
 from rig.emulator.emulated import emulated
 from tests.contract.test_wire import OverAPort, Reached
-from tests.firmware.building import built
+from tests.firmware.building import FOLDER, built
 from tests.rig.rigs import bench_with
 
 QEMU = "qemu-system-arm"
+BOARD = "boards/mps2-an386"
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,38 @@ def test_the_same_outputs_give_the_samples_of_the_emulator_bit_for_bit(image: Pa
     assert np.abs(on_arm).max() > 0.01
 
 
-@pytest.mark.slow
+FAULT = """
+#include "board.h"
+#include "semihosting.h"
+#include "uart.h"
+int main(void);
+void board_output(int32_t count) { semihosting(SEMIHOSTING_WRITE, count == 0 ? "0 V" : "more"); }
+void uart_interrupt(void) {}
+int main(void) { WHAT; return 3; }
+"""
+
+
+@pytest.mark.parametrize(
+    "what", ['__asm__("udf #0")', "*(volatile int *)0xF0000000u = 1", "((void (*)(void))0x20000000u)()"]
+)
+def test_a_fault_brings_the_output_to_0_v_and_ends_the_program(image: Path, tmp_path: Path, what: str) -> None:
+    (tmp_path / "fault.c").write_text(FAULT.replace("WHAT", what))
+    compiler = [
+        "arm-none-eabi-gcc",
+        "-mcpu=cortex-m4",
+        "-mthumb",
+        "-nostartfiles",
+        "--specs=nano.specs",
+        "-Icore",
+        f"-I{BOARD}",
+    ]
+    program = [tmp_path / "fault.c", f"{BOARD}/startup.c", f"-T{BOARD}/memory.ld", "-o", tmp_path / "fault.elf"]
+    subprocess.run([*compiler, *program], check=True, cwd=FOLDER)
+    run = [QEMU, "-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none", "-semihosting"]
+    done = subprocess.run([*run, "-kernel", tmp_path / "fault.elf"], check=False, capture_output=True, timeout=60)
+    assert (done.returncode, done.stderr) == (1, b"0 V")
+
+
 class TestConformance(OverAPort):
     """The contract of drivers, with the device in QEMU."""
 

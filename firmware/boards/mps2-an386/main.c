@@ -120,8 +120,9 @@ static bool find_structure(void)
     initialise_monitor_handles();
     if (semihosting(SEMIHOSTING_COMMAND_LINE, &into) != 0)
         return false;
-    strtok(line, " ");
-    const char *from = strtok(NULL, " "), *to = strtok(NULL, " ");
+    char *rest = NULL;
+    strtok_r(line, " ", &rest); /* the program's own name. strtok would need a heap */
+    const char *from = strtok_r(NULL, " ", &rest), *to = strtok_r(NULL, " ", &rest);
     return from && to && plant_open(&plant, open(from, O_RDONLY), open(to, O_WRONLY | O_CREAT | O_TRUNC));
 }
 

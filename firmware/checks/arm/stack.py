@@ -1,7 +1,7 @@
 """Worst stack of the core: the longest path through the compiler's call graph, and what a painted stack shows after a run.
 
-The compiler says the frame of each function and whom it calls. A call through `struct vl_wire` leads to the member of that name, of
-the wire that the board has. Frames of library functions are read from their machine code.
+The compiler says the frame of each function and whom it calls. A call through `struct vl_wire` leads to the function that the
+board's wire has there. Frames of library functions are read from their machine code.
 """
 
 import re
@@ -105,7 +105,7 @@ def painted(memory: bytes) -> int:
 
 def report(build: Path) -> str:
     """The table of stacks. The worst is the main loop's, with both kinds of interrupt on top of it."""
-    head = ["wire", "main loop", "painted", "sampling interrupt", "worst", "the main loop's way"]
+    head = ["wire", "main loop", "painted", "sampling interrupt", "together", "the main loop's longest way"]
     rows: list[list[object]] = []
     for optimisation in OPTIMISATIONS:
         for wire in WIRES:
@@ -114,5 +114,7 @@ def report(build: Path) -> str:
             interrupt, _ = max(graph.path(name) for name in FROM_INTERRUPT)
             _, used = said(load(build, wire, optimisation))
             worst = main + EXCEPTION_FRAME + interrupt
-            rows.append([f"{wire}, {optimisation}", main, used, interrupt, worst, " > ".join(way)])
+            rows.append(
+                [f"{wire}, {optimisation}", main, used, interrupt, worst, ", ".join(f"`{name}`" for name in way)]
+            )
     return table(head, rows)

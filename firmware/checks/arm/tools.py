@@ -52,14 +52,20 @@ def load(build: Path, wire: str, optimisation: str, block: int = 10) -> Path:
     sources = [f"{BOARD}/startup.c", *(f"checks/arm/{name}" for name in ("load.c", "common.c", host))]
     out = build / f"load-{WIRES[wire]}{optimisation}-{block}.elf"
     settings = [f"-DWIRE={WIRES[wire]}", f"-DBLOCK={block}", f"-DFD={int(wire == 'CAN FD')}"]
-    linking = ["-nostartfiles", "--specs=nano.specs", f"-T{BOARD}/memory.ld", "-Wl,--gc-sections", f"-Wl,-Map={out}.map"]
+    linking = [
+        "-nostartfiles",
+        "--specs=nano.specs",
+        f"-T{BOARD}/memory.ld",
+        "-Wl,--gc-sections",
+        f"-Wl,-Map={out}.map",
+    ]
     made = objects(build, optimisation)
     output_of(f"{ARM}gcc", *flags(), optimisation, *settings, *sources, *made, "-o", str(out), *linking)
     return out
 
 
 def said(elf: Path) -> tuple[int, int]:
-    """What load.c prints at its end: ticks of its timer, with an instruction a nanosecond, and bytes of stack that calls from its main loop used."""
+    """What load.c prints: ticks of its timer, where an instruction takes 1 ns, and bytes of stack below its main loop."""
     command = [*QEMU, *SEMIHOSTING, "-icount", "shift=0", "-kernel", str(elf)]
     text = subprocess.run(command, check=True, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT).stdout
     ticks, stack = (int(number) for number in re.findall(r"\d+", text))
