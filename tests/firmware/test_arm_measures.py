@@ -14,7 +14,7 @@ from tests.firmware.test_arm import image
 
 __all__ = ["image"]  # fixture: skips or fails where programs are missing
 
-MODULES = ("tools", "sizes", "stack", "instructions")
+MODULES = ("tools", "sizes", "stack", "execution", "instructions")
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_trace_and_timer_count_the_same_and_a_sample_takes_a_part_of_its_time(
 ) -> None:
     instructions = measures.instructions
     program = measures.tools.load(tmp_path, wire, "-O2", 5)
-    counts = instructions.traced(program)
+    counts = measures.execution.traced(program)
     ticks, _ = measures.tools.said(program)
     assert abs(counts.steady - instructions.TIMER_TICK * ticks) <= instructions.TIMER_TICK
     samples = len(counts.calls["steady", "vl_output"])

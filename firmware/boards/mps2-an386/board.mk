@@ -11,6 +11,7 @@ AN386 = boards/mps2-an386
 .PHONY: mps2-an386
 mps2-an386: $(BUILD)/mps2-an386.elf ## the device as ARM machine code, for QEMU
 
-$(BUILD)/mps2-an386.elf: $(CORE) $(wildcard $(AN386)/*.c boards/plant/*.c) $(HEADERS) $(AN386)/memory.ld $(AN386)/board.mk | $(BUILD)
+MPS2_AN386 = $(CORE) $(wildcard $(AN386)/*.c boards/plant/*.c)
+$(BUILD)/mps2-an386.elf: $(MPS2_AN386) $(HEADERS) $(AN386)/memory.ld $(AN386)/board.mk | $(BUILD)
 	$(ARM_CC) $(WARNINGS) $(ARM) $(ARM_OPTIMISATION) -g $(ARM_LIMITS) -Icore -Iboards/plant -D_POSIX_C_SOURCE=200809L \
-	  $(filter %.c,$^) -o $@ -nostartfiles --specs=nano.specs --specs=rdimon.specs -T $(AN386)/memory.ld -Wl,--gc-sections
+	  $(MPS2_AN386) -o $@ -nostartfiles --specs=nano.specs --specs=rdimon.specs -T $(AN386)/memory.ld -Wl,--gc-sections

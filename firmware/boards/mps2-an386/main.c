@@ -1,5 +1,6 @@
 /* The device on the mps2-an386 with a Cortex-M4, as QEMU emulates it: serial line, lockstep, and a virtual structure instead of
- * converters. QEMU's time is not real, and it counts no cycles: this board shows that the core runs as ARM machine code, not how fast.
+ * converters. QEMU's time is not real, and it counts no cycles: this board shows that the core runs as ARM machine code, not
+ * how fast.
  *
  * The structure is reached through two FIFOs of the computer on which QEMU runs (boards/plant). Their names come by the command
  * line of semihosting: -semihosting-config enable=on,target=native,arg=mps2-an386,arg=FROM_STRUCTURE,arg=TO_STRUCTURE */
@@ -14,7 +15,7 @@
 #include "startup.h"
 #include "uart.h"
 
-/* -- the clock: timer 0 (CMSDK APB timer) counts down at 25 MHz ------------------------------------------------------------- */
+/* -- the clock: timer 0 (CMSDK APB timer) counts down at 25 MHz ---------------------------------------------------- */
 
 #define TICKS_PER_US 25u
 #define TIMER0_CONTROL (*(volatile uint32_t *)0x40000000u)
@@ -43,7 +44,7 @@ uint64_t board_clock_us(void)
     return now_us += passed_us;
 }
 
-/* -- sample instants: in lockstep there is no timer -------------------------------------------------------------------------- */
+/* -- sample instants: in lockstep there is no timer ---------------------------------------------------------------- */
 
 static struct plant plant;
 static bool is_there;
@@ -77,7 +78,7 @@ static void measure_a_block(void)
     is_there = plant_measure(&plant, vl_block());
 }
 
-/* -- what else the core asks for --------------------------------------------------------------------------------------------- */
+/* -- what else the core asks for ----------------------------------------------------------------------------------- */
 
 void board_lock(void)
 {
@@ -110,7 +111,7 @@ bool board_send_frame(const struct vl_frame *frame)
     return false;
 }
 
-/* -- the program --------------------------------------------------------------------------------------------------------------- */
+/* -- the program --------------------------------------------------------------------------------------------------- */
 
 /* Open the FIFOs, in this order. O_TRUNC makes semihosting open for writing, and does nothing to a FIFO. */
 static bool find_structure(void)

@@ -1,5 +1,5 @@
-/* The core on a processor that has nothing else to do, for measures.py: blocks at 5 kHz, a clock and a host of its own, and a board
- * that throws away what is sent. Compiled for a WIRE, samples a block BLOCK. */
+/* The core on a processor that has nothing else to do, for measures.py: blocks at 5 kHz, a clock and a host of its own, and a
+ * board that throws away what is sent. Compiled for a WIRE and BLOCK, samples a block. */
 
 #include "host.h"
 
@@ -39,7 +39,7 @@ static const struct vl_description DEVICE = {
     .node = 1,
 };
 
-/* -- the board ----------------------------------------------------------------------------------------------------------------- */
+/* -- the board ----------------------------------------------------------------------------------------------------- */
 
 static uint64_t now_us;
 
@@ -86,7 +86,7 @@ void board_feed_watchdog(void)
 {
 }
 
-/* -- what is measured: calls from `steady`, and from `ramp` -------------------------------------------------------------------- */
+/* -- what is measured: calls from `steady`, and from `ramp` -------------------------------------------------------- */
 
 static const char *stack_in_main_loop;
 

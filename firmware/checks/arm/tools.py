@@ -74,5 +74,5 @@ def said(elf: Path) -> tuple[int, int]:
 
 def table(head: list[str], rows: list[list[object]]) -> str:
     """A table of Markdown; text at the left, numbers at the right."""
-    lines = [head, ["---" if isinstance(one, str) else "---:" for one in rows[0]], *rows]
+    lines: list[list[object]] = [[*head], ["---" if isinstance(one, str) else "---:" for one in rows[0]], *rows]
     return "\n".join("| " + " | ".join(str(one) for one in line) + " |" for line in lines)
