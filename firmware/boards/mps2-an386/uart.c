@@ -32,7 +32,7 @@ void uart_interrupt(void)
 {
     UART0->interrupt_clear = RX_INTERRUPT;
     uint8_t byte = (uint8_t)UART0->data;
-    if (received - taken < RING)
+    if (received - taken < RING) /* else the byte is lost, and by its CRC the frame */
         ring[received++ % RING] = byte;
 }
 
