@@ -73,7 +73,7 @@ def compare(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, float]]:
     for name, one in found.items():
         _, mine, theirs = np.intersect1d(one["number"], truth["number"], return_indices=True)
         differ = {
-            key: float(np.max(np.abs(np.array(one[key])[mine] / np.array(truth[key])[theirs] - 1.0))) * 100.0
+            key: 100.0 * float(np.abs(np.array(one[key])[mine] / np.array(truth[key])[theirs] - 1.0).max(initial=0.0))
             for key in ("frequency_hz", "damping_ratio")
         }
         out[name] = {"points": float(len(one["frequency_hz"])), **{f"{k}_percent": v for k, v in differ.items()}}
