@@ -24,7 +24,7 @@ import numpy as np
 
 from rig.daq import Adjustable
 
-__all__ = ["Recommendation", "Settings", "Timing", "answer_s", "complaints", "lateness_s", "recommend"]
+__all__ = ["Recommendation", "Settings", "Timing", "answer_s", "complaints", "lateness_s", "reached_blocks_s", "recommend"]
 
 RESERVE = 1.5  # of the largest lateness: one or two seconds do not see the largest of a test
 BUSY = 0.5  # of a block for the driver's computing; controller and recorder need the rest
@@ -81,6 +81,20 @@ def lateness_s(arrivals_s: np.ndarray, period_s: float, horizon_s: float = HORIZ
         lowest = np.minimum.accumulate(ahead[::-1])[::-1]
         out[first : first + window] = (ahead - lowest)[:window]
     return out
+
+
+def reached_blocks_s(arrivals_s: np.ndarray, period_s: float) -> float:
+    """Return the blocks per second of ``arrivals_s`` float64[n]; 0 if there are too few.
+
+    They are counted from the block that is least late in the first fifth to that in the last fifth, so that a block late at
+    either end does not count as a lower rate.
+    """
+    if arrivals_s.size < 2:
+        return 0.0
+    since = arrivals_s - period_s * np.arange(arrivals_s.size)
+    part = max(1, arrivals_s.size // 5)
+    first, last = int(np.argmin(since[:part])), arrivals_s.size - part + int(np.argmin(since[-part:]))
+    return (last - first) / max(1e-9, float(arrivals_s[last] - arrivals_s[first]))
 
 
 def answer_s(timing: Timing, wire_s: float) -> float:
@@ -189,7 +203,7 @@ def _watchdog(timing: Timing, now: Settings, allowed: Adjustable | None) -> tupl
     if wanted_s <= now.watchdog_s:
         return now.watchdog_s, why
     chosen_s = min(max(_rounded_up(wanted_s), shortest_s), longest_s)
-    return chosen_s, f"{why}; more than {longest_s:g} s are not allowed" if chosen_s < wanted_s else why
+    return chosen_s, f"{why}; more than {longest_s:g} s are not allowed" if longest_s < wanted_s else why
 
 
 def _rate(

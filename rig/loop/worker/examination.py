@@ -12,7 +12,7 @@ from rig.errors import DaqRefused, RigError
 from rig.loop.recommendation import Recommendation, Settings, complaints, recommend
 from rig.loop.worker.probe import round_trips, timing_of
 
-__all__ = ["examine_device", "with_settings"]
+__all__ = ["bench_lines", "examine_device", "with_settings"]
 
 MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0
 TRIES = 3  # of settings, each with twice the queue or a longer block
@@ -57,6 +57,13 @@ def with_settings(bench: Bench, settings: Settings, rate_hz: float) -> Bench:
     return bench.model_copy(update={"driver": driver, "block": settings.block, "sample_rate_hz": rate_hz})
 
 
+def bench_lines(differs: dict[str, Any]) -> list[str]:
+    """Return lines of a bench file with the settings that differ from those of the bench; empty if none do."""
+    options = [f"{name} = {differs[name]:g}" for name in ("queue_blocks", "watchdog_s") if name in differs]
+    block = [f"block = {differs['block']}"] if "block" in differs else []
+    return [*block, *([""] if block and options else []), *(["[driver.options]", *options] if options else [])]
+
+
 def _that_opens(bench: Bench, seed: int) -> tuple[Bench, str]:
     """Return the bench, or, if the device or its wire refuses that, with the shortest block that is not; and the refusal."""
     try:
@@ -92,7 +99,7 @@ def _patient(now: Settings, allowed: Adjustable | None) -> Settings:
 def _without_clock(facts: dict[str, Any]) -> dict[str, Any]:
     """Return the report on a device that waits for the host: no output can be late."""
     why = "the device waits for the host: no output is late, and neither queue nor watchdog needs to be changed"
-    told = {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": []}
+    told = {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": [], "bench_lines": []}
     return facts | {"recommendation": told}
 
 
@@ -127,6 +134,7 @@ class _Examination:
             "delay_s": self._delay_s(advice.settings),
             "holds": bool(self._tried and self._holds(advice.settings)),
             "tried": self._tried,
+            "bench_lines": bench_lines(differs),
         }
         return facts | {"remarks": remarks, "recommendation": told}
 

@@ -10,7 +10,7 @@ from rig.bench import Bench
 from rig.daq import DAQ, HELD, LOST, flag_names
 from rig.drivers import make_daq
 from rig.errors import DaqError
-from rig.loop.recommendation import Timing, lateness_s
+from rig.loop.recommendation import Timing, lateness_s, reached_blocks_s
 from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
@@ -123,7 +123,7 @@ def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> dict[str, Any]:
     if by_device:
         out["late_us"] = _quantiles_us(lateness_s(times[1:], daq.block / daq.sample_rate_hz))
     out["driver_us"] = round(1e6 * seen.busy_s / max(1, blocks), 2)
-    out["reached_hz"] = round(blocks * daq.block / max(1e-9, float(times[-1] - times[0])), 1)
+    out["reached_hz"] = round(reached_blocks_s(times, daq.block / daq.sample_rate_hz if by_device else 0.0) * daq.block, 1)
     out |= {"queue_blocks": daq.queue_blocks, "blocks": blocks, "held_blocks": seen.held, "lost_blocks": seen.lost}
     out["smallest_step_v"] = _smallest_steps(daq, seen.readings_v)
     out |= {"failure": seen.failure} if seen.failure else {}
