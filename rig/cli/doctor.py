@@ -1,21 +1,43 @@
-"""``rig doctor``: what this machine and a bench's device can promise, and which settings hold."""
+"""``rig doctor``: what this machine and a bench's device can promise, which settings hold, and all ways to run side by side."""
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rig.cli.options import Json
 
+if TYPE_CHECKING:
+    from rig.bench import Bench
+
 __all__ = ["doctor"]
 
 UNITS = {"block": "samples", "queue_blocks": "blocks", "watchdog_s": "s", "largest_rate_hz": "Hz"}
+MATRIX_BENCH = "magnet-beam"
 
 
 def doctor(
+    others: Annotated[
+        list[Path] | None,
+        typer.Argument(help="With --matrix: files of rows that others have measured, to be shown too."),
+    ] = None,
     daq: Annotated[
         str | None, typer.Option(help="Bench whose device to look at: a name or TOML file. It is given 0 V only.")
+    ] = None,
+    matrix: Annotated[
+        bool, typer.Option("--matrix", help="Measure every way to run without a rig, side by side; half a minute.")
+    ] = False,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="With --matrix: also run the conformance suite over each; two minutes.")
+    ] = False,
+    firmware: Annotated[
+        list[Path] | None,
+        typer.Option(help="With --matrix: firmware to measure as well, built for this machine or for ARM (QEMU)."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File for the rows that were measured: TOML or JSON.")
     ] = None,
     json: Json = False,
 ) -> None:
@@ -25,15 +47,70 @@ def doctor(
     """
     from rig.bench import load_bench
     from rig.loop.doctor import examine, examine_bench
+
+    _check_options(daq, matrix, [*(others or ()), *(firmware or ()), *([Path("--verify")] if verify else ())], output)
+    facts = None if daq is None else examine_bench(load_bench(daq))
+    if matrix:
+        _matrix(None if daq is None else (load_bench(daq), facts), others or [], firmware or [], verify, output, json)
+        return
+    if facts is not None and output is not None:
+        from rig.matrix import write_rows
+        from rig.matrix.measuring import device_row
+
+        write_rows(output, [device_row(load_bench(str(daq)), facts)])
+    _show(facts or examine(Path.cwd()), json)
+
+
+def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], output: Path | None) -> None:
+    """Refuse options that would have no effect."""
+    from rig.errors import ConfigurationError
+
+    if of_the_matrix and not matrix:
+        raise ConfigurationError(f"{of_the_matrix[0]}: allowed with --matrix alone")
+    if output is not None and not (matrix or daq is not None):
+        raise ConfigurationError(f"-o {output}: allowed with --matrix or --daq")
+    if output is not None and output.suffix not in (".toml", ".json"):
+        raise ConfigurationError(f"-o {output}: allowed is a file .toml or .json")
+
+
+def _matrix(
+    device: tuple["Bench", dict[str, Any]] | None,
+    others: list[Path],
+    firmware: list[Path],
+    verify: bool,
+    output: Path | None,
+    json: bool,
+) -> None:
+    """Measure every way, and show it with what others have measured; ``device``: a bench and what was found of its device."""
+    from rig.bench import load_bench
+    from rig.matrix import read_rows, write_rows
+    from rig.matrix.measuring import device_row, matrix_rows
+    from rig.matrix.table import print_matrix
+    from rig.text.console import print_json
+
+    theirs = [row for path in others for row in read_rows(path)]
+    rows = [] if device is None else [device_row(*device)]
+    for row in matrix_rows(load_bench(MATRIX_BENCH), firmware, verify=verify):
+        rows.append(row)
+        print(f"measured: {row.way}", file=sys.stderr, flush=True)
+    if output is not None:
+        write_rows(output, rows)
+    if json:
+        print_json({"row": [row.model_dump(mode="json", exclude_none=True) for row in [*rows, *theirs]]})
+    else:
+        print_matrix([*rows, *theirs])
+
+
+def _show(facts: dict[str, Any], json: bool) -> None:
+    """Print what was found of this machine, or of a device."""
     from rig.text.console import print_json
     from rig.text.printable import printable_strings
 
-    facts = examine(Path.cwd()) if daq is None else examine_bench(load_bench(daq))
     if json:
         print_json(facts)
     else:
-        advice = facts.pop("recommendation", None)
-        for name, value in printable_strings(facts).items():
+        advice = facts.get("recommendation")
+        for name, value in printable_strings({key: facts[key] for key in facts if key != "recommendation"}).items():
             _print(name, value)
         if advice is not None:
             _print_advice(printable_strings(advice))

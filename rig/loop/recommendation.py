@@ -24,7 +24,16 @@ import numpy as np
 
 from rig.daq import Adjustable
 
-__all__ = ["Recommendation", "Settings", "Timing", "answer_s", "complaints", "lateness_s", "reached_blocks_s", "recommend"]
+__all__ = [
+    "Recommendation",
+    "Settings",
+    "Timing",
+    "answer_s",
+    "complaints",
+    "lateness_s",
+    "reached_blocks_s",
+    "recommend",
+]
 
 RESERVE = 1.5  # of the largest lateness: one or two seconds do not see the largest of a test
 BUSY = 0.5  # of a block for the driver's computing; controller and recorder need the rest
@@ -157,7 +166,9 @@ def complaints(
             f"{timing.gap_s:.3g} s: it ends a run"
         )
     if reached_hz is not None and reached_hz < 0.99 * rate_hz:
-        out.append(f"{reached_hz:.0f} of {rate_hz:.0f} samples a second are reached: device, wire or computer are too slow")
+        out.append(
+            f"{reached_hz:.0f} of {rate_hz:.0f} samples a second are reached: device, wire or computer are too slow"
+        )
     return out
 
 

@@ -106,7 +106,9 @@ def _without_clock(facts: dict[str, Any]) -> dict[str, Any]:
 class _Examination:
     """What follows the first measurement of a device with a clock."""
 
-    def __init__(self, bench: Bench, seed: int, now: Settings, allowed: Adjustable | None, facts: dict[str, Any]) -> None:
+    def __init__(
+        self, bench: Bench, seed: int, now: Settings, allowed: Adjustable | None, facts: dict[str, Any]
+    ) -> None:
         self._bench, self._seed, self._now, self._allowed, self._facts = bench, seed, now, allowed, facts
         self._timing, self._rate_hz = timing_of(facts), bench.sample_rate_hz
         self._tried: list[dict[str, Any]] = []
@@ -151,7 +153,11 @@ class _Examination:
         if settings == self._now and rate_hz == self._rate_hz and "block_us" in facts:
             self._as_is = facts
         counts = ("blocks", "held_blocks", "lost_blocks", "reached_hz", "failure", "latched")
-        told = {**settings._asdict(), "sample_rate_hz": rate_hz, **{name: facts[name] for name in counts if name in facts}}
+        told = {
+            **settings._asdict(),
+            "sample_rate_hz": rate_hz,
+            **{name: facts[name] for name in counts if name in facts},
+        }
         self._tried.append({name: value for name, value in told.items() if value is not None})
         return facts
 

@@ -2,6 +2,7 @@
 
 import gc
 import time
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +16,10 @@ from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
 
-__all__ = ["probe", "round_trips", "timing_of"]
+__all__ = ["probe", "round_trips", "smallest_steps_v", "timing_of"]
 
 SETTLE_BLOCKS = 10
+ROUNDING = 1e-9  # of the largest reading: a smaller difference is none
 KEPT_ROWS = 20_000  # of readings, for the smallest step between two
 
 
@@ -123,9 +125,11 @@ def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> dict[str, Any]:
     if by_device:
         out["late_us"] = _quantiles_us(lateness_s(times[1:], daq.block / daq.sample_rate_hz))
     out["driver_us"] = round(1e6 * seen.busy_s / max(1, blocks), 2)
-    out["reached_hz"] = round(reached_blocks_s(times, daq.block / daq.sample_rate_hz if by_device else 0.0) * daq.block, 1)
+    out["reached_hz"] = round(
+        reached_blocks_s(times, daq.block / daq.sample_rate_hz if by_device else 0.0) * daq.block, 1
+    )
     out |= {"queue_blocks": daq.queue_blocks, "blocks": blocks, "held_blocks": seen.held, "lost_blocks": seen.lost}
-    out["smallest_step_v"] = _smallest_steps(daq, seen.readings_v)
+    out["smallest_step_v"] = smallest_steps_v([channel.name for channel in daq.channels], seen.readings_v)
     out |= {"failure": seen.failure} if seen.failure else {}
     out |= {"statistics": dict(daq.statistics), "counters": dict(daq.counters)}
     out["remarks"] = [*daq.remarks]
@@ -140,12 +144,16 @@ def _quantiles_us(times_s: np.ndarray) -> dict[str, float]:
     return histogram.report()
 
 
-def _smallest_steps(daq: DAQ, readings_v: np.ndarray) -> dict[str, float]:
-    """Return the smallest step between two different readings, V, by channel; channels with only one reading are left out."""
+def smallest_steps_v(names: Sequence[str], readings_v: np.ndarray) -> dict[str, float]:
+    """Return the smallest step between two different readings float64[n, n_channels], V, by channel.
+
+    Channels whose reading never changed are left out. The step of a converter is seen where noise or signal takes neighbouring
+    values.
+    """
     out = {}
-    for channel, column in zip(daq.channels, readings_v.T, strict=True):
+    for name, column in zip(names, readings_v.T, strict=True):
         levels = np.unique(column[np.isfinite(column)])
         if levels.size > 1:
             steps = np.diff(levels)
-            out[channel.name] = float(steps[steps > 1e-9 * np.abs(levels).max()].min())
+            out[name] = float(steps[steps > ROUNDING * np.abs(levels).max()].min())
     return out

@@ -8,7 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.daq import Adjustable
-from rig.loop.recommendation import BUSY, GAPS, RESERVE, Settings, Timing, complaints, lateness_s, reached_blocks_s, recommend
+from rig.loop.recommendation import (
+    BUSY,
+    GAPS,
+    RESERVE,
+    Settings,
+    Timing,
+    complaints,
+    lateness_s,
+    reached_blocks_s,
+    recommend,
+)
 
 RATE_HZ = 5000.0
 QUICK = Timing(late_s=0.0, gap_s=0.001, round_trip_s=0.0, busy_s=1e-5)
@@ -38,7 +48,9 @@ def test_a_bench_that_is_quick_enough_is_left_as_it_is():
     assert advice.holds
 
 
-@pytest.mark.parametrize(("late_s", "blocks"), [(0.0, 1), (0.00066, 1), (0.00067, 2), (0.002, 2), (0.0021, 3), (0.030, 23)])
+@pytest.mark.parametrize(
+    ("late_s", "blocks"), [(0.0, 1), (0.00066, 1), (0.00067, 2), (0.002, 2), (0.0021, 3), (0.030, 23)]
+)
 def test_the_queue_lasts_for_the_lateness_with_its_reserve_and_half_a_block(late_s, blocks):
     """Blocks of 2 ms: q = ceil(1.5 late / 2 ms + 0.5)."""
     assert blocks == math.ceil(RESERVE * late_s / 0.002 + 1.0 - BUSY)
@@ -52,9 +64,7 @@ def test_round_trip_and_time_on_the_wire_count_once():
     assert advised(late, allow=full).settings.queue_blocks == 4
 
 
-@given(
-    st.floats(0.0, 0.2), st.floats(0.0, 0.01), st.floats(0.0, 0.001), st.sampled_from(BLOCKS), st.integers(1, 64)
-)
+@given(st.floats(0.0, 0.2), st.floats(0.0, 0.01), st.floats(0.0, 0.001), st.sampled_from(BLOCKS), st.integers(1, 64))
 def test_what_is_recommended_fulfils_the_rule_wherever_it_says_that_it_holds(late, trip, busy, block, queue):
     timing = Timing(late, late + 0.001, trip, busy)
     advice = advised(timing, Settings(block, queue, 0.1))
@@ -81,7 +91,9 @@ def test_where_the_longest_queue_is_too_short_the_block_grows():
 
 
 def test_where_nothing_is_long_enough_it_says_so():
-    advice = advised(QUICK._replace(late_s=0.030), allow=allowed(largest_queue=2, wire_share={10: 0.0}), largest_block=10)
+    advice = advised(
+        QUICK._replace(late_s=0.030), allow=allowed(largest_queue=2, wire_share={10: 0.0}), largest_block=10
+    )
     assert not advice.holds
     assert advice.settings.queue_blocks == 2
     assert "more than 2 cannot be set" in advice.reasons["queue_blocks"]

@@ -25,7 +25,9 @@ def failed(outcome, held=0, lost=0, samples=2000):
 def test_a_record_with_held_outputs_says_how_many_and_what_helps():
     point = failed(Outcome.DISTURBED, held=14)
     assert point.quality is Quality.DISTURBED
-    assert point.reason.startswith("outputs came too late: held in 14 samples of 2000, `rig doctor --daq` recommends a queue")
+    assert point.reason.startswith(
+        "outputs came too late: held in 14 samples of 2000, `rig doctor --daq` recommends a queue"
+    )
     assert "averaged phase error 3.00 deg" in point.reason
     assert DISTURBED not in point.reason
 

@@ -25,7 +25,9 @@ def test_a_point_with_more_than_a_twentieth_of_its_outputs_held_is_not_accepted(
     assert point.warnings[0] == "before"
     assert (f"output held in {held} of 1000 samples" in point.warnings) is (held > 0)
     if not accepted:
-        assert point.reason.startswith("outputs came too late: held in 51 samples of 1000, `rig doctor --daq` recommends")
+        assert point.reason.startswith(
+            "outputs came too late: held in 51 samples of 1000, `rig doctor --daq` recommends"
+        )
 
 
 def test_a_point_that_failed_for_another_reason_keeps_it_behind_the_outputs_that_were_held() -> None:

@@ -91,7 +91,9 @@ def test_held_outputs_and_a_queue_that_is_too_short_are_remarked(examined):
 def test_the_lines_for_the_bench_make_a_bench_with_the_recommended_settings(examined, tmp_path):
     late(examined, 0.060)
     advice = examine_device(BENCH, 0)["recommendation"]
-    (tmp_path / "mine.toml").write_text('base = "magnet-beam"\nblock = 10\n[driver]\nname = "serial"\noptions.port = "p"\n')
+    (tmp_path / "mine.toml").write_text(
+        'base = "magnet-beam"\nblock = 10\n[driver]\nname = "serial"\noptions.port = "p"\n'
+    )
     (tmp_path / "better.toml").write_text("\n".join(['base = "mine.toml"', *advice["bench_lines"]]))
     options = load_bench(tmp_path / "better.toml").driver.options
     assert options == {"port": "p", **advice["differs"]}
@@ -124,7 +126,9 @@ def test_a_watchdog_that_would_end_the_examination_is_not_tried_and_nothing_latc
 
 
 def test_a_wire_that_cannot_carry_the_blocks_of_the_bench_gets_longer_ones(examined):
-    examined.keys["available_bit_s"] = 0.85e6  # a block of one sample takes 5000 x 8 x (12 + 2 x 2) bit/s, of two the half
+    examined.keys["available_bit_s"] = (
+        0.85e6  # a block of one sample takes 5000 x 8 x (12 + 2 x 2) bit/s, of two the half
+    )
     facts = examine_device(bench_with({"block": 1}), 0)
     advice = facts["recommendation"]
     assert "of the wire" in facts["remarks"][0]
@@ -151,7 +155,9 @@ def test_a_device_that_waits_for_the_host_needs_no_settings(examined):
 def test_all_outputs_are_0_v(examined, monkeypatch):
     sent = []
     exchange = MemoryDAQ.exchange
-    monkeypatch.setattr(MemoryDAQ, "exchange", lambda daq, volts: (sent.append(abs(volts).max()), exchange(daq, volts))[1])
+    monkeypatch.setattr(
+        MemoryDAQ, "exchange", lambda daq, volts: (sent.append(abs(volts).max()), exchange(daq, volts))[1]
+    )
     examine_device(BENCH, 0)
     assert len(sent) > 1000
     assert max(sent) == 0.0
