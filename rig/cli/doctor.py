@@ -45,20 +45,28 @@ def doctor(
 
     With --daq it also recommends block, queue, watchdog and the largest sample rate, and says whether they held when tried.
     """
-    from rig.bench import load_bench
-    from rig.loop.doctor import examine, examine_bench
+    from rig.loop.doctor import examine
 
     _check_options(daq, matrix, [*(others or ()), *(firmware or ()), *([Path("--verify")] if verify else ())], output)
-    facts = None if daq is None else examine_bench(load_bench(daq))
+    device = None if daq is None else _examined(daq)
     if matrix:
-        _matrix(None if daq is None else (load_bench(daq), facts), others or [], firmware or [], verify, output, json)
+        _matrix(device, others or [], firmware or [], verify, output, json)
         return
-    if facts is not None and output is not None:
+    if device is not None and output is not None:
         from rig.matrix import write_rows
         from rig.matrix.measuring import device_row
 
-        write_rows(output, [device_row(load_bench(str(daq)), facts)])
-    _show(facts or examine(Path.cwd()), json)
+        write_rows(output, [device_row(*device)])
+    _show(device[1] if device else examine(Path.cwd()), json)
+
+
+def _examined(daq: str) -> tuple["Bench", dict[str, Any]]:
+    """Return a bench, and what was found of its device."""
+    from rig.bench import load_bench
+    from rig.loop.doctor import examine_bench
+
+    bench = load_bench(daq)
+    return bench, examine_bench(bench)
 
 
 def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], output: Path | None) -> None:

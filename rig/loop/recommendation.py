@@ -8,8 +8,8 @@ The rule. All times in s, T = block / sample rate:
 - **Queue**: the outputs of a block are due q blocks after it, so q T must last for the answer time and the part ``1 - BUSY`` of
   a block more, in which the controller computes. The shortest such q is taken, and a longer block where q is more than the
   device has.
-- **Block**: that of the bench, unless the driver needs more than ``BUSY`` of it for computing, or the wire cannot carry it. Then
-  the next longer one of 1, 2, 5, 10, 20... samples.
+- **Block**: that of the bench, unless the driver needs more than ``BUSY`` of it for computing, or the wire cannot carry it.
+  Then the next longer one of 1, 2, 5, 10, 20... samples.
 - **Watchdog**: ``GAPS`` times the longest time between two blocks, within what driver and device allow.
 - **Largest rate**: the lowest of the device's, of what the wire carries (`rig.daq.Adjustable`), of what the driver can compute
   (``BUSY`` of a block), and of that at which the longest queue still lasts.
@@ -83,7 +83,7 @@ def lateness_s(arrivals_s: np.ndarray, period_s: float, horizon_s: float = HORIZ
     block by block, and counts. A device whose clock has stood still is not made up for, and does not count.
     """
     since = arrivals_s - period_s * np.arange(arrivals_s.size)
-    out = np.empty_like(since)
+    out = np.zeros(since.size)
     window = max(1, math.ceil(horizon_s / period_s))
     for first in range(0, since.size, window):
         ahead = since[first : first + 2 * window]

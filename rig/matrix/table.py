@@ -12,8 +12,9 @@ HEADINGS = (
     *("held", "lost", "step mV", "watchdog s", "0 V after s", "suite", "on"),
 )
 LEGEND = (
-    "late: how late blocks came; held, lost: blocks with held outputs, and lost, of those exchanged; step: the coarsest channel's",
-    "smallest step; 0 V after: from the last output, (r) reported by the device, else seen; suite: duties kept/failed/not applicable",
+    "late: how late blocks came; held, lost: blocks with held outputs, and lost, of those exchanged; step: the smallest",
+    "between two readings, of the coarsest channel; 0 V after: after the last output, seen, or (r) as the device reports",
+    "its watchdog; suite: duties kept/failed/not applicable",
 )
 
 

@@ -55,7 +55,7 @@ class Way:
 
 
 def way_benches(firmware: Sequence[Path] = ()) -> list[Way]:
-    """Return the ways that are there on every machine, and those over ``firmware``: ELF files for the host or for ARM (QEMU)."""
+    """Return the ways that there are on every machine, and those over ``firmware``: files for the host or for ARM (QEMU)."""
     out = [Way("virtual")]
     out += [way for lockstep in (False, True) for way in _wires("emulator", lockstep)]
     for path in firmware:

@@ -165,14 +165,13 @@ class WireDAQ(DAQ):
         return out
 
     def _open(self) -> None:
-        link = self._make_link()
-        link.open()
-        self._connection = Connection(link, self.clock)
-        self._streaming = None
+        connection = Connection(self._make_link(), self.clock)
         try:
-            self._connection.meet(self._bench, self._options.queue_blocks)
+            connection.link.open()
+            self._connection, self._streaming = connection, None
+            connection.meet(self._bench, self._options.queue_blocks)
         except BaseException:
-            self._connection.let_go()
+            connection.let_go()  # also a port whose adapter did not answer
             raise
 
     def _start(self) -> None:

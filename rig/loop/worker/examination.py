@@ -25,11 +25,11 @@ HIGHER = 1.05  # a largest rate that is not more than this many times the bench'
 def examine_device(bench: Bench, seed: int) -> dict[str, Any]:
     """Exchange 0 V with a bench's device for some seconds; return the timing and a ``recommendation`` with its reasons.
 
-    The device first has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the settings that
-    `rig.loop.recommendation` gives are tried, with a longer queue if outputs are held all the same; then a higher sample rate if
-    device and wire have one; last the settings of the bench, unless its watchdog would end that. The report is that of
-    `rig.loop.worker.probe.round_trips` with the bench's settings, where they were tried. Nothing is driven, and nothing that has
-    latched is cleared: an examination that has made the watchdog latch ends there.
+    The device first has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the settings
+    that `rig.loop.recommendation` gives are tried, with a longer queue if outputs are held all the same; then a higher sample
+    rate if device and wire have one; last the settings of the bench, unless its watchdog would end that. The report is that of
+    `rig.loop.worker.probe.round_trips` with the bench's settings, where they were tried. Nothing is driven, and nothing that
+    has latched is cleared: an examination that has made the watchdog latch ends there.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
@@ -49,7 +49,7 @@ def examine_device(bench: Bench, seed: int) -> dict[str, Any]:
 
 
 def with_settings(bench: Bench, settings: Settings, rate_hz: float) -> Bench:
-    """Return a bench with other settings and another sample rate; options that the bench has not are only set if they differ."""
+    """Return a bench with other settings and another sample rate; queue and watchdog only if its driver has them."""
     options = dict(bench.driver.options)
     if settings.watchdog_s is not None:
         options |= {"queue_blocks": settings.queue_blocks, "watchdog_s": settings.watchdog_s}
@@ -115,7 +115,7 @@ class _Examination:
         self._as_is: dict[str, Any] | None = None  # report with the settings of the bench
 
     def report(self, refusal: str) -> dict[str, Any]:
-        """Try settings and rates; return the whole report. ``refusal``: of the settings of the bench, empty if there is none."""
+        """Try settings and rates; return the whole report. ``refusal``: of the settings of the bench, empty without one."""
         advice = recommend(self._timing, self._now, self._rate_hz, self._allowed, self._facts["largest_block"])
         advice = self._try_settings(advice)
         rate_hz, rate_was_tried = self._try_rates(advice)

@@ -95,7 +95,9 @@ def _exchanged(daq: DAQ, seconds: float) -> _Exchanged:
     """Exchange blocks of 0 V for a time."""
     block, names = daq.block, flag_names(daq.counters)
     held_flag = 1 << names.index(HELD) if HELD in names else 0
-    zeros, arrivals, readings = np.zeros(block), [], []
+    zeros = np.zeros(block)
+    arrivals: list[float] = []
+    readings: list[np.ndarray] = []
     held = lost = 0
     failure = ""
     began_s, computed_s = time.monotonic(), time.thread_time()

@@ -8,8 +8,8 @@ import pytest
 from rig.bench import load_bench
 from rig.drivers.wire import WireOptions
 from rig.emulator import Faults
-from rig.loop.session import LocalSession
 from rig.loop.recommendation import Settings
+from rig.loop.session import LocalSession
 from rig.loop.worker.examination import examine_device, with_settings
 from rig.loop.worker.probe import round_trips
 from rig.wire.messages import DeviceState, EmergencyStop
