@@ -3,17 +3,18 @@
 import contextlib
 import math
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from rig.bench import Bench, DriverChoice
 from rig.daq import Adjustable
 from rig.drivers import make_daq
-from rig.errors import DaqRefused, RigError
+from rig.errors import DaqRefused, DaqWatchdog, RigError
 from rig.loop.recommendation import Recommendation, Settings, complaints, recommend
 from rig.loop.worker.probe import round_trips, timing_of
 
 __all__ = ["bench_lines", "examine_device", "with_settings"]
 
+LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
 MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0
 TRIES = 3  # of settings, each with twice the queue or a longer block
 RATE_TRIES = 2
@@ -34,8 +35,7 @@ def examine_device(bench: Bench, seed: int) -> dict[str, Any]:
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
     began = time.monotonic()
-    opened, refusal = _that_opens(bench, seed)
-    allowed, now, by_device = _asked(opened, seed)
+    opened, (allowed, now, by_device), refusal = _that_opens(bench, seed)
     if by_device:
         opened = with_settings(opened, _patient(now, allowed), bench.sample_rate_hz)
     facts = round_trips(opened, seed, MEASURED_S)
@@ -57,6 +57,16 @@ def with_settings(bench: Bench, settings: Settings, rate_hz: float) -> Bench:
     return bench.model_copy(update={"driver": driver, "block": settings.block, "sample_rate_hz": rate_hz})
 
 
+class _Asked(NamedTuple):
+    """What a device lets one set."""
+
+    allowed: Adjustable | None
+    now: Settings
+    """Those of the bench."""
+    by_device: bool
+    """Whether the device has a clock of its own."""
+
+
 def bench_lines(differs: dict[str, Any]) -> list[str]:
     """Return lines of a bench file with the settings that differ from those of the bench; empty if none do."""
     options = [f"{name} = {differs[name]:g}" for name in ("queue_blocks", "watchdog_s") if name in differs]
@@ -64,29 +74,27 @@ def bench_lines(differs: dict[str, Any]) -> list[str]:
     return [*block, *([""] if block and options else []), *(["[driver.options]", *options] if options else [])]
 
 
-def _that_opens(bench: Bench, seed: int) -> tuple[Bench, str]:
+def _that_opens(bench: Bench, seed: int) -> tuple[Bench, _Asked, str]:
     """Return the bench, or, if the device or its wire refuses that, with the shortest block that is not; and the refusal."""
     try:
-        _asked(bench, seed)
+        return bench, _asked(bench, seed), ""
     except DaqRefused as error:
         for block in LONGER_BLOCKS:
             if bench.block < block <= LONGEST_BLOCK_S * bench.sample_rate_hz:
                 longer = bench.model_copy(update={"block": block})
                 with contextlib.suppress(DaqRefused):
-                    _asked(longer, seed)
-                    return longer, str(error)
+                    return longer, _asked(longer, seed), str(error)
         raise
-    return bench, ""
 
 
-def _asked(bench: Bench, seed: int) -> tuple[Adjustable | None, Settings, bool]:
-    """Return what a device lets one set, the settings of the bench, and whether the device has a clock of its own."""
+def _asked(bench: Bench, seed: int) -> _Asked:
+    """Open a device, and return what it lets one set."""
     with make_daq(bench, seed) as daq:
         allowed, capabilities = daq.adjustable, daq.capabilities
         queue = bench.driver.options.get("queue_blocks", 1)
         watchdog_s = allowed.watchdog_s if allowed else None
         by_device = capabilities.paced and not capabilities.repeatable
-        return allowed, Settings(bench.block, queue if isinstance(queue, int) else 1, watchdog_s), by_device
+        return _Asked(allowed, Settings(bench.block, queue if isinstance(queue, int) else 1, watchdog_s), by_device)
 
 
 def _patient(now: Settings, allowed: Adjustable | None) -> Settings:
@@ -122,6 +130,7 @@ class _Examination:
         facts = self._facts if refusal else self._try_bench()
         remarks = complaints(self._timing, self._now, self._rate_hz, self._allowed, facts["reached_hz"])
         remarks = [*facts["remarks"], *([refusal] if refusal else _said(self._as_is)), *remarks]
+        remarks += [LATCHED] if self._has_latched() else []
         chosen = advice.settings._asdict() | {"largest_rate_hz": rate_hz}
         reasons = dict(advice.reasons)
         reasons["largest_rate_hz"] += "; tried" if rate_was_tried else ""
@@ -173,7 +182,7 @@ class _Examination:
         for _ in range(TRIES):
             self._attempt(advice.settings, self._rate_hz, TRIED_S)
             told = self._tried[-1]
-            if _is_good(told) or "latched" in told or "held_blocks" not in told or self._allowed is None:
+            if _is_good(told) or _has_ended(told) or self._allowed is None:
                 break
             longer = self._longer(advice.settings)
             if longer is None:
@@ -202,17 +211,20 @@ class _Examination:
             self._attempt(longer, rate_hz, TRIED_S)
             if _is_good(self._tried[-1]):
                 return rate_hz, True
-            if "latched" in self._tried[-1]:
+            if _has_ended(self._tried[-1]) and "blocks" in self._tried[-1]:  # a rate that is refused has ended nothing
                 break
             rate_hz = float(f"{math.sqrt(rate_hz * self._rate_hz):.2g}")
         return self._rate_hz, True
 
     def _try_bench(self) -> dict[str, Any]:
         """Return the report with the settings of the bench; that of the first measurement if they are not tried."""
-        latched = any("latched" in told for told in self._tried)
-        if self._as_is is None and not latched and not self._would_trip():
+        if self._as_is is None and not self._has_latched() and not self._would_trip():
             self._attempt(self._now, self._rate_hz, AS_IS_S)
         return self._as_is or self._facts
+
+    def _has_latched(self) -> bool:
+        """Whether the device's watchdog has tripped while settings were tried."""
+        return any(told.get("failure", "").startswith(DaqWatchdog.__name__) for told in self._tried)
 
     def _would_trip(self) -> bool:
         """Whether by what was measured the bench's watchdog trips: it is too short, or the usual output comes too late."""
@@ -226,6 +238,11 @@ def _is_good(told: dict[str, Any]) -> bool:
     return "failure" not in told and told.get("held_blocks") == 0 and told.get("lost_blocks") == 0
 
 
+def _has_ended(told: dict[str, Any]) -> bool:
+    """Whether nothing more can be tried: the device has failed, or its watchdog has latched."""
+    return "failure" in told or "latched" in told
+
+
 def _count(told: dict[str, Any]) -> str:
     return f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
 
@@ -233,7 +250,9 @@ def _count(told: dict[str, Any]) -> str:
 def _said(facts: dict[str, Any] | None) -> list[str]:
     """Return what is wrong in the report with the settings of the bench."""
     if facts is None:
-        return ["the settings of the bench were not tried: by what was measured its watchdog would have ended that"]
+        return [
+            "the settings of the bench were not tried: the watchdog has ended it, or would have by what was measured"
+        ]
     out = []
     if facts["held_blocks"]:
         out.append(f"outputs were held in {facts['held_blocks']} of {facts['blocks']} blocks: they came too late")

@@ -12,7 +12,7 @@ from rig.loop.recommendation import Settings
 from rig.loop.session import LocalSession
 from rig.loop.worker.examination import examine_device, with_settings
 from rig.loop.worker.probe import round_trips
-from rig.wire.messages import DeviceState, EmergencyStop
+from rig.wire.messages import DeviceState, EmergencyStop, Parameter
 from tests.rig.loop.worker.rigs import tone
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ
@@ -24,13 +24,17 @@ BENCH = bench_with({"block": 10})
 @pytest.fixture
 def examined(monkeypatch):
     """Devices behind a wire in memory, in whose time everything is measured; ``keys`` are those of the next devices."""
-    made = SimpleNamespace(keys={"lockstep": False}, devices=[], latched=False)
+    made = SimpleNamespace(keys={"lockstep": False}, devices=[], latched=False, faults=[], words={})
 
     def make(bench, seed=0):
         options, of_the_wire = dict(bench.driver.options), WireOptions.model_fields
         wired = WireOptions(**{name: options.pop(name) for name in [*options] if name in of_the_wire})
         driver = bench.driver.model_copy(update={"options": options})
         daq = MemoryDAQ(bench.model_copy(update={"driver": driver}), seed, wired, **made.keys)
+        if made.faults:  # of each device in turn, the last of them for all that follow
+            daq.device.faults = made.faults[min(len(made.devices), len(made.faults) - 1)]
+            daq.device._sender._faults = daq.device.faults
+        daq.device.words.update(made.words)
         if made.latched:
             daq.device.handle(EmergencyStop(), 0.0)
         made.devices.append(daq)
@@ -135,6 +139,46 @@ def test_a_wire_that_cannot_carry_the_blocks_of_the_bench_gets_longer_ones(exami
     assert advice["settings"]["block"] == 2
     assert advice["differs"]["block"] == 2
     assert advice["holds"]
+
+
+def test_a_queue_that_does_not_hold_when_it_is_tried_is_doubled_until_it_does(examined):
+    """Nothing is late while it is measured; from then on blocks are late by 5 ms: 2.5 of 2 ms, and four are needed."""
+    examined.faults = [Faults(), Faults(), Faults(late_every=100, late_s=0.005)]
+    facts = examine_device(bench_with({"block": 10}), 0)
+    advice = facts["recommendation"]
+    assert [told["queue_blocks"] for told in advice["tried"]] == [1, 2, 4]
+    assert [told["held_blocks"] > 0 for told in advice["tried"]] == [True, True, False]
+    assert advice["settings"]["queue_blocks"] == 4
+    assert advice["holds"]
+    assert "tried with 2: " in advice["reasons"]["queue_blocks"]
+
+
+def test_a_higher_rate_of_the_device_is_tried_and_told(examined):
+    examined.words = {(Parameter.HIGHEST_RATE_MHZ, 0): 20_000_000}
+    advice = examine_device(BENCH, 0)["recommendation"]
+    assert advice["settings"]["largest_rate_hz"] == 20_000.0
+    assert advice["tried"][-1]["sample_rate_hz"] == 20_000.0
+    assert advice["tried"][-1]["held_blocks"] == 0
+    assert advice["reasons"]["largest_rate_hz"].endswith("; tried")
+
+
+def test_a_higher_rate_that_loses_blocks_is_not_told(examined):
+    """One block in a hundred is lost from the fourth time on that the device is opened, the first at a higher rate."""
+    examined.words = {(Parameter.HIGHEST_RATE_MHZ, 0): 20_000_000}
+    examined.faults = [Faults()] * 3 + [Faults(drop_every=100)]
+    advice = examine_device(BENCH, 0)["recommendation"]
+    assert [told["sample_rate_hz"] for told in advice["tried"]] == [5000.0, 20_000.0, 10_000.0]
+    assert advice["settings"]["largest_rate_hz"] == 5000.0
+
+
+def test_a_watchdog_that_trips_all_the_same_ends_the_examination_and_is_left(examined):
+    """From the third time on that the device is opened, for the first try, it is soon deaf to the host."""
+    examined.faults = [Faults(), Faults(), Faults(deaf_after_s=0.3)]
+    facts = examine_device(BENCH, 0)
+    assert [told["failure"].split(":")[0] for told in facts["recommendation"]["tried"]] == ["DaqWatchdog"]
+    assert not facts["recommendation"]["holds"]
+    assert facts["remarks"][-1].startswith("the watchdog has latched while settings were tried")
+    assert examined.devices[-1].device.state is DeviceState.LATCHED
 
 
 def test_a_latched_device_is_left_as_it_is(examined):
