@@ -38,6 +38,7 @@ __all__ = [
 RESERVE = 1.5  # of the largest lateness: one or two seconds do not see the largest of a test
 BUSY = 0.5  # of a block for the driver's computing; controller and recorder need the rest
 GAPS = 3.0  # of the longest time between two blocks
+REACHED = 0.99  # of the sample rate
 HORIZON_S = 0.5  # a block is late only if the device's clock is seen to go on within this time
 KEPT_QUEUE = 2  # times the queue that is needed: a longer one of the bench is not kept
 
@@ -165,7 +166,7 @@ def complaints(
             f"the watchdog's {now.watchdog_s:.3g} s are shorter than the longest time between two blocks, "
             f"{timing.gap_s:.3g} s: it ends a run"
         )
-    if reached_hz is not None and reached_hz < 0.99 * rate_hz:
+    if reached_hz is not None and reached_hz < REACHED * rate_hz:
         out.append(
             f"{reached_hz:.0f} of {rate_hz:.0f} samples a second are reached: device, wire or computer are too slow"
         )

@@ -9,7 +9,7 @@ from rig.bench import Bench, DriverChoice
 from rig.daq import Adjustable
 from rig.drivers import make_daq
 from rig.errors import DaqRefused, DaqWatchdog, RigError
-from rig.loop.recommendation import Recommendation, Settings, complaints, recommend
+from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, complaints, recommend
 from rig.loop.worker.probe import round_trips, timing_of
 
 __all__ = ["bench_lines", "examine_device", "with_settings"]
@@ -17,6 +17,7 @@ __all__ = ["bench_lines", "examine_device", "with_settings"]
 LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
 MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0
 TRIES = 3  # of settings, each with twice the queue or a longer block
+MUCH_LONGER = 4  # times the block, where the rate is not reached
 RATE_TRIES = 2
 LONGER_BLOCKS = (2, 5, 10, 20, 50, 100, 200, 500, 1000)
 LONGEST_BLOCK_S = 0.2  # as `rig.bench.Bench` allows
@@ -184,21 +185,31 @@ class _Examination:
             told = self._tried[-1]
             if _is_good(told) or _has_ended(told) or self._allowed is None:
                 break
-            longer = self._longer(advice.settings)
+            longer = self._longer(advice.settings, told)
             if longer is None:
                 break
-            why = f"{advice.reasons['queue_blocks']}; tried with {advice.settings.queue_blocks}: {_count(told)}"
-            advice = advice._replace(settings=longer, reasons=advice.reasons | {"queue_blocks": why})
+            name = "queue_blocks" if longer.block == advice.settings.block else "block"
+            why = f"{advice.reasons[name]}; tried with {getattr(advice.settings, name)}: {_count(told)}"
+            advice = advice._replace(settings=longer, reasons=advice.reasons | {name: why})
         return advice
 
-    def _longer(self, settings: Settings) -> Settings | None:
-        """Return settings with twice the queue, or with the next longer block; None if there are none."""
+    def _longer(self, settings: Settings, told: dict[str, Any]) -> Settings | None:
+        """Return settings with twice the queue, or with a longer block where the queue has no room or the rate is not reached.
+
+        A longer block takes a queue of the same duration. None if there is nothing longer.
+        """
         assert self._allowed is not None
-        if settings.queue_blocks < self._allowed.largest_queue:
-            return settings._replace(queue_blocks=min(2 * settings.queue_blocks, self._allowed.largest_queue))
-        largest = self._facts["largest_block"]
-        longer = [size for size in sorted(self._allowed.wire_share) if settings.block < size <= largest]
-        return settings._replace(block=longer[0]) if longer else None
+        largest = self._allowed.largest_queue
+        if _is_quick(told) and settings.queue_blocks < largest:
+            return settings._replace(queue_blocks=min(2 * settings.queue_blocks, largest))
+        blocks = sorted(size for size in self._allowed.wire_share if size <= self._facts["largest_block"])
+        longer = [
+            size for size in blocks if size >= (settings.block + 1 if _is_quick(told) else MUCH_LONGER * settings.block)
+        ]
+        if not longer:
+            return None
+        queue = math.ceil(settings.queue_blocks * settings.block / longer[0] + 1.0 - BUSY)
+        return settings._replace(block=longer[0], queue_blocks=min(queue, largest))
 
     def _try_rates(self, advice: Recommendation) -> tuple[float, bool]:
         """Try the largest rate, then one between; return the largest that held, and whether it was tried."""
@@ -235,7 +246,12 @@ class _Examination:
 
 
 def _is_good(told: dict[str, Any]) -> bool:
-    return "failure" not in told and told.get("held_blocks") == 0 and told.get("lost_blocks") == 0
+    """Whether settings that were tried hold: nothing failed, no output was held, no block lost, and the rate was reached."""
+    return not _has_ended(told) and told["held_blocks"] == told["lost_blocks"] == 0 and _is_quick(told)
+
+
+def _is_quick(told: dict[str, Any]) -> bool:
+    return bool(told["reached_hz"] >= REACHED * told["sample_rate_hz"])
 
 
 def _has_ended(told: dict[str, Any]) -> bool:
@@ -244,7 +260,8 @@ def _has_ended(told: dict[str, Any]) -> bool:
 
 
 def _count(told: dict[str, Any]) -> str:
-    return f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
+    held = f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
+    return f"{held}, {told['reached_hz']:g} Hz reached"
 
 
 def _said(facts: dict[str, Any] | None) -> list[str]:

@@ -153,6 +153,23 @@ def test_a_queue_that_does_not_hold_when_it_is_tried_is_doubled_until_it_does(ex
     assert "tried with 2: " in advice["reasons"]["queue_blocks"]
 
 
+def test_where_the_rate_is_not_reached_the_block_grows_and_the_queue_lasts_as_long(examined, monkeypatch):
+    """The computer has only 4.5 of 5 kHz in blocks of fewer than 30 samples, and then all."""
+    measured = round_trips
+
+    def slow(bench, seed, seconds):
+        facts = measured(bench, seed, seconds)
+        return facts | ({"reached_hz": 4500.0} if bench.block < 30 else {})
+
+    monkeypatch.setattr("rig.loop.worker.examination.round_trips", slow)
+    late(examined, 0.0099)  # 14.85 ms and half a block: 8 blocks of 2 ms
+    advice = examine_device(BENCH, 0)["recommendation"]
+    assert [(told["block"], told["queue_blocks"]) for told in advice["tried"][:2]] == [(10, 8), (50, 3)]
+    assert (advice["settings"]["block"], advice["settings"]["queue_blocks"]) == (50, 3)
+    assert "tried with 10: 0 of " in advice["reasons"]["block"]
+    assert advice["holds"]
+
+
 def test_a_higher_rate_of_the_device_is_tried_and_told(examined):
     examined.words = {(Parameter.HIGHEST_RATE_MHZ, 0): 20_000_000}
     advice = examine_device(BENCH, 0)["recommendation"]
