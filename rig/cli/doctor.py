@@ -26,6 +26,10 @@ def doctor(
     daq: Annotated[
         str | None, typer.Option(help="Bench whose device to look at: a name or TOML file. It is given 0 V only.")
     ] = None,
+    seconds: Annotated[
+        float,
+        typer.Option(help="With --daq: for how long to measure before settings are recommended.", min=0.5, max=600),
+    ] = 1.5,
     matrix: Annotated[
         bool, typer.Option("--matrix", help="Measure every way to run without a rig, side by side; half a minute.")
     ] = False,
@@ -48,7 +52,7 @@ def doctor(
     from rig.loop.doctor import examine
 
     _check_options(daq, matrix, [*(others or ()), *(firmware or ()), *([Path("--verify")] if verify else ())], output)
-    device = None if daq is None else _examined(daq)
+    device = None if daq is None else _examined(daq, seconds)
     if matrix:
         _matrix(device, others or [], firmware or [], verify, output, json)
         return
@@ -60,13 +64,13 @@ def doctor(
     _show(device[1] if device else examine(Path.cwd()), json)
 
 
-def _examined(daq: str) -> tuple["Bench", dict[str, Any]]:
+def _examined(daq: str, seconds: float) -> tuple["Bench", dict[str, Any]]:
     """Return a bench, and what was found of its device."""
     from rig.bench import load_bench
     from rig.loop.doctor import examine_bench
 
     bench = load_bench(daq)
-    return bench, examine_bench(bench)
+    return bench, examine_bench(bench, seconds=seconds)
 
 
 def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], output: Path | None) -> None:

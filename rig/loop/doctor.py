@@ -14,6 +14,7 @@ __all__ = ["examine", "examine_bench", "measure_bench"]
 
 RATE_HZ = 1000.0
 SECONDS = 1.0
+MEASURED_S = 1.5  # of a device, before settings are recommended and tried
 
 
 def examine(folder: Path) -> dict[str, Any]:
@@ -48,8 +49,8 @@ def examine(folder: Path) -> dict[str, Any]:
     }
 
 
-def examine_bench(bench: Bench, seed: int = 0) -> dict[str, Any]:
-    """Exchange 0 V with a bench's device for some seconds; return timing and recommended settings, some of them tried.
+def examine_bench(bench: Bench, seed: int = 0, seconds: float = MEASURED_S) -> dict[str, Any]:
+    """Exchange 0 V with a bench's device; return timing, measured for some ``seconds``, and recommended settings, tried.
 
     What is done and returned: `rig.loop.worker.examination.examine_device`. Nothing is driven.
 
@@ -58,7 +59,7 @@ def examine_bench(bench: Bench, seed: int = 0) -> dict[str, Any]:
     from rig.loop.worker.examination import examine_device
     from rig.loop.worker.spawn import ask, supported
 
-    return dict(ask("examination", bench, seed)) if supported() else examine_device(bench, seed)
+    return dict(ask("examination", bench, seed, seconds)) if supported() else examine_device(bench, seed, seconds)
 
 
 def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:

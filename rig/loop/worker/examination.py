@@ -24,14 +24,14 @@ LONGEST_BLOCK_S = 0.2  # as `rig.bench.Bench` allows
 HIGHER = 1.05  # a largest rate that is not more than this many times the bench's is not tried
 
 
-def examine_device(bench: Bench, seed: int) -> dict[str, Any]:
+def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> dict[str, Any]:
     """Exchange 0 V with a bench's device for some seconds; return the timing and a ``recommendation`` with its reasons.
 
-    The device first has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the settings
-    that `rig.loop.recommendation` gives are tried, with a longer queue if outputs are held all the same; then a higher sample
-    rate if device and wire have one; last the settings of the bench, unless its watchdog would end that. The report is that of
-    `rig.loop.worker.probe.round_trips` with the bench's settings, where they were tried. Nothing is driven, and nothing that
-    has latched is cleared: an examination that has made the watchdog latch ends there.
+    For ``seconds`` the device has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the
+    settings that `rig.loop.recommendation` gives are tried, with a longer queue or block if they do not hold; then a higher
+    sample rate if device and wire have one; last the settings of the bench, unless its watchdog would end that. The report is
+    that of `rig.loop.worker.probe.round_trips` with the bench's settings, where they were tried. Nothing is driven, and nothing
+    that has latched is cleared: an examination that has made the watchdog latch ends there.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
@@ -39,7 +39,7 @@ def examine_device(bench: Bench, seed: int) -> dict[str, Any]:
     opened, (allowed, now, by_device), refusal = _that_opens(bench, seed)
     if by_device:
         opened = with_settings(opened, _patient(now, allowed), bench.sample_rate_hz)
-    facts = round_trips(opened, seed, MEASURED_S)
+    facts = round_trips(opened, seed, seconds)
     if "latched" not in facts and "failure" not in facts:
         if by_device:
             examination = _Examination(bench, seed, now._replace(block=bench.block), allowed, facts)

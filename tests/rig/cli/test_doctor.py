@@ -53,12 +53,13 @@ def command(monkeypatch, capsys, tmp_path):
 
 
 def test_settings_stand_with_unit_and_reason_and_lines_for_the_bench_behind(command, monkeypatch):
-    monkeypatch.setattr("rig.loop.doctor.examine_bench", lambda bench: FOUND)
-    status, out, _ = command("doctor --daq magnet-beam")
+    monkeypatch.setattr("rig.loop.doctor.examine_bench", lambda bench, seconds: FOUND | {"seconds": seconds})
+    status, out, _ = command("doctor --daq magnet-beam --seconds 7")
     assert status == 0
     lines = [" ".join(line.split()) for line in out.splitlines()]
     assert "remarks outputs were held in 23 of 4968 blocks: they came too late; 4895 of 5000 samples a second" in lines
     assert "examined s 4.3" in lines
+    assert "seconds 7.0" in lines
     assert "queue blocks 32 blocks lasts 6.4 ms" in lines
     assert "watchdog s 0.12 s" in lines
     assert "delay of the loop 6.6 ms" in lines
