@@ -67,10 +67,10 @@ def _reason(entry: np.void, plays: bool) -> str:
     samples = int(entry["end_sample"]) - int(entry["first_sample"])
     held, lost = int(entry["held"]), int(entry["lost"])
     if int(entry["outcome"]) != Outcome.DISTURBED:
-        return faults_text(held, lost, samples)
+        return faults_text(held, lost, samples, final=False)
     error_deg, drift = math.degrees(float(entry["mean_error_rad"])), 100.0 * float(entry["drift"])
     course = f" (averaged phase error {error_deg:.2f} deg, amplitude drift {drift:.3g} %)" if not plays else ""
-    return why_disturbed(held, lost, samples, course)
+    return why_disturbed(held, lost, samples, course, final=False)
 
 
 def attempt_at(point: Point[Any]) -> Attempt:

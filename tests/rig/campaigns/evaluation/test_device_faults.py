@@ -55,6 +55,14 @@ def test_a_level_out_of_reach_is_not_put_down_to_the_device():
     assert "too late" not in failed(Outcome.UNREACHABLE, held=300).reason
 
 
+def test_an_attempt_that_is_measured_again_needs_no_remedy():
+    assert faults_text(14, 3, 2000, final=False) == (
+        "outputs came too late: held in 14 samples of 2000, 3 of 2000 samples were lost on their way"
+    )
+    assert "doctor" not in why_disturbed(14, 0, 2000, final=False)
+    assert "doctor" in why_disturbed(14, 0, 2000)
+
+
 def test_nothing_is_said_of_nothing():
     assert faults_text(0, 0, 100) == ""
     assert why_disturbed(0, 0, 100, " (x)") == f"{DISTURBED} (x)"
