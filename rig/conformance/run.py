@@ -1,5 +1,6 @@
 """The contract without pytest: every test once over an installed driver, with what came out."""
 
+import contextlib
 import inspect
 from collections.abc import Iterator
 from contextlib import suppress
@@ -12,7 +13,7 @@ from rig.conformance.contract import DriverContract
 from rig.conformance.loopback import with_loopback
 from rig.conformance.subject import NotApplicable
 from rig.conformance.timing import SLOW_TEST
-from rig.conformance.ways_out import last_output_v
+from rig.conformance.ways_out import KILLING_TEST, last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import DaqError, NotArmed
@@ -56,7 +57,7 @@ class _OnBench(DriverContract):
 def require_arming(bench: Bench, arm: bool) -> None:
     """Raise `NotArmed` where something physical would move and nobody has said that it may; opens the device to ask it.
 
-    What it has latched until then is cleared; what latches from then on stays so.
+    What it has latched until then is cleared; what latches from then on stays so, but for what `check_driver` makes latch.
     """
     with make_daq(bench) as daq:
         if not daq.capabilities.virtual and not arm:
@@ -71,7 +72,8 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     """Every test of the contract over the bench's driver, one after the other. Nothing is asked about arming here.
 
     ``output_log``: where the device is an emulator that writes its outputs down (``rig emulate --log-output``), that file.
-    A driver that is too slow for any test is not tested further, for it would take hours.
+    A driver that is too slow for any test is not tested further, for it would take hours. The watchdog that latches because a
+    test kills the host is cleared after that test; whatever else latches stays so.
     """
     contract = _OnBench(bench, output_log)
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
@@ -81,7 +83,15 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
         if found.outcome == "failed":
             _clear_if_virtual(bench)
         yield found
+        if name == KILLING_TEST:
+            _clear(contract)
         slow = slow or (name == SLOW_TEST and found.outcome == "failed")
+
+
+def _clear(contract: DriverContract) -> None:
+    """Clear what has latched in the device."""
+    with contextlib.suppress(DaqError), contract.make() as daq:
+        daq.clear()
 
 
 def _found(contract: DriverContract, name: str) -> Finding:
