@@ -1,7 +1,7 @@
 """A firmware as the emulated device: its program is a child process, and this process is the virtual structure behind it.
 
-The exchange is that of ``firmware/boards/plant/plant.h``: a description in lines of text, then requests with output counts, each
-answered by flags and a row of input counts for every output.
+The exchange is that of ``firmware/boards/plant/plant.h``: a description in lines of text, then requests with output counts,
+each answered by flags and a row of input counts for every output.
 """
 
 import os

@@ -1,15 +1,15 @@
-"""The board host as a program: its description, its line, its adapter and its ends, without the process that usually runs it."""
+"""The board host as a program: description, line, adapter and ends, without the process that usually runs it."""
 
 import os
 import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -50,10 +50,8 @@ class Board:
         )
         for one in (input_, output):
             os.close(one)
-        try:
+        with suppress(BrokenPipeError):  # it has ended already
             os.write(self.answers, text.encode("ascii"))
-        except BrokenPipeError:  # it has ended already
-            pass
 
     def began(self) -> "Board":
         """Answer its first request."""
@@ -110,6 +108,7 @@ def board(text: str | None = None, *arguments: str, **changes: Any) -> Iterator[
         one.close()
 
 
+@cache
 def described(**changes: Any) -> str:
     given = EmulatorSettings(wire=changes.pop("wire", "serial"), bench=bench_with(), **changes)
     return description(given, VirtualPlant(given.bench))
@@ -177,6 +176,34 @@ def test_a_bad_description_is_one_line_and_status_2(was: str, becomes: str, said
     assert complained.count("\n") == 1
 
 
+HOSTILE = (
+    "end",
+    "channel",
+    "output",
+    "boot",
+    "wire can",
+    "0x1p+0",
+    "-0x1p-1100",
+    "0x",
+    "4294967295",
+    " ",
+    "\0",
+    "9" * 40,
+)
+
+
+@given(st.integers(0, 18), st.lists(st.sampled_from(HOSTILE) | st.text("0123456789abcdefpx.+- ", max_size=40)))
+@settings(max_examples=60)
+def test_any_line_in_a_description_is_taken_or_refused(place: int, words: list[str]) -> None:
+    lines = described().splitlines()
+    lines[place] = " ".join(words)
+    with board("\n".join(lines) + "\nend\n") as one:
+        if os.read(one.requests, 4) != REST:
+            status, _, complained = one.ended()
+            assert status == 2
+            assert complained.count("\n") == 1
+
+
 def test_more_channels_than_its_memory_has_are_refused() -> None:
     row = next(line for line in described().splitlines() if line.startswith("channel"))
     with board(described().replace("end\n", f"{row}\n" * 31 + "end\n")) as one:
@@ -187,7 +214,10 @@ def test_a_description_that_ends_early_and_bad_arguments_are_refused() -> None:
     with board("model one\n") as one:
         os.close(one.answers)
         one.answers = os.dup(one.requests)
-        assert one.ended()[::2] == (2, "plant: the description ends, or a line of it is too long, before a line 'end'\n")
+        assert one.ended()[::2] == (
+            2,
+            "plant: the description ends, or a line of it is too long, before a line 'end'\n",
+        )
     for arguments in (("--log-output",), ("--speed", "1"), ("--line", "first")):
         with board(None, *arguments) as one:
             status, _, complained = one.ended()
@@ -307,7 +337,10 @@ def test_hostile_text_at_the_adapter_is_skipped(pieces: list[bytes]) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    [b"t0232", b"T000000230", b"r0230", b"b02381122", b"d023F00", b"t8230", b"t023 0", b"t02390011223344556677", b"x"],
+    [
+        *(b"t0232", b"t", b"T000000230", b"T0000002F0", b"r0230", b"b02381122", b"d023F00", b"t8230", b"t023 0", b"x"),
+        *(b"t02390011223344556677", b"t0231G0", b"b023F" + b"0" * 129, b"b023F" + b"0" * 300, b"S" * 16, b"\0"),
+    ],
 )
 def test_what_is_no_frame_of_eleven_bits_reaches_nobody(line: bytes) -> None:
     with board(wire="can", node=NODE) as one:

@@ -1,4 +1,4 @@
-"""The output of the firmware by the clock: killed, flooded or silent hosts and the emergency stop, by the log that the device writes.
+"""The firmware by the clock brings its output to 0 V, as it logs it: hosts that are killed, silent or flood, emergency stops.
 
 What is asserted counts samples, which are the device's clock: it stands still while a busy machine does not run it.
 """

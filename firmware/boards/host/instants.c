@@ -23,7 +23,9 @@ static timer_t timer;
 static sigset_t the_interrupt, before;
 static volatile bool is_on, rest_is_due;
 static uint64_t period_ns, period_rest;   /* of a sample: whole ns, and the rest in parts of a ns by rate */
-static uint64_t due_ns, due_rest;         /* the next instant */
+static _Atomic uint64_t due_ns;           /* the next instant */
+static uint64_t due_rest;
+static uint64_t patience_ns;              /* half the queue: by how much instants may be late */
 static uint32_t rate_mhz, collected;      /* collected: outputs of the block under way */
 static _Atomic uint64_t stalled_ns, told_us;
 
@@ -34,9 +36,17 @@ static uint64_t monotonic_ns(void)
     return (uint64_t)now.tv_sec * SECOND_NS + (uint64_t)now.tv_nsec;
 }
 
+/* The time, which stands still where the next instant is later than it may be, until that has run. */
+static uint64_t running_ns(void)
+{
+    const uint64_t now_ns = monotonic_ns(), latest_ns = atomic_load(&due_ns) + patience_ns;
+    const bool by_the_clock = is_on && !host_structure.lockstep;
+    return (by_the_clock && now_ns > latest_ns ? latest_ns : now_ns) - atomic_load(&stalled_ns);
+}
+
 uint64_t board_clock_us(void)
 {
-    const uint64_t now_us = (monotonic_ns() - atomic_load(&stalled_ns)) / 1000;
+    const uint64_t now_us = running_ns() / 1000;
     uint64_t last_us = atomic_load(&told_us);
     while (now_us > last_us)
         if (atomic_compare_exchange_weak(&told_us, &last_us, now_us))
@@ -93,9 +103,8 @@ static void take_instant(void)
 
 static void stand_still(uint64_t now_ns)
 {
-    const uint64_t queue = (uint64_t)vl_settings.queue * vl_block();
     const uint64_t late_ns = now_ns > due_ns ? now_ns - due_ns : 0;
-    if (late_ns <= queue * period_ns / 2)
+    if (late_ns <= patience_ns)
         return;
     due_ns = now_ns;
     atomic_fetch_add(&stalled_ns, late_ns);
@@ -119,14 +128,14 @@ static void interrupt(int number)
     if (is_on) {
         uint64_t now_ns = monotonic_ns();
         stand_still(now_ns);
-        for (; due_ns <= now_ns; due_ns += period_ns) {
+        while (due_ns <= now_ns) {
             if (collected == vl_block()) {
                 measure(collected);
                 collected = 0;
             }
             take_instant();
             due_rest += period_rest;
-            due_ns += due_rest >= rate_mhz ? 1 : 0;
+            due_ns += period_ns + due_rest / rate_mhz;
             due_rest %= rate_mhz;
         }
         now_ns = monotonic_ns();
@@ -168,6 +177,7 @@ void board_start_sampling(uint32_t rate)
     rate_mhz = rate;
     period_ns = MHZ_NS / rate;
     period_rest = MHZ_NS % rate;
+    patience_ns = (uint64_t)vl_settings.queue * vl_block() * period_ns / 2;
     collected = 0;
     due_rest = 0;
     due_ns = monotonic_ns();
