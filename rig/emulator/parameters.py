@@ -2,10 +2,11 @@
 
 from rig.emulator.faults import Faults
 from rig.emulator.plant import Plant
+from rig.wire.link import Link
 from rig.wire.messages import VERSION, Parameter, Status
 from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_words
 
-__all__ = ["SETTINGS", "Parameters", "Words", "described"]
+__all__ = ["SETTINGS", "Parameters", "Words", "carried", "described"]
 
 Words = dict[tuple[int, int], int]
 """Words by parameter and item."""
@@ -77,6 +78,12 @@ def described(
     put(Parameter.LAYOUT_CRC, layout_crc)
     put(Parameter.BOOT, boot)
     return words
+
+
+def carried(words: Words, plant: Plant, link: Link) -> Words:
+    """The words of a device whose blocks are no larger than its wire carries."""
+    carried_block = link.largest_block_of(len(plant.names), plant.bits)
+    return {**words, (Parameter.LARGEST_BLOCK, 0): min(words[Parameter.LARGEST_BLOCK, 0], carried_block)}
 
 
 class Parameters:
