@@ -24,6 +24,7 @@ static bool is_sampling;
 static uint64_t origin_us;   /* of sample instant 0 */
 static uint64_t instant;     /* index of the next sample instant */
 static uint32_t rate_mhz;
+static uint64_t instants_left = UINT64_MAX;
 static bool has_row;         /* a row was measured and is not handed over yet */
 static int32_t output;       /* at the sample instant before */
 
@@ -120,8 +121,9 @@ void board_feed_watchdog(void)
 size_t board_read(uint8_t *bytes, size_t room)
 {
     size_t n = n_waiting < room ? n_waiting : room;
-    if (n)
-        memcpy(bytes, waiting, n);
+    if (n == 0)
+        return 0;
+    memcpy(bytes, waiting, n);
     waiting += n;
     n_waiting -= n;
     return n;
@@ -159,6 +161,7 @@ bool board_send_frame(const struct vl_frame *frame)
 static void put_out(void)
 {
     output = vl_output();
+    instants_left--;
     has_row = is_sampling;
     bench_output(now_us, output);
 }
@@ -175,13 +178,14 @@ static void take_instant(void)
 /* Whether the next sample instant is at `time_us` or before. */
 static bool has_come(uint64_t time_us)
 {
-    return is_sampling && instant * 1000000000 <= (time_us - origin_us) * rate_mhz;
+    return is_sampling && instants_left && instant * 1000000000 <= (time_us - origin_us) * rate_mhz;
 }
 
 static void measure_block(void)
 {
     static int32_t counts[VL_LARGEST_BLOCK];
     uint32_t n = vl_block();
+    instants_left -= n < instants_left ? n : instants_left;
     for (uint32_t i = 0; i < n; i++) {
         counts[i] = vl_output();
         bench_output(now_us, counts[i]);
@@ -192,7 +196,7 @@ static void measure_block(void)
 
 static bool take_what_is_due(void)
 {
-    if (chosen.lockstep ? !(is_sampling && vl_block_is_due()) : !has_come(now_us))
+    if (chosen.lockstep ? !(is_sampling && instants_left && vl_block_is_due()) : !has_come(now_us))
         return false;
     if (chosen.lockstep)
         measure_block();
@@ -287,6 +291,11 @@ bool bench_begin(const struct bench_choice *choice, uint64_t time_us)
         return false;
     bench_serve();
     return true;
+}
+
+void bench_limit(uint64_t instants)
+{
+    instants_left = instants;
 }
 
 void bench_reset(void)

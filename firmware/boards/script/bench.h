@@ -23,6 +23,9 @@ struct bench_choice {
 /* Switch the device on at a time, us. False: vl_begin has refused the description. */
 bool bench_begin(const struct bench_choice *choice, uint64_t time_us);
 
+/* Let no more than so many sample instants come, however long they are waited for. */
+void bench_limit(uint64_t instants);
+
 /* Reset the device, as after a loss of supply: BOOT is one more. */
 void bench_reset(void);
 
