@@ -97,6 +97,11 @@ class Parameters:
         for channel, name in enumerate(faults.channel_names or ()):
             for number, word in enumerate(text_words(name)):
                 self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word
+        self._settings = {(int(one), 0): self.words[one, 0] for one in SETTINGS}
+
+    def begin_anew(self) -> None:
+        """Forget what was set."""
+        self.words.update(self._settings)
 
     def value(self, parameter: Parameter) -> int:
         """The value of a parameter in force."""

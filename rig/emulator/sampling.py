@@ -180,10 +180,9 @@ class Sampling:
     def take(self, output: Output, now_s: float) -> int | None:
         """Keep outputs until they are due; how many are in time, None for a malformed block."""
         present = self._present(now_s)
+        self._put_out_before(present)  # which frees their places for outputs that are due later
         in_time = self._outputs.put(output.first, output.counts, present)
-        if in_time is not None and not self._has_output:
-            self._put_out_before(present)
-            self._has_output = True
+        self._has_output |= in_time is not None
         return in_time
 
     def _present(self, now_s: float) -> int:

@@ -105,12 +105,12 @@ class Life:
         self._counts["emergency_stops"] += 1
         self._bring_down(now_s, DeviceState.LATCHED, flag=DeviceFlag.EMERGENCY_STOP)
 
-    def begin_anew(self, now_s: float) -> None:
-        """Reset, as after a loss of supply."""
-        self.stop(now_s)
-        self.latch = 0
-        self.state = DeviceState.IDLE
+    def begin_anew(self) -> None:
+        """Reset, as after a loss of supply: nobody is told of it."""
+        self._sampling.stop()
         self._sampling.measured = 0
+        self._fed_s = math.inf
+        self.state, self.latch = DeviceState.IDLE, 0
 
     def _become(self, state: DeviceState, now_s: float, latch: int | None = None) -> None:
         before = self.state, self.latch

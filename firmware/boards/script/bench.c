@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_SERVINGS = 100000, OVERLOAD_PER_MILLE = 750 };
+enum { MOST_SERVINGS = 100000, OVERLOAD_PER_MILLE = 500 };
 
 static const char *const names[VL_MOST_CHANNELS] = {
     "channel-00", "channel-01", "channel-02", "channel-03", "channel-04", "channel-05", "channel-06", "channel-07",
@@ -49,7 +49,7 @@ static int32_t reading(uint32_t channel, int32_t count, uint64_t index)
     return wrapped((2 * c + 1) * count + 77 * c * (int64_t)(index % 1000003));
 }
 
-/* The inputs can be overloaded at three quarters of the output's range. */
+/* The inputs can be overloaded at half of full scale. */
 static bool is_overloaded(int32_t count)
 {
     int64_t full = chosen.bits == 16 ? 32768 : 2147483648;
