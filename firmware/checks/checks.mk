@@ -4,7 +4,7 @@ RUNS ?= 3400000
 FUZZER = clang
 FUZZ = $(CORE) boards/script/bench.c checks/fuzz.c
 FUZZ_LIMITS = -DVL_LARGEST_BLOCK=100 -DVL_MOST_BLOCKS=8
-FUZZ_FLAGS = -max_len=400 -print_final_stats=1 -verbosity=0
+FUZZ_FLAGS = -max_len=256 -print_final_stats=1
 
 .PHONY: fuzz fuzz-serial fuzz-can fuzz-can-fd
 fuzz: fuzz-serial fuzz-can fuzz-can-fd ## RUNS=n inputs each by libFuzzer, under sanitizers (three times 3.4 million)
@@ -16,7 +16,8 @@ $(BUILD)/fuzz-serial: WIRE = 0
 $(BUILD)/fuzz-can: WIRE = 1
 $(BUILD)/fuzz-can-fd: WIRE = 2
 $(BUILD)/fuzz-serial $(BUILD)/fuzz-can $(BUILD)/fuzz-can-fd: $(FUZZ) $(HEADERS) | $(BUILD)
-	$(FUZZER) $(WARNINGS) -O2 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all -DFUZZ_WIRE=$(WIRE) \
+	$(FUZZER) $(WARNINGS) -O2 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-coverage=trace-cmp \
+	    -fno-sanitize-recover=all -DFUZZ_WIRE=$(WIRE) \
 	    $(FUZZ_LIMITS) -Icore $(FUZZ) -o $@
 
 fuzz-serial fuzz-can fuzz-can-fd:

@@ -10,7 +10,7 @@
 #include "bytes.h"
 #include "device.h"
 
-enum { MOST_INSTANTS = 2000, STEP_US = 211, LARGEST_COUNT_16 = 20480 };
+enum { MOST_INSTANTS = 600, STEP_US = 211, LARGEST_COUNT_16 = 20480 };
 enum { REQUEST = 1, OUTPUT = 4, EMERGENCY_STOP = 6 }; /* types of payloads on a serial line */
 enum { CLASSICAL_ROWS = 4, CLASSICAL_WRAP = 32, FD_ROWS = 31, FD_WRAP = 256 };
 
