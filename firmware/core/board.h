@@ -12,7 +12,7 @@
 /* Microseconds since some instant before vl_begin; never goes back. */
 uint64_t board_clock_us(void);
 
-/* The sample rate nearest to this one that the timer can make exactly, mHz. */
+/* The sample rate nearest to this one that the timer makes, in whole mHz. */
 uint32_t board_nearest_rate_mhz(uint32_t rate_mhz);
 
 /* Call vl_output and vl_input at this rate from now on, the first time at once or one sample later. */

@@ -53,14 +53,14 @@ static struct stream sent, received;
 
 static struct stream stream_of(uint32_t rows, uint32_t wrap)
 {
-    uint32_t groups = (vl_settings.block + rows - 1) / rows;
+    uint32_t groups = (vl_in_force.block + rows - 1) / rows;
     return (struct stream){.rows = rows, .groups = groups, .wrap = wrap - wrap % groups};
 }
 
 static uint32_t rows_of(const struct stream *stream, uint32_t group)
 {
     uint32_t before = group * stream->rows;
-    return vl_settings.block - before < stream->rows ? vl_settings.block - before : stream->rows;
+    return vl_in_force.block - before < stream->rows ? vl_in_force.block - before : stream->rows;
 }
 
 static uint16_t identifier(uint32_t base, uint32_t number)
@@ -112,14 +112,14 @@ static void send_answer(const struct vl_command *answer)
 /* How long a block may wait for the bus: its own duration. */
 static uint64_t patience_us(void)
 {
-    uint64_t block_us = (uint64_t)vl_settings.block * 1000000000 / vl_settings.rate_mhz;
+    uint64_t block_us = (uint64_t)vl_in_force.block * 1000000000 / vl_in_force.rate_mhz;
     return block_us > SHORTEST_EXPIRY_US ? block_us : SHORTEST_EXPIRY_US;
 }
 
 /* Before a block that would end more than half the sequence numbers after the last index, the host is told its index. */
 static void send_samples(const struct vl_samples *samples)
 {
-    uint64_t first_group = samples->first / vl_settings.block * sent.groups;
+    uint64_t first_group = samples->first / vl_in_force.block * sent.groups;
     bool must_tell = !was_told || first_group + sent.groups - told_group > sent.wrap / 2;
     if (must_tell || (!shape.fd && samples->flags != flags_told)) {
         put_heartbeat(samples->flags, (uint32_t)samples->first, samples->dropped);
@@ -233,7 +233,7 @@ static void give_up_before(int64_t number)
 /* An index is told modulo 2^32: take the one nearest to where the stream is. */
 static void take_index(uint32_t first)
 {
-    int64_t n = vl_settings.block, here = next_group / received.groups * n;
+    int64_t n = vl_in_force.block, here = next_group / received.groups * n;
     int64_t sample = here + (int32_t)(first - (uint32_t)here);
     int64_t told = sample >= 0 ? sample / n * received.groups : -1;
     has_mark = sample >= 0 && sample % n == 0 && told - next_group >= (int64_t)(received.wrap / 2);
@@ -299,7 +299,7 @@ static struct open *open_block(int64_t number)
 
 static void hand_over(int64_t number, const uint8_t *counts)
 {
-    vl_take_output((uint64_t)number * vl_settings.block, counts);
+    vl_take_output((uint64_t)number * vl_in_force.block, counts);
 }
 
 static void add_to_block(int64_t number, uint32_t place, const uint8_t *counts, uint32_t n_bytes)
@@ -457,7 +457,7 @@ static void configure(void)
     was_told = has_mark = was_given_up = false;
     for (uint32_t i = 0; i <= OPEN_BLOCKS; i++)
         opened[i].is_used = false;
-    oldest = vl_settings.queue;
+    oldest = vl_in_force.queue;
     next_group = oldest * received.groups;
     is_configured = true;
 }

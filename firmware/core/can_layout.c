@@ -16,13 +16,12 @@ static void text(const char *said)
 
 static void number(uint32_t value, bool is_hexadecimal, uint32_t digits)
 {
-    const uint32_t base = is_hexadecimal ? 16 : 10;
     char said[11];
     uint32_t i = sizeof said - 1;
     said[i] = 0;
     while (value || digits) {
-        said[--i] = "0123456789ABCDEF"[value % base];
-        value /= base;
+        said[--i] = "0123456789ABCDEF"[is_hexadecimal ? value & 15 : value % 10];
+        value = is_hexadecimal ? value >> 4 : value / 10;
         digits -= digits > 0;
     }
     text(said + i);

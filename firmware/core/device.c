@@ -122,6 +122,7 @@ static void tell_of_a_change(void)
 static enum vl_status start(uint32_t *value)
 {
     if (vl_state() == VL_IDLE) {
+        vl_in_force = vl_settings;
         vl_about->wire->configure();
         block_is_under_way = false;
     }

@@ -88,6 +88,7 @@ struct vl_settings {
 };
 
 extern struct vl_settings vl_settings;
+extern struct vl_settings vl_in_force; /* those of the last START; the ones above may be set anew once sampling has ended */
 extern uint32_t vl_boot;
 
 void vl_begin_parameters(uint32_t boot);

@@ -90,7 +90,7 @@ enum vl_status vl_start(uint32_t *value)
     is_down = false;
     become_locked(VL_RUNNING);
     board_unlock();
-    board_start_sampling(vl_settings.rate_mhz);
+    board_start_sampling(vl_in_force.rate_mhz);
     return VL_DONE;
 }
 
@@ -168,29 +168,29 @@ void vl_feed(void)
 
 static uint64_t instants_in(uint64_t microseconds)
 {
-    return (microseconds * vl_settings.rate_mhz + 999999999) / 1000000000;
+    return (microseconds * vl_in_force.rate_mhz + 999999999) / 1000000000;
 }
 
 static uint64_t microseconds_of(uint64_t instants)
 {
-    return instants * 1000000000 / vl_settings.rate_mhz;
+    return instants * 1000000000 / vl_in_force.rate_mhz;
 }
 
 void vl_watch(void)
 {
-    if (state != VL_ARMED || board_clock_us() < fed_us + vl_settings.watchdog_us)
+    if (state != VL_ARMED || board_clock_us() < fed_us + vl_in_force.watchdog_us)
         return;
     vl_counters.watchdog_trips++;
     raise_locked(VL_WATCHDOG);
-    if (vl_settings.ramp_us == 0) {
+    if (vl_in_force.ramp_us == 0) {
         drop_locked(VL_LATCHED);
         return;
     }
-    bitten_us = fed_us + vl_settings.watchdog_us;
+    bitten_us = fed_us + vl_in_force.watchdog_us;
     ramp_from = vl_held();
     ramp_instants = 0;
     is_ramping = true;
-    go_down_locked(instants_in(vl_settings.ramp_us));
+    go_down_locked(instants_in(vl_in_force.ramp_us));
     become_locked(VL_LATCHED);
 }
 
@@ -205,10 +205,10 @@ bool vl_ramp(int32_t *count)
         ramp_offset_us = since_us < period_us ? since_us : period_us;
     }
     uint64_t passed_us = ramp_offset_us + microseconds_of(ramp_instants++);
-    is_ramping = passed_us < vl_settings.ramp_us;
+    is_ramping = passed_us < vl_in_force.ramp_us;
     if (!is_ramping)
         return false;
-    int64_t ramp = vl_settings.ramp_us, left = ramp_from * (ramp - (int64_t)passed_us);
+    int64_t ramp = vl_in_force.ramp_us, left = ramp_from * (ramp - (int64_t)passed_us);
     *count = (int32_t)((left + (left < 0 ? -ramp / 2 : ramp / 2)) / ramp);
     return true;
 }

@@ -20,7 +20,7 @@ static uint32_t stamp_of(uint64_t index)
 
 void vl_clear_outputs(void)
 {
-    n_slots = (vl_settings.queue + VL_BLOCKS_AHEAD) * vl_settings.block;
+    n_slots = (vl_in_force.queue + VL_BLOCKS_AHEAD) * vl_in_force.block;
     for (uint32_t i = 0; i < n_slots; i++)
         atomic_store_explicit(&slots[i].stamp, 0, memory_order_relaxed);
     at = 0;
@@ -29,7 +29,7 @@ void vl_clear_outputs(void)
 
 int32_t vl_keep_outputs(uint64_t first, const uint8_t *counts, uint64_t present)
 {
-    uint32_t block = vl_settings.block, n_bytes = vl_count_bytes();
+    uint32_t block = vl_in_force.block, n_bytes = vl_count_bytes();
     if (first % block)
         return -1;
     uint64_t under_way = present - present % block;
@@ -63,7 +63,7 @@ bool vl_next_output(int32_t *count)
 
 bool vl_has_next_block(void)
 {
-    for (uint32_t i = 0; i < vl_settings.block; i++)
+    for (uint32_t i = 0; i < vl_in_force.block; i++)
         if (atomic_load_explicit(&slots[(at + i) % n_slots].stamp, memory_order_relaxed) != stamp_of(due + i))
             return false;
     return true;

@@ -5,7 +5,7 @@
 
 enum { TEXT_WORDS = 8 };
 
-struct vl_settings vl_settings;
+struct vl_settings vl_settings, vl_in_force;
 uint32_t vl_boot;
 
 static uint32_t layout_crc;
@@ -51,6 +51,7 @@ void vl_begin_parameters(uint32_t boot)
         .watchdog_us = within(100000, vl_about->shortest_watchdog_us, vl_about->longest_watchdog_us),
         .ramp_us = smaller(50000, vl_about->longest_watchdog_us),
     };
+    vl_in_force = vl_settings;
 }
 
 static uint32_t float_word(float value)

@@ -43,9 +43,9 @@ void vl_restart_sampling(void)
     vl_clear_outputs();
     held = 0;
     has_output = false;
-    first_expected = (uint64_t)vl_settings.queue * vl_settings.block;
+    first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
-    block_bytes = vl_settings.block * vl_about->n_channels * vl_count_bytes();
+    block_bytes = vl_in_force.block * vl_about->n_channels * vl_count_bytes();
     n_blocks = VL_SAMPLE_BYTES / block_bytes < VL_MOST_BLOCKS ? VL_SAMPLE_BYTES / block_bytes : VL_MOST_BLOCKS;
     atomic_store(&written, 0);
     atomic_store(&read, 0);
@@ -100,7 +100,7 @@ uint64_t vl_handed_over(void)
 
 uint32_t vl_block(void)
 {
-    return vl_settings.block;
+    return vl_in_force.block;
 }
 
 static int32_t clipped(int32_t count)
@@ -167,9 +167,9 @@ static void end_block(void)
         atomic_fetch_add_explicit(&written, 1, memory_order_release);
     } else {
         vl_counters.dropped_blocks++;
-        atomic_fetch_add(&dropped, vl_settings.block);
+        atomic_fetch_add(&dropped, vl_in_force.block);
     }
-    first += vl_settings.block;
+    first += vl_in_force.block;
     row = 0;
     seen = 0;
 }
@@ -185,7 +185,7 @@ void vl_input(const int32_t counts[], bool overload)
     if (into)
         for (uint32_t channel = 0; channel < vl_about->n_channels; channel++)
             into = vl_put(into, (uint32_t)counts[channel], vl_count_bytes());
-    if (++row == vl_settings.block)
+    if (++row == vl_in_force.block)
         end_block();
 }
 
@@ -196,10 +196,10 @@ const struct vl_samples *vl_oldest_block(void)
 
 void vl_forget_oldest_block(bool was_sent)
 {
-    handed_over = blocks[read_at].first + vl_settings.block;
+    handed_over = blocks[read_at].first + vl_in_force.block;
     if (!was_sent) {
         vl_counters.dropped_blocks++;
-        atomic_fetch_add(&dropped, vl_settings.block);
+        atomic_fetch_add(&dropped, vl_in_force.block);
     }
     read_at = after(read_at);
     atomic_fetch_add_explicit(&read, 1, memory_order_release);
@@ -212,5 +212,5 @@ bool vl_block_is_due(void)
         return false;
     if (next < first_expected || vl_has_next_block())
         return true;
-    return next >= vl_settings.block && vl_is_coming_down(next - vl_settings.block);
+    return next >= vl_in_force.block && vl_is_coming_down(next - vl_in_force.block);
 }

@@ -97,9 +97,9 @@ static void send_samples(const struct vl_samples *samples)
     uint8_t head[SAMPLES_HEAD - HEADER] = {0};
     vl_put(vl_put(vl_put(head, samples->first, 8), samples->clock_us, 8), samples->dropped, 4);
     head[20] = samples->flags;
-    begin_frame(SAMPLES, (uint16_t)(samples->first / vl_settings.block));
+    begin_frame(SAMPLES, (uint16_t)(samples->first / vl_in_force.block));
     put(head, sizeof head);
-    put(samples->counts, vl_settings.block * vl_about->n_channels * vl_count_bytes());
+    put(samples->counts, vl_in_force.block * vl_about->n_channels * vl_count_bytes());
     end_frame();
 }
 
@@ -225,7 +225,7 @@ static void begin(void)
 
 static void configure(void)
 {
-    output_size = OUTPUT_HEAD + vl_settings.block * vl_count_bytes();
+    output_size = OUTPUT_HEAD + vl_in_force.block * vl_count_bytes();
 }
 
 static bool has_expired(void)
