@@ -23,3 +23,26 @@ $(BUILD)/fuzz-serial $(BUILD)/fuzz-can $(BUILD)/fuzz-can-fd: $(FUZZ) $(HEADERS) 
 fuzz-serial fuzz-can fuzz-can-fd:
 	mkdir -p $(BUILD)/corpus/$@
 	$(BUILD)/$@ $(FUZZ_FLAGS) -runs=$(RUNS) -artifact_prefix=$(BUILD)/ $(BUILD)/corpus/$@
+
+# Branch coverage of the core by random scripts (tests/firmware/differential.py) and by what the fuzzer has found.
+PYTHON ?= python3
+REQUESTS ?= 20000
+COVERAGE = $(BUILD)/coverage
+GCOV = gcc -std=c11 -O0 -g --coverage -fprofile-abs-path -Icore
+
+.PHONY: coverage
+coverage: $(COVERAGE)/script $(COVERAGE)/replay-0 $(COVERAGE)/replay-1 $(COVERAGE)/replay-2 ## branches of the core that scripts and the fuzzer's inputs reach
+	find $(COVERAGE) -name '*.gcda' -delete
+	cd .. && $(PYTHON) -m tests.firmware.differential $(abspath $(COVERAGE)/script) --requests $(REQUESTS)
+	for wire in 0:serial 1:can 2:can-fd; do find $(BUILD)/corpus/fuzz-$${wire#*:} -type f 2>/dev/null \
+	    | xargs -r $(COVERAGE)/replay-$${wire%:*} || exit 1; done
+	gcovr --root . --filter core/ --object-directory $(COVERAGE) --branches --fail-under-branch 95 \
+	    --txt $(COVERAGE)/report.txt --print-summary $(COVERAGE)
+	cat $(COVERAGE)/report.txt
+
+$(COVERAGE)/script: $(SCRIPT) $(HEADERS)
+	mkdir -p $(COVERAGE)
+	$(GCOV) $(SCRIPT) -o $@
+$(COVERAGE)/replay-%: $(FUZZ) checks/replay.c $(HEADERS)
+	mkdir -p $(COVERAGE)
+	$(GCOV) -DFUZZ_WIRE=$* $(FUZZ_LIMITS) $(FUZZ) checks/replay.c -o $@

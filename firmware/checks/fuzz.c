@@ -23,7 +23,7 @@ static uint8_t byte(void)
     return at < end ? *at++ : 0;
 }
 
-static uint32_t word(void)
+static uint32_t four_bytes(void)
 {
     uint32_t low = byte();
     low |= (uint32_t)byte() << 8;
@@ -170,7 +170,7 @@ static void send_any_request(void)
     number += how & 1;
     if (how & 2)
         parameter %= 66;
-    send_request((how >> 2) % 9, parameter, how & 128 ? byte() : 0, word());
+    send_request((how >> 2) % 9, parameter, how & 128 ? byte() : 0, four_bytes());
 }
 
 static void send_setting(void)
@@ -257,7 +257,7 @@ static void act(uint8_t kind)
         if (byte() & 1)
             stop();
         else
-            bench_press(byte() & 1);
+            bench_press(byte() & 1, byte() & 1);
         break;
     case 14: bench_open(byte() & 1); break;
     default:
@@ -266,7 +266,7 @@ static void act(uint8_t kind)
         else if (FUZZ_WIRE == BENCH_SERIAL)
             send_garbage();
         else
-            send_index(word());
+            send_index(four_bytes());
     }
 }
 
@@ -282,7 +282,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t n)
     node = what >> 4;
     number = 0;
     now_us = 1000000;
-    struct bench_choice choice = {FUZZ_WIRE, n_channels, bits, node, what % 3, what & 8, 1000, 20000000, 1};
+    struct bench_choice choice = {FUZZ_WIRE, n_channels, bits, node, what % 3, what & 8, 1000, 20000000, 1000, 4000000000, 1};
     bench_limit(MOST_INSTANTS);
     if (!bench_begin(&choice, now_us))
         return 0;

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rig.wire.can.frames import Frame
 
-HEADER = struct.Struct("<BBBBBBIIIQ")
+HEADER = struct.Struct("<BBBBBBIIIIIQ")
 RECORD = struct.Struct("<QBI")
 FRAME = struct.Struct("<HB")
 
@@ -41,6 +41,8 @@ class Choice(NamedTuple):
     lockstep: bool = False
     lowest_rate_mhz: int = 1_000
     highest_rate_mhz: int = 1_000_000
+    shortest_watchdog_us: int = 1_000
+    longest_watchdog_us: int = 4_000_000_000
 
     @property
     def fd(self) -> bool:

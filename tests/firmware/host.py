@@ -14,7 +14,7 @@ from tests.firmware.events import BEGIN_US, SERIAL, Choice, Event, Kind, of_fram
 from tests.firmware.python_device import PythonDevice
 
 SETTABLE = (48, 49, 50, 51, 52)
-BLOCKS = (1, 1, 2, 3, 5, 7, 8, 10, 16, 31, 32, 33, 62, 63, 64, 100, 256, 500, 1000)
+BLOCKS = (1, 1, 2, 3, 5, 7, 8, 10, 16, 31, 32, 33, 62, 63, 64, 100, 125, 256, 500, 1000)
 BOUNDS = (0, 1, 2, 999, 1000, 1001, 2**16, 2**31 - 1, 2**31, 4_000_000_000, 4_000_000_001, 2**32 - 1)
 GRID_HAIR = 3e-6  # of a sample: nothing happens so close to a sample instant, where rounding would decide
 
@@ -32,7 +32,7 @@ class Host:
         self._number = 0
         self._last: bytes | None = None
         self._pressed = False
-        self._watchdog_us = 0
+        self._dtype = np.dtype(f"<i{choice.bits // 8}")
         if choice.wire != SERIAL:
             self._protocol = protocol(choice.n_channels, choice.fd, choice.node)
 
@@ -148,6 +148,8 @@ class Host:
     def get(self) -> None:
         parameter = self.random.choice((self.random.randrange(70), self.random.randrange(256), 9, 17, 49))
         item = self.random.choice((0, 0, 1, 2, self.random.randrange(256)))
+        if self.random.random() < 0.5:
+            parameter, item = self.random.choice(list(self.python.device.words))
         self.request(Command.GET, parameter, item, self.random.choice((0, 0, 7)))
 
     def set(self) -> None:
@@ -188,8 +190,10 @@ class Host:
     def counts(self, n: int) -> np.ndarray:
         largest = 2 ** (self.choice.bits - 1) - 1
         level = self.random.choice((0.0, 0.1, 0.3, 0.5, 0.62, 0.63, 1.0)) * largest
+        if self.random.random() < 0.1:  # no byte is zero: long runs for COBS
+            return np.frombuffer(bytes(self.random.choices(range(1, 64), k=n * self.choice.bits // 8)), self._dtype)
         noise = np.frombuffer(self.random.randbytes(2 * n), np.int16) / 2**15
-        return np.rint(level * noise).astype(f"<i{self.choice.bits // 8}")
+        return np.rint(level * noise).astype(self._dtype)
 
     def output(self, number: int) -> None:
         """The outputs of a block, as they should be."""

@@ -14,6 +14,9 @@ from rig.wire.serial.frames import FrameReader, frame
 from tests.firmware.events import BEGIN_US, BOOT, SERIAL, Choice, Event, Kind, frame_of, of_frame
 from tests.firmware.structure import Formula
 
+MODEL = "a formula behind a simulated clock"
+"""Longer than what a parameter holds."""
+
 HAIR_S = 1e-9
 """The device is woken so much late, so that what falls on one instant is due in spite of rounding."""
 
@@ -102,12 +105,16 @@ class PythonDevice:
             self.link = CanEnd(choice.n_channels, choice.fd, choice.node)
         words = described(
             self.plant,
-            model="script",
+            model=MODEL,
             simulated=choice.simulated,
             layout_crc=self.link.layout_crc,
             boot=BOOT,
         )
         words[Parameter.LOWEST_RATE_MHZ, 0] = choice.lowest_rate_mhz
+        words[Parameter.SHORTEST_WATCHDOG_US, 0] = choice.shortest_watchdog_us
+        words[Parameter.LONGEST_WATCHDOG_US, 0] = choice.longest_watchdog_us
+        for item in range(2) if choice.simulated == 0 else ():  # which may be left out
+            del words[Parameter.FILTER_DELAY_S, item]
         self.device = Device(self.plant, words, self.link, lockstep=choice.lockstep)
         self.wakes: list[Event] = []
         """When it has done something of its own accord."""

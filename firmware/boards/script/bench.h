@@ -17,7 +17,9 @@ enum bench_wire { BENCH_SERIAL, BENCH_CAN, BENCH_CAN_FD };
 struct bench_choice {
     uint8_t wire, n_channels, bits, node, simulated;
     bool lockstep; /* measure a block once it is due, instead of by the clock */
-    uint32_t lowest_rate_mhz, highest_rate_mhz, boot;
+    uint32_t lowest_rate_mhz, highest_rate_mhz;
+    uint32_t shortest_watchdog_us, longest_watchdog_us;
+    uint32_t boot;
 };
 
 /* Switch the device on at a time, us. False: vl_begin has refused the description. */
@@ -39,8 +41,8 @@ void bench_serve(void);
 void bench_bytes(const uint8_t *bytes, size_t n);
 void bench_frame(const struct vl_frame *frame);
 
-/* Press or release the emergency stop. */
-void bench_press(bool is_pressed);
+/* Press or release the emergency stop; it may be seen by the next sample instant only. */
+void bench_press(bool is_pressed, bool is_served);
 
 /* Whether the wire takes what the device sends. */
 void bench_open(bool is_open);

@@ -1,7 +1,8 @@
 /* The core driven by a script: records from standard input, what the device does to standard output. All numbers are
  * little-endian.
  *
- * Header: u8 wire, n_channels, bits, node, simulated, lockstep; u32 lowest rate, highest rate (mHz), boot; u64 time, us.
+ * Header: u8 wire, n_channels, bits, node, simulated, lockstep; u32 lowest rate, highest rate (mHz), shortest
+ * watchdog, longest watchdog (us), boot; u64 time, us.
  * Record, in the order of time: u64 time, us; u8 kind; u32 length; data.
  *
  *   0  nothing but time      3  press the emergency stop      5  the wire takes nothing any more
@@ -19,7 +20,7 @@
 
 #include "bytes.h"
 
-enum { HEADER_BYTES = 26, RECORD_BYTES = 13, FRAME_HEAD = 3, MOST_BYTES = 1 << 20 };
+enum { HEADER_BYTES = 34, RECORD_BYTES = 13, FRAME_HEAD = 3, MOST_BYTES = 1 << 20 };
 enum { NOTHING, BYTES, FRAME, PRESS, RELEASE, SHUT, OPEN, RESET, COUNTERS };
 
 static uint8_t data[MOST_BYTES];
@@ -86,9 +87,11 @@ static uint64_t begin(void)
         .lockstep = head[5],
         .lowest_rate_mhz = vl_u32(head + 6),
         .highest_rate_mhz = vl_u32(head + 10),
-        .boot = vl_u32(head + 14),
+        .shortest_watchdog_us = vl_u32(head + 14),
+        .longest_watchdog_us = vl_u32(head + 18),
+        .boot = vl_u32(head + 22),
     };
-    uint64_t time_us = vl_u64(head + 18);
+    uint64_t time_us = vl_u64(head + 26);
     if (!bench_begin(&choice, time_us))
         fail("the description is refused");
     return time_us;
@@ -111,7 +114,7 @@ static void act(uint8_t kind, size_t n)
     case BYTES: bench_bytes(data, n); break;
     case FRAME: take_frame(n); break;
     case PRESS:
-    case RELEASE: bench_press(kind == PRESS); break;
+    case RELEASE: bench_press(kind == PRESS, true); break;
     case SHUT:
     case OPEN: bench_open(kind == OPEN); break;
     case RESET: bench_reset(); break;

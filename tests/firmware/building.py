@@ -1,0 +1,55 @@
+"""The firmware, built by its Makefile into a folder of this process."""
+
+import atexit
+import os
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+__all__ = ["FOLDER", "built"]
+
+FOLDER = Path(__file__).parents[2] / "firmware"
+NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc")}
+"""Programs that a target needs; others need those of this computer."""
+HOSTS = ("make", "cc")
+MAKING_S = 900.0
+
+
+@cache
+def _build_folder() -> Path:
+    folder = tempfile.mkdtemp(prefix="vibrolock-firmware-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+@cache
+def _made(target: str) -> Path:
+    folder = _build_folder()
+    done = subprocess.run(
+        ["make", "-C", str(FOLDER), f"BUILD={folder}", target],
+        capture_output=True,
+        text=True,
+        timeout=MAKING_S,
+        check=False,
+    )
+    assert done.returncode == 0, f"make {target}:\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+    (program,) = (path for path in (folder / target, folder / f"{target}.elf") if path.is_file())
+    return program
+
+
+def built(target: str) -> Path:
+    """The program of a target (``host``, ``host-sanitized``, ``script``, ``mps2-an386``), built once a process.
+
+    Skips the test where a program that builds it is missing; with ``VIBROLOCK_FIRMWARE=required`` it fails instead.
+    """
+    missing = [name for name in NEEDS.get(target, HOSTS) if shutil.which(name) is None]
+    if missing:
+        why = f"the firmware needs {' and '.join(missing)} to be built"
+        if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
+            pytest.fail(why)
+        pytest.skip(why)
+    return _made(target)
