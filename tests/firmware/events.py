@@ -2,10 +2,12 @@
 
 import struct
 from collections.abc import Iterator
+from functools import cache
 from enum import IntEnum
 from typing import NamedTuple
 
 from rig.wire.can.frames import Frame
+from rig.wire.can.protocol import Protocol, protocol
 
 HEADER = struct.Struct("<BBBBBBIIIIIQ")
 RECORD = struct.Struct("<QBI")
@@ -78,3 +80,9 @@ def events_in(data: bytes) -> Iterator[Event]:
         time_us, kind, length = RECORD.unpack_from(data, at)
         at += RECORD.size + length
         yield Event(time_us, Kind(kind), data[at - length : at])
+
+
+@cache
+def protocol_of(n_channels: int, fd: bool, node: int) -> Protocol:
+    """The definition of a bus, which takes a while to compile."""
+    return protocol(n_channels, fd, node)

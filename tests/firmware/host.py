@@ -7,10 +7,10 @@ import numpy as np
 
 from rig.wire.can.blocks import StreamFrames
 from rig.wire.can.frames import FD_LENGTHS, Frame
-from rig.wire.can.protocol import FrameKind, protocol
+from rig.wire.can.protocol import FrameKind
 from rig.wire.messages import ARM_KEY, Command, DeviceState, Parameter
 from rig.wire.serial.frames import frame
-from tests.firmware.events import BEGIN_US, SERIAL, Choice, Event, Kind, of_frame
+from tests.firmware.events import BEGIN_US, SERIAL, Choice, Event, Kind, of_frame, protocol_of
 from tests.firmware.python_device import PythonDevice
 
 SETTABLE = (48, 49, 50, 51, 52)
@@ -34,7 +34,7 @@ class Host:
         self._pressed = False
         self._dtype = np.dtype(f"<i{choice.bits // 8}")
         if choice.wire != SERIAL:
-            self._protocol = protocol(choice.n_channels, choice.fd, choice.node)
+            self._protocol = protocol_of(choice.n_channels, choice.fd, choice.node)
 
     # -- facts of the device -------------------------------------------------------------------------------------------
 
@@ -220,15 +220,18 @@ class Host:
         for _ in range(self.random.choice((1, 1, 1, 2))):
             self.output(max(self._next_block + ahead, 0))
 
-    def drive(self) -> None:
-        """Outputs in time for some blocks, as a good host gives them; or some of them."""
-        queue, share = self._setting(Parameter.QUEUE), self.random.choice((1.0, 1.0, 0.9, 0.5))
-        for _ in range(self.random.choice((3, 10, 20))):
+    def drive(self, blocks: int, share: float = 1.0) -> None:
+        """Outputs in time for so many blocks, as a good host gives them; or for a share of them."""
+        queue = self._setting(Parameter.QUEUE)
+        for _ in range(blocks):
             if not self._is_sampling or self._block_us > 2e5:
                 return
             if self.random.random() < share:
                 self.output(self._next_block + queue)
             self.wait(self._block_us * self.random.choice((1.0, 1.0, 0.9, 1.1)))
+
+    def drive_a_while(self) -> None:
+        self.drive(self.random.choice((3, 10, 20, 60)), self.random.choice((1.0, 1.0, 0.9, 0.5)))
 
     # -- nonsense --------------------------------------------------------------------------------------------------------
 
@@ -321,10 +324,10 @@ class Host:
             self.command: 8,
             self.repeat: 5,
             self.some_output: 12 if self._is_sampling else 1,
-            self.drive: 12 if self._is_sampling else 0,
+            self.drive_a_while: 12 if self._is_sampling else 0,
             self.nonsense: 16,
             self.stop_message: 1,
-            self.switch: 20 if self._pressed else 1,
+            self.switch: 30 if self._pressed else 0.5,
             self.reset: 0.5,
             self.pause: 6,
         }

@@ -6,12 +6,11 @@ from rig.emulator import Device
 from rig.emulator.parameters import described
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import Frame
-from rig.wire.can.protocol import protocol
 from rig.wire.link import Link, Load
 from rig.wire.messages import Message, Output, Parameter, Samples, Stream
 from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame
-from tests.firmware.events import BEGIN_US, BOOT, SERIAL, Choice, Event, Kind, frame_of, of_frame
+from tests.firmware.events import BEGIN_US, BOOT, SERIAL, Choice, Event, Kind, frame_of, of_frame, protocol_of
 from tests.firmware.structure import Formula
 
 MODEL = "a formula behind a simulated clock"
@@ -72,7 +71,7 @@ class CanEnd(SerialEnd):
 
     def __init__(self, n_channels: int, fd: bool, node: int) -> None:
         super().__init__()
-        self._protocol = protocol(n_channels, fd, node)
+        self._protocol = protocol_of(n_channels, fd, node)
         self._can_codec = CanCodec(self._protocol, True, self.counters)
 
     def configure(self, stream: Stream) -> None:

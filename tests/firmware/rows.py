@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rig.wire.can.blocks import StreamFrames
-from rig.wire.can.protocol import FrameKind, protocol
-from tests.firmware.events import Choice, Event, frame_of
+from rig.wire.can.protocol import FrameKind
+from tests.firmware.events import Choice, Event, frame_of, protocol_of
 
 HEAD = struct.Struct("<BBHQQIHH")
 
@@ -44,7 +44,7 @@ class SamplesOnBus:
     def __init__(self, choice: Choice, block_of: Sequence[int]) -> None:
         self.rows: list[Rows] = []
         self._choice, self._block_of = choice, block_of
-        self._protocol = protocol(choice.n_channels, choice.fd, choice.node)
+        self._protocol = protocol_of(choice.n_channels, choice.fd, choice.node)
         self._streams: dict[int, StreamFrames] = {}
         self._frames: list[Event] = []
 
@@ -52,7 +52,9 @@ class SamplesOnBus:
         if len(self.rows) == len(self._block_of):
             raise AssertionError("a block more than was measured")
         block = self._block_of[len(self.rows)]
-        stream = self._streams.setdefault(block, StreamFrames(self._protocol, FrameKind.SAMPLES, block))
+        if block not in self._streams:
+            self._streams[block] = StreamFrames(self._protocol, FrameKind.SAMPLES, block)
+        stream = self._streams[block]
         self._frames.append(event)
         if len(self._frames) == stream.groups * stream.parts:
             self.rows.append(self._joined(stream))
