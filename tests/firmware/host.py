@@ -138,6 +138,9 @@ class Host:
     def switch(self) -> None:
         self._pressed = not self._pressed
         self.happens(Kind.PRESS if self._pressed else Kind.RELEASE)
+        if self.random.random() < 0.5:
+            self.request(Command.STOP)
+            self.request(Command.CLEAR)
 
     def reset(self) -> None:
         if not self._pressed:
@@ -195,12 +198,12 @@ class Host:
         noise = np.frombuffer(self.random.randbytes(2 * n), np.int16) / 2**15
         return np.rint(level * noise).astype(self._dtype)
 
-    def output(self, number: int) -> None:
-        """The outputs of a block, as they should be."""
+    def output(self, number: int, amiss: int = 0, longer: int = 0) -> None:
+        """The outputs of a block, as they should be; or, on a serial line, at a sample beside it or of another length."""
         self.requests += 1
-        counts = self.counts(self._block)
+        counts = self.counts(max(0, self._block + longer))
         if self.choice.wire == SERIAL:
-            first = (number * self._block) % 2**64
+            first = (number * self._block + amiss) % 2**64
             self._payload(struct.pack("<BBHQ", 1, 4, number & 0xFFFF, first) + counts.tobytes())
         elif number >= 0:
             for one in self._frames(number, counts):
@@ -217,8 +220,11 @@ class Host:
         """Outputs of the block under way or another one."""
         queue = self._setting(Parameter.QUEUE)
         ahead = self.random.choice((-3, -1, 0, 0, 1, queue, queue, queue + 1, queue + 3, queue + 4, queue + 5, 70))
+        amiss, longer = 0, 0
+        if self.choice.wire == SERIAL and self.random.random() < 0.3:
+            amiss, longer = self.random.choice(((1, 0), (-1, 0), (0, 1), (0, -1)))
         for _ in range(self.random.choice((1, 1, 1, 2))):
-            self.output(max(self._next_block + ahead, 0))
+            self.output(max(self._next_block + ahead, 0), amiss, longer)
 
     def drive(self, blocks: int, share: float = 1.0) -> None:
         """Outputs in time for so many blocks, as a good host gives them; or for a share of them."""
