@@ -266,12 +266,12 @@ static uint32_t n_open(void)
     return n;
 }
 
-/* Number of the oldest open block after the very oldest. */
+/* Number of the second oldest block; all places are in use. */
 static int64_t second_oldest(void)
 {
     int64_t first = INT64_MAX, second = INT64_MAX;
     for (uint32_t i = 0; i <= OPEN_BLOCKS; i++) {
-        int64_t number = opened[i].is_used ? opened[i].number : INT64_MAX;
+        int64_t number = opened[i].number;
         if (number < first) {
             second = first;
             first = number;

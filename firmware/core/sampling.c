@@ -10,7 +10,7 @@ static volatile bool has_output; /* an output has come since START */
 static volatile uint32_t instants;
 
 static int32_t held;             /* count on the converter */
-static int32_t largest_count;    /* of the converter's range */
+static int32_t lowest_count, highest_count; /* of the converter's range */
 static uint64_t first_expected;  /* no output exists for samples before it */
 static uint8_t seen;             /* flags of the block under way */
 
@@ -25,6 +25,16 @@ static uint8_t *into;            /* where its next row goes; NULL: there is no r
 static _Atomic uint32_t dropped;
 static uint64_t handed_over;
 
+/* The range in counts, to the nearest. Two's complement has one more below zero than above. */
+static void find_range(void)
+{
+    double counts = (double)vl_about->output_range_v / (double)vl_about->output_v_per_count + 0.5;
+    int64_t most = vl_about->bits == 16 ? INT16_MAX : INT32_MAX;
+    int64_t range = counts > (double)most ? most + 1 : (int64_t)counts;
+    lowest_count = (int32_t)-range;
+    highest_count = (int32_t)(range < most ? range : most);
+}
+
 void vl_begin_sampling(void)
 {
     is_on = false;
@@ -33,9 +43,7 @@ void vl_begin_sampling(void)
     atomic_store(&dropped, 0);
     atomic_store(&written, 0);
     atomic_store(&read, 0);
-    double counts = (double)vl_about->output_range_v / (double)vl_about->output_v_per_count;
-    double most = vl_about->bits == 16 ? 32767.0 : 2147483647.0;
-    largest_count = (int32_t)(counts < most ? counts + 0.5 : most);
+    find_range();
 }
 
 void vl_restart_sampling(void)
@@ -105,10 +113,10 @@ uint32_t vl_block(void)
 
 static int32_t clipped(int32_t count)
 {
-    if (count >= -largest_count && count <= largest_count)
+    if (count >= lowest_count && count <= highest_count)
         return count;
     seen |= VL_OUTPUT_CLIPPED;
-    return count < 0 ? -largest_count : largest_count;
+    return count < 0 ? lowest_count : highest_count;
 }
 
 /* The output of an armed device: the one that is due, or the one before. */
