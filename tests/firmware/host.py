@@ -193,6 +193,8 @@ class Host:
     def counts(self, n: int) -> np.ndarray:
         largest = 2 ** (self.choice.bits - 1) - 1
         level = self.random.choice((0.0, 0.1, 0.3, 0.5, 0.62, 0.63, 1.0)) * largest
+        if self.random.random() < 0.05:
+            return np.full(n, self.random.choice((largest, -largest, -largest - 1)), self._dtype)
         if self.random.random() < 0.1:  # no byte is zero: long runs for COBS
             return np.frombuffer(bytes(self.random.choices(range(1, 64), k=n * self.choice.bits // 8)), self._dtype)
         noise = np.frombuffer(self.random.randbytes(2 * n), np.int16) / 2**15

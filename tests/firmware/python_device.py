@@ -11,7 +11,7 @@ from rig.wire.messages import Message, Output, Parameter, Samples, Stream
 from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame
 from tests.firmware.events import BEGIN_US, BOOT, SERIAL, Choice, Event, Kind, frame_of, of_frame, protocol_of
-from tests.firmware.structure import Formula
+from tests.firmware.structure import FULL_RANGE_V, RANGE_V, Formula
 
 MODEL = "a formula behind a simulated clock"
 """Longer than what a parameter holds."""
@@ -97,7 +97,8 @@ class PythonDevice:
 
     def __init__(self, choice: Choice) -> None:
         self.choice = choice
-        self.plant = Formula(choice.n_channels, choice.bits, 1e-3 * choice.highest_rate_mhz)
+        range_v = FULL_RANGE_V if choice.simulated == 2 else RANGE_V
+        self.plant = Formula(choice.n_channels, choice.bits, 1e-3 * choice.highest_rate_mhz, range_v)
         if choice.wire == SERIAL:
             self.link = SerialEnd()
         else:

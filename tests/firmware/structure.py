@@ -7,6 +7,8 @@ import numpy as np
 from rig.wire.messages import DeviceFlag
 
 RANGE_V = 10.0
+FULL_RANGE_V = 16.0
+"""Of the output where the device says that it is simulated and repeats itself: all that a count can say."""
 V_PER_COUNT = {16: 2.0**-11, 32: 2.0**-27}
 OVERLOAD = 0.5
 """Share of full scale from which on the inputs are overloaded."""
@@ -32,6 +34,7 @@ class Formula:
     n_channels: int
     bits: int
     rate_hz: float
+    output_range_v: float = RANGE_V
 
     def __post_init__(self) -> None:
         n = self.n_channels
@@ -39,7 +42,6 @@ class Formula:
         self.range_v = np.full(n, RANGE_V)
         self.v_per_count = np.full(n, V_PER_COUNT[self.bits])
         self.skew_s = 1e-6 * np.arange(n)
-        self.output_range_v = RANGE_V
         self.output_v_per_count = V_PER_COUNT[self.bits]
         self.filter_delay_s = 0.00025
         self.blocks: list[np.ndarray] = []
