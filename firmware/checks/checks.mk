@@ -27,6 +27,7 @@ fuzz-serial fuzz-can fuzz-can-fd:
 # Branch coverage of the core by random scripts (tests/firmware/differential.py) and by what the fuzzer has found.
 PYTHON ?= python3
 REQUESTS ?= 20000
+LEAST ?= 95
 COVERAGE = $(BUILD)/coverage
 GCOV = gcc -std=c11 -O0 -g --coverage -fprofile-abs-path -Icore
 
@@ -36,7 +37,7 @@ coverage: $(COVERAGE)/script $(COVERAGE)/replay-0 $(COVERAGE)/replay-1 $(COVERAG
 	cd .. && $(PYTHON) -m tests.firmware.differential $(abspath $(COVERAGE)/script) --requests $(REQUESTS)
 	for wire in 0:serial 1:can 2:can-fd; do find $(BUILD)/corpus/fuzz-$${wire#*:} -type f 2>/dev/null \
 	    | xargs -r $(COVERAGE)/replay-$${wire%:*} || exit 1; done
-	gcovr --root . --filter core/ --object-directory $(COVERAGE) --branches --fail-under-branch 95 \
+	gcovr --root . --filter core/ --object-directory $(COVERAGE) --branches --fail-under-branch $(LEAST) \
 	    --txt $(COVERAGE)/report.txt --print-summary $(COVERAGE)
 	cat $(COVERAGE)/report.txt
 
@@ -46,3 +47,8 @@ $(COVERAGE)/script: $(SCRIPT) $(HEADERS)
 $(COVERAGE)/replay-%: $(FUZZ) checks/replay.c $(HEADERS)
 	mkdir -p $(COVERAGE)
 	$(GCOV) -DFUZZ_WIRE=$* $(FUZZ_LIMITS) $(FUZZ) checks/replay.c -o $@
+
+.PHONY: cppcheck
+cppcheck: ## static analysis of the core and of the boards for this computer
+	cppcheck --enable=warning,style,performance,portability --error-exitcode=1 --std=c11 --quiet --force \
+	    -Icore -Iboards/plant core boards/host boards/plant boards/script checks
