@@ -12,8 +12,8 @@ import pytest
 from tests.firmware.building import FOLDER
 
 CHECKS_S = 500.0
-RUNS = 3000
-"""Inputs for each wire; the long run has 3.4 million."""
+RUNS = 10_000
+"""Inputs in all; the long run has ten million."""
 REQUESTS = 5000
 LEAST_BRANCHES = 85.0
 """Per cent, with so few requests and inputs; those of the long run are at least 95."""
@@ -46,9 +46,9 @@ def _python() -> str:
 def test_the_fuzzer_finds_nothing(tmp_path: Path) -> None:
     _needs("make", "clang")
     said = _make("fuzz", tmp_path, RUNS=RUNS)
-    assert re.findall(r"Done (\d+) runs", said) == [str(RUNS)] * 3
+    assert re.findall(r"Done (\d+) runs", said) == [str(2 * RUNS // 5), str(RUNS // 5), str(2 * RUNS // 5)]
     reached = [int(found) for found in re.findall(r"DONE +cov: (\d+)", said)]
-    assert min(reached) > 300  # edges: it comes beyond the frames, to states and streams
+    assert min(reached) > 250  # edges: it comes beyond the frames, to states and streams
 
 
 @pytest.mark.slow
