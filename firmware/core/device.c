@@ -25,13 +25,23 @@ static bool block_is_under_way; /* the oldest block was given to the wire */
 static uint64_t beaten_us;
 static uint32_t instants_seen;
 
+static bool channels_fit(const struct vl_description *about)
+{
+    for (uint32_t i = 0; i < about->n_channels; i++) {
+        const struct vl_channel *channel = &about->channels[i];
+        if (!channel->name || !channel->name[0] || !(channel->range_v > 0.0f) || !(channel->v_per_count > 0.0f))
+            return false;
+    }
+    return true;
+}
+
 static bool fits(const struct vl_description *about)
 {
     return about->n_channels >= 1 && about->n_channels <= VL_MOST_CHANNELS && (about->bits == 16 || about->bits == 32)
            && about->bits / 8 <= VL_MOST_COUNT_BYTES && about->output_v_per_count > 0.0f && about->output_range_v > 0.0f
            && about->lowest_rate_mhz >= 1 && about->lowest_rate_mhz <= about->highest_rate_mhz
            && about->shortest_watchdog_us >= 1 && about->shortest_watchdog_us <= about->longest_watchdog_us
-           && about->simulated <= 2 && about->wire->fits(about);
+           && about->simulated <= 2 && channels_fit(about) && about->wire->fits(about);
 }
 
 bool vl_begin(const struct vl_description *description, uint32_t boot)

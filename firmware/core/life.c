@@ -129,6 +129,8 @@ enum vl_status vl_disarm(uint32_t *value)
     board_lock();
     if (state == VL_ARMED)
         drop_locked(VL_RUNNING);
+    else if (is_ramping)
+        drop_locked(VL_LATCHED);
     board_unlock();
     *value = state;
     return VL_DONE;

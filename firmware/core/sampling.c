@@ -13,6 +13,7 @@ static int32_t held;             /* count on the converter */
 static int32_t lowest_count, highest_count; /* of the converter's range */
 static uint64_t first_expected;  /* no output exists for samples before it */
 static uint8_t seen;             /* flags of the block under way */
+static bool is_spoilt;           /* an instant of the block under way was missed */
 
 static uint8_t memory[VL_SAMPLE_BYTES];
 static struct vl_samples blocks[VL_MOST_BLOCKS];
@@ -53,6 +54,7 @@ void vl_restart_sampling(void)
     has_output = false;
     first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
+    is_spoilt = false;
     block_bytes = vl_in_force.block * vl_about->n_channels * vl_count_bytes();
     n_blocks = VL_SAMPLE_BYTES / block_bytes < VL_MOST_BLOCKS ? VL_SAMPLE_BYTES / block_bytes : VL_MOST_BLOCKS;
     atomic_store(&written, 0);
@@ -163,7 +165,7 @@ static void end_block(void)
 {
     if (seen & VL_OUTPUT_HELD)
         vl_counters.held_blocks++;
-    if (into) {
+    if (into && !is_spoilt) {
         blocks[write_at] = (struct vl_samples){
             .first = first,
             .clock_us = board_clock_us(),
@@ -180,6 +182,25 @@ static void end_block(void)
     first += vl_in_force.block;
     row = 0;
     seen = 0;
+    is_spoilt = false;
+}
+
+static void end_row(void)
+{
+    if (++row == vl_in_force.block)
+        end_block();
+}
+
+void vl_miss(void)
+{
+    if (!is_on)
+        return;
+    vl_output();
+    if (row == 0)
+        begin_block();
+    is_spoilt = true;
+    vl_counters.missed_instants++;
+    end_row();
 }
 
 void vl_input(const int32_t counts[], bool overload)
@@ -193,8 +214,7 @@ void vl_input(const int32_t counts[], bool overload)
     if (into)
         for (uint32_t channel = 0; channel < vl_about->n_channels; channel++)
             into = vl_put(into, (uint32_t)counts[channel], vl_count_bytes());
-    if (++row == vl_in_force.block)
-        end_block();
+    end_row();
 }
 
 const struct vl_samples *vl_oldest_block(void)

@@ -1,7 +1,7 @@
 /* A device of the vibrolock wire protocol, version 1: what a board describes, and what it calls.
  *
- * The core needs no heap, no operating system, no vendor library and, but for memcpy, memset and memmove, no C library. There is one
- * device in a program. A board provides the functions of board.h and calls, in this order,
+ * The core needs no heap, no operating system and no vendor library; of the C library memcpy, memmove, memset, memcmp and strlen, and
+ * of the compiler's library divisions of 64 bits. There is one device in a program. A board provides the functions of board.h and calls, in this order,
  *
  *   vl_begin      once after a reset;
  *   vl_serve      again and again from its main loop, at least every millisecond;
@@ -9,7 +9,7 @@
  *   vl_input      with the counts that the inputs had at that instant, from the same interrupt or later. Those of a block come
  *                 before vl_output is called for the first instant of the next block.
  *
- * vl_output, vl_input and vl_watch may interrupt vl_serve anywhere but between board_lock and board_unlock. They must not
+ * vl_output, vl_input, vl_miss and vl_watch may interrupt vl_serve anywhere but between board_lock and board_unlock. They must not
  * interrupt each other.
  */
 
@@ -70,6 +70,10 @@ int32_t vl_output(void);
 /* The counts [n_channels] of a sample instant. `overload`: one of them was beyond its range. */
 void vl_input(const int32_t counts[], bool overload);
 
+/* In place of both for a sample instant that went by without its interrupt, for instance because the timer has overrun. The index
+ * of samples counts it, its output is passed over, and its block is dropped whole and counted. */
+void vl_miss(void);
+
 /* Trip the watchdog if its time is over. vl_output and vl_serve do this; a timer of its own may do it besides. */
 void vl_watch(void);
 
@@ -85,7 +89,8 @@ struct vl_counters {
     uint32_t watchdog_trips;
     uint32_t emergency_stops;
     uint32_t held_blocks;          /* blocks of which an output was held */
-    uint32_t dropped_blocks;       /* blocks that found no room, or expired */
+    uint32_t dropped_blocks;       /* blocks that found no room, expired, or of which an instant was missed */
+    uint32_t missed_instants;
     uint32_t bad_outputs;          /* outputs whose length or index makes no sense */
     uint32_t late_outputs;         /* outputs that came late altogether */
     uint32_t outputs_while_idle;
