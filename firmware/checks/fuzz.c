@@ -260,7 +260,12 @@ static void act(uint8_t kind)
         else
             bench_press(byte() & 1, byte() & 1);
         break;
-    case 14: bench_open(byte() & 1); break;
+    case 14:
+        if (kind & 0x80)
+            bench_miss();
+        else
+            bench_open(byte() & 1);
+        break;
     default:
         if (kind & 0x80)
             bench_reset();

@@ -206,6 +206,11 @@ class Sampling:
             self._put_out_before(math.ceil(instant))
         self._converter.close(instant, ramp_s * self._rate_hz)
 
+    @property
+    def is_ramping(self) -> bool:
+        """Whether the output is on its way to 0 V."""
+        return self.on and self._converter.is_closing(self._put_out)
+
     def _put_out_before(self, end: int) -> None:
         """Put out the samples of the block under way that are due before sample ``end``."""
         begun, block_first = self._put_out, self.measured

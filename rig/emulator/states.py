@@ -78,9 +78,11 @@ class Life:
         return Status.DONE, 0
 
     def disarm(self, now_s: float) -> tuple[Status, int]:
-        """Set the output to 0 V at once; sampling continues."""
+        """Set the output to 0 V at once, also from the watchdog's ramp; sampling continues."""
         if self.state is DeviceState.ARMED:
             self._bring_down(now_s, DeviceState.RUNNING)
+        elif self._sampling.is_ramping:
+            self._bring_down(now_s, self.state)
         return Status.DONE, int(self.state)
 
     def stop(self, now_s: float) -> tuple[Status, int]:

@@ -31,12 +31,12 @@ COMPARED_COUNTERS = {
     "watchdog_trips": 0,
     "emergency_stops": 1,
     "held_blocks": 2,
-    "bad_outputs": 4,
-    "outputs_while_idle": 6,
-    "repeated_requests": 7,
-    "repeated_frames": 13,
-    "incomplete_blocks": 14,
-    "resynchronised": 15,
+    "bad_outputs": 5,
+    "outputs_while_idle": 7,
+    "repeated_requests": 8,
+    "repeated_frames": 14,
+    "incomplete_blocks": 15,
+    "resynchronised": 16,
 }
 """Counters that both have, and their place in ``struct vl_counters``."""
 
@@ -241,17 +241,17 @@ def random_script(seed: int, n_actions: int) -> Host:
     return host
 
 
-def far_script(choice: Choice, blocks: int) -> Host:
-    """A host that drives blocks of one sample beyond ``blocks``: at the beginning, then nothing, then again."""
+def far_script(choice: Choice, blocks: int, block: int = 1) -> Host:
+    """A host that drives blocks of ``block`` samples beyond ``blocks``: at the beginning, then nothing, then again."""
     host = Host(choice, Random(blocks))
-    for parameter, value in ((Parameter.BLOCK, 1), (Parameter.QUEUE, 3), (Parameter.WATCHDOG_US, 4_000_000_000)):
+    for parameter, value in ((Parameter.BLOCK, block), (Parameter.QUEUE, 3), (Parameter.WATCHDOG_US, 4_000_000_000)):
         host.request(Command.SET, parameter, 0, value)
     host.request(Command.START)
     host.request(Command.ARM, value=ARM_KEY)
     for part in range(3):
         host.drive(100)
         if part == 0:
-            host.wait(1e9 * (blocks - 200) / choice.highest_rate_mhz)
+            host.wait(1e9 * block * (blocks - 200) / choice.highest_rate_mhz)
     host.request(Command.STOP)
     return host
 

@@ -29,7 +29,8 @@ class Kind(IntEnum):
     SHUT = 5
     OPEN = 6
     RESET = 7
-    COUNTERS = 8
+    MISS = 8
+    COUNTERS = 9
 
 
 class Choice(NamedTuple):

@@ -4,6 +4,7 @@ import subprocess
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rig.wire.messages import Command, DeviceFlag, Parameter
@@ -15,6 +16,7 @@ from tests.firmware.differential import (
     far_script,
     random_script,
     run_firmware,
+    sort_out,
 )
 from tests.firmware.events import CAN, CAN_FD, SERIAL, Choice, Event, Kind
 from tests.firmware.host import Host
@@ -104,6 +106,24 @@ def test_a_switch_that_stays_pressed_is_not_cleared(program: Path) -> None:
     host.request(Command.CLEAR)
     host.request(Command.GET, Parameter.STATE)
     assert compare(program, host.choice, host.events) == []
+
+
+@pytest.mark.parametrize("block", [1, 4])
+def test_of_an_instant_that_was_missed_the_block_is_dropped_and_indices_go_on(block: int, program: Path) -> None:
+    host = far_script(Choice(SERIAL, 3), blocks=300, block=block)
+    missed_us = host.events[len(host.events) // 4].time_us
+    python = host.python
+    script = python.script([*host.events, Event(missed_us, Kind.MISS)])
+    sizes = [one.size for one in python.plant.blocks]
+    ours = sort_out(python.choice, python.link.sent, sizes)
+    theirs = sort_out(python.choice, run_firmware(program, script), sizes)
+    (lost,) = {one.first for one in ours.rows} - {one.first for one in theirs.rows}
+    expected = [one._replace(dropped=block * (one.first > lost)) for one in ours.rows if one.first != lost]
+    for one, other in zip(expected, theirs.rows, strict=True):
+        assert one._replace(counts=None).is_like(other._replace(counts=None))
+        np.testing.assert_array_equal(one.counts, other.counts)
+    assert theirs.counters[4] == 1
+    assert ours.answers == theirs.answers
 
 
 @pytest.mark.parametrize("choice", choices_that_are_refused(), ids=str)

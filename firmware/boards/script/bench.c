@@ -25,6 +25,7 @@ static uint64_t origin_us;   /* of sample instant 0 */
 static uint64_t instant;     /* index of the next sample instant */
 static uint32_t rate_mhz;
 static uint64_t instants_left = UINT64_MAX;
+static bool is_missed;       /* the next instant will be */
 static bool has_row;         /* a row was measured and is not handed over yet */
 static int32_t output;       /* at the sample instant before */
 
@@ -171,7 +172,11 @@ static void take_instant(void)
     if (has_row)
         hand_over_row(instant - 1, output);
     has_row = false;
-    put_out();
+    if (is_missed)
+        vl_miss();
+    else
+        put_out();
+    is_missed = false;
     instant++;
 }
 
@@ -249,6 +254,11 @@ void bench_press(bool pressed, bool is_served)
         bench_serve();
 }
 
+void bench_miss(void)
+{
+    is_missed = true;
+}
+
 void bench_open(bool opened)
 {
     is_open = opened;
@@ -288,6 +298,7 @@ static void be_early(void)
     if (vl_output() != 0 || vl_block_is_due())
         abort();
     vl_input(row, false);
+    vl_miss();
 }
 
 bool bench_begin(const struct bench_choice *choice, uint64_t time_us)
@@ -295,7 +306,7 @@ bool bench_begin(const struct bench_choice *choice, uint64_t time_us)
     chosen = *choice;
     describe();
     now_us = time_us;
-    is_locked = is_pressed = is_sampling = false;
+    is_locked = is_pressed = is_sampling = is_missed = false;
     is_open = true;
     if (!vl_begin(&about, chosen.boot))
         return false;

@@ -44,6 +44,9 @@ void bench_frame(const struct vl_frame *frame);
 /* Press or release the emergency stop; it may be seen by the next sample instant only. */
 void bench_press(bool is_pressed, bool is_served);
 
+/* Let the next sample instant go by without its interrupt. */
+void bench_miss(void);
+
 /* Whether the wire takes what the device sends. */
 void bench_open(bool is_open);
 

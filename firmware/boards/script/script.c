@@ -8,9 +8,9 @@
  *   0  nothing but time      3  press the emergency stop      5  the wire takes nothing any more
  *   1  bytes on the line     4  release it                    6  the wire takes everything again
  *   2  a CAN frame: u16 identifier, u8 whether it is CAN FD, data
- *   7  a reset
+ *   7  a reset                8  the next sample instant goes by
  *
- * Records of the device: the same, of kinds 1 and 2, and last one of kind 8: the counters, u32 each. Times are those of the
+ * Records of the device: the same, of kinds 1 and 2, and last one of kind 9: the counters, u32 each. Times are those of the
  * sample instant or of the record that it answers. */
 
 #include "bench.h"
@@ -21,7 +21,7 @@
 #include "bytes.h"
 
 enum { HEADER_BYTES = 34, RECORD_BYTES = 13, FRAME_HEAD = 3, MOST_BYTES = 1 << 20 };
-enum { NOTHING, BYTES, FRAME, PRESS, RELEASE, SHUT, OPEN, RESET, COUNTERS };
+enum { NOTHING, BYTES, FRAME, PRESS, RELEASE, SHUT, OPEN, RESET, MISS, COUNTERS };
 
 static uint8_t data[MOST_BYTES];
 
@@ -118,6 +118,7 @@ static void act(uint8_t kind, size_t n)
     case SHUT:
     case OPEN: bench_open(kind == OPEN); break;
     case RESET: bench_reset(); break;
+    case MISS: bench_miss(); break;
     default: fail("a record of an unknown kind");
     }
 }

@@ -37,6 +37,18 @@ def test_once_the_watchdog_has_bitten_it_ramps_from_where_it_was_and_lets_no_out
     np.testing.assert_allclose(bench.plant.output_v[bitten:], 2.0 * np.clip(1.0 - beyond, 0.0, 1.0), atol=1e-6)
 
 
+def test_disarmed_during_the_watchdogs_ramp_it_is_at_0_v_at_once() -> None:
+    bench = Bench()
+    bench.armed()
+    bench.drive(4, 2.0)
+    bench.pass_time(WATCHDOG_S - BLOCK / RATE_HZ + 0.0105)
+    assert bench.ask(Command.DISARM).value == DeviceState.LATCHED
+    put_out = 141  # samples, with that at the instant before
+    bench.pass_time(0.02)
+    assert bench.plant.output_v[put_out - 1] > 0.0
+    np.testing.assert_array_equal(bench.plant.output_v[put_out:], 0.0)
+
+
 def test_what_is_held_is_what_the_converter_holds() -> None:
     bench = Bench()
     bench.armed(watchdog_s=10.0)
