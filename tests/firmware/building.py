@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["FOLDER", "built"]
+__all__ = ["FOLDER", "built", "need"]
 
 FOLDER = Path(__file__).parents[2] / "firmware"
 NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc")}
@@ -41,15 +41,20 @@ def _made(target: str) -> Path:
     return program
 
 
-def built(target: str) -> Path:
-    """The program of a target (``host``, ``host-sanitized``, ``script``, ``mps2-an386``), built once a process.
-
-    Skips the test where a program that builds it is missing; with ``VIBROLOCK_FIRMWARE=required`` it fails instead.
-    """
-    missing = [name for name in NEEDS.get(target, HOSTS) if shutil.which(name) is None]
+def need(*programs: str) -> None:
+    """Skip the test where a program is missing; with ``VIBROLOCK_FIRMWARE=required`` fail instead."""
+    missing = [name for name in programs if shutil.which(name) is None]
     if missing:
-        why = f"the firmware needs {' and '.join(missing)} to be built"
+        why = f"the firmware needs {' and '.join(missing)} to be built or run"
         if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
             pytest.fail(why)
         pytest.skip(why)
+
+
+def built(target: str) -> Path:
+    """The program of a target (``host``, ``host-sanitized``, ``script``, ``mps2-an386``), built once a process.
+
+    Skips or fails as `need` does where a program that builds it is missing.
+    """
+    need(*NEEDS.get(target, HOSTS))
     return _made(target)

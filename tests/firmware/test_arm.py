@@ -1,7 +1,5 @@
 """The core as ARM machine code: the image for the board mps2-an386, in QEMU."""
 
-import os
-import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +13,7 @@ from rig.conformance import with_loopback
 from rig.drivers import make_daq
 from rig.emulator.emulated import emulated
 from tests.contract.test_wire import OverAPort, Reached
-from tests.firmware.building import FOLDER, built
+from tests.firmware.building import FOLDER, built, need
 from tests.rig.rigs import bench_with
 
 QEMU = "qemu-system-arm"
@@ -26,11 +24,7 @@ BOARD = "boards/mps2-an386"
 def image() -> Path:
     """The image, where QEMU is there to run it; skips or fails as `built` does."""
     path = built("mps2-an386")
-    if shutil.which(QEMU) is None:
-        why = f"the image for ARM needs {QEMU}"
-        if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
-            pytest.fail(why)
-        pytest.skip(why)
+    need(QEMU)
     return path
 
 
