@@ -14,7 +14,8 @@ __all__ = ["Life"]
 class Life:
     """States and the transitions between them.
 
-    ``changed`` is called with the time at every change of the state or of what has latched. Commands return the status and value of their answer.
+    ``changed`` is called with the time at every change of the state or of what has latched. Commands return the status and
+    value of their answer.
     """
 
     def __init__(

@@ -2,8 +2,8 @@
 
 import struct
 from collections.abc import Iterator
-from functools import cache
 from enum import IntEnum
+from functools import cache
 from typing import NamedTuple
 
 from rig.wire.can.frames import Frame

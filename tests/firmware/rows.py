@@ -66,7 +66,9 @@ class SamplesOnBus:
         header, pieces = stream.header, [piece for group in stream.pieces for piece in group]
         for frame, piece in zip(frames, pieces, strict=True):
             assert (frame.fd, len(frame.data)) == (stream.fd, piece.n_bytes)
-            counts[piece.rows, piece.columns] = np.frombuffer(frame.data, "<i2", piece.size, header).reshape(piece.shape)
+            counts[piece.rows, piece.columns] = np.frombuffer(frame.data, "<i2", piece.size, header).reshape(
+                piece.shape
+            )
         number, flags = self._place(stream, frames)
         return Rows(self._frames[0].time_us, 0, number, 0, 0, flags, 0, counts)
 

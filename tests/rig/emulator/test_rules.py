@@ -12,7 +12,6 @@ from rig.wire.messages import (
     DeviceState,
     EmergencyStop,
     Heartbeat,
-    Output,
     Parameter,
     Request,
     Samples,
