@@ -6,11 +6,12 @@ from random import Random
 import numpy as np
 
 from rig.wire.can.blocks import StreamFrames
-from rig.wire.can.frames import FD_LENGTHS, Frame
+from rig.wire.can.frames import Frame
 from rig.wire.can.protocol import FrameKind
 from rig.wire.messages import ARM_KEY, Command, DeviceState, Parameter
 from rig.wire.serial.frames import frame
 from tests.firmware.events import BEGIN_US, SERIAL, Choice, Event, Kind, of_frame, protocol_of
+from tests.firmware.nonsense import nonsense_on_the_bus, nonsense_on_the_line
 from tests.firmware.python_device import PythonDevice
 
 SETTABLE = (48, 49, 50, 51, 52)
@@ -46,7 +47,7 @@ class Host:
         return self.python.device.words[parameter, 0]
 
     @property
-    def _block(self) -> int:
+    def block(self) -> int:
         return self._setting(Parameter.BLOCK)
 
     @property
@@ -54,13 +55,17 @@ class Host:
         return self.python.device.is_sampling
 
     @property
-    def _block_us(self) -> float:
-        return 1e9 * self._block / self._setting(Parameter.RATE_MHZ)
+    def queue(self) -> int:
+        return self._setting(Parameter.QUEUE)
 
     @property
-    def _next_block(self) -> int:
+    def _block_us(self) -> float:
+        return 1e9 * self.block / self._setting(Parameter.RATE_MHZ)
+
+    @property
+    def next_block(self) -> int:
         """Number of the block under way."""
-        return self.python.device.measured // self._block
+        return self.python.device.measured // self.block
 
     # -- time ------------------------------------------------------------------------------------------------------------
 
@@ -101,7 +106,7 @@ class Host:
             self.happens(Kind.BYTES, data[:cut])
         self.happens(Kind.BYTES, data[cut:])
 
-    def _frame(self, one: Frame) -> None:
+    def send_frame(self, one: Frame) -> None:
         self.wait(self.random.choice((1, 3, 17, 131)))
         self._happens(of_frame(self._now_us, one))
 
@@ -112,7 +117,7 @@ class Host:
             version = 1 if self.random.random() < 0.95 else self.random.randrange(256)
             self._payload(bytes((version, 1, 0, 0)) + body)
         else:
-            self._frame(Frame(0x020 + self.choice.node, body))
+            self.send_frame(Frame(0x020 + self.choice.node, body))
 
     def request(self, command: int, parameter: int = 0, item: int = 0, value: int = 0) -> None:
         self._number = self._number % 255 + 1
@@ -133,7 +138,7 @@ class Host:
         if self.choice.wire == SERIAL:
             self._payload(bytes((self.random.choice((1, 1, 9)), 6, 0, 0)) + data)
         else:
-            self._frame(Frame(0, self.random.choice((b"", data, bytes(8)))))
+            self.send_frame(Frame(0, self.random.choice((b"", data, bytes(8)))))
 
     def switch(self) -> None:
         self._pressed = not self._pressed
@@ -203,123 +208,51 @@ class Host:
     def output(self, number: int, amiss: int = 0, longer: int = 0) -> None:
         """The outputs of a block, as they should be; or, on a serial line, at a sample beside it or of another length."""
         self.requests += 1
-        counts = self.counts(max(0, self._block + longer))
+        counts = self.counts(max(0, self.block + longer))
         if self.choice.wire == SERIAL:
-            first = (number * self._block + amiss) % 2**64
+            first = (number * self.block + amiss) % 2**64
             self._payload(struct.pack("<BBHQ", 1, 4, number & 0xFFFF, first) + counts.tobytes())
         elif number >= 0:
-            for one in self._frames(number, counts):
-                self._frame(one)
+            for one in self.output_frames(number, counts):
+                self.send_frame(one)
 
-    def _frames(self, number: int, counts: np.ndarray) -> list[Frame]:
-        stream = StreamFrames(self._protocol, FrameKind.OUTPUT, self._block)
-        frames = stream.frames(number * self._block, counts[:, None], 0)
+    def output_frames(self, number: int, counts: np.ndarray) -> list[Frame]:
+        stream = StreamFrames(self._protocol, FrameKind.OUTPUT, self.block)
+        frames = stream.frames(number * self.block, counts[:, None], 0)
         if number * stream.groups % (stream.wrap // 2) < stream.groups:
-            frames.insert(0, Frame(0x040 + self.choice.node, struct.pack("<I", number * self._block & 0xFFFFFFFF)))
+            frames.insert(0, Frame(0x040 + self.choice.node, struct.pack("<I", number * self.block & 0xFFFFFFFF)))
         return frames
 
     def some_output(self) -> None:
         """Outputs of the block under way or another one."""
-        queue = self._setting(Parameter.QUEUE)
+        queue = self.queue
         ahead = self.random.choice((-3, -1, 0, 0, 1, queue, queue, queue + 1, queue + 3, queue + 4, queue + 5, 70))
         amiss, longer = 0, 0
         if self.choice.wire == SERIAL and self.random.random() < 0.3:
             amiss, longer = self.random.choice(((1, 0), (-1, 0), (0, 1), (0, -1)))
         for _ in range(self.random.choice((1, 1, 1, 2))):
-            self.output(max(self._next_block + ahead, 0), amiss, longer)
+            self.output(max(self.next_block + ahead, 0), amiss, longer)
 
     def drive(self, blocks: int, share: float = 1.0) -> None:
         """Outputs in time for so many blocks, as a good host gives them; or for a share of them."""
-        queue = self._setting(Parameter.QUEUE)
+        queue = self.queue
         for _ in range(blocks):
             if not self._is_sampling or self._block_us > 2e5:
                 return
             if self.random.random() < share:
-                self.output(self._next_block + queue)
+                self.output(self.next_block + queue)
             self.wait(self._block_us * self.random.choice((1.0, 1.0, 0.9, 1.1)))
 
     def drive_a_while(self) -> None:
         self.drive(self.random.choice((3, 10, 20, 60)), self.random.choice((1.0, 1.0, 0.9, 0.5)))
 
-    # -- nonsense --------------------------------------------------------------------------------------------------------
-
     def nonsense(self) -> None:
+        """Something that no host sends."""
         self.requests += 1
         if self.choice.wire == SERIAL:
-            self._nonsense_on_the_line()
+            nonsense_on_the_line(self)
         else:
-            self._nonsense_on_the_bus()
-
-    def _nonsense_on_the_line(self) -> None:
-        random = self.random
-        request = struct.pack("<BBHBBBBI", 1, 1, 0, random.randrange(256), 4, 0, 0, 0)
-        counts = self.counts(self._block).tobytes()
-        output = struct.pack("<BBHQ", 1, 4, 0, random.choice((0, 1, 2**32, 2**63, 2**64 - self._block))) + counts
-        heartbeat = struct.pack("<BBHBBHII", 1, 5, 0, 0, 0, 0, 0, 0)
-        payload = random.choice((request, output, output, heartbeat, random.randbytes(random.randrange(40))))
-        kind = random.randrange(7)
-        if kind == 0:
-            payload = bytes((random.randrange(256),)) + payload[1:]  # another version
-        elif kind == 1:
-            payload = payload[:1] + bytes((random.randrange(256),)) + payload[2:]  # another type
-        elif kind == 2:
-            payload = payload[: random.randrange(len(payload) + 1)]
-        elif kind == 3:
-            payload += random.randbytes(random.randrange(9))
-        line = bytearray(frame(payload))
-        if kind == 4:
-            line[random.randrange(len(line))] ^= 1 << random.randrange(8)
-        elif kind == 5:
-            line = line[: random.randrange(len(line))] + b"\0" * random.randrange(2)
-        elif kind == 6:
-            line = bytearray(random.randbytes(random.choice((1, 10, 300, 5000))) + b"\0" * random.randrange(3))
-        self.happens(Kind.BYTES, bytes(line))
-        if line[-1:] != b"\0":
-            self.happens(Kind.BYTES, b"\0")
-
-    def _nonsense_on_the_bus(self) -> None:
-        random, node = self.random, self.choice.node
-        kind = random.randrange(6)
-        if kind == 0:
-            identifier = random.choice((random.randrange(1, 0x800), 0x010 + node, 0x030 + node, 0x300 + node))
-            self._frame(self._any_frame(identifier))
-        elif kind == 1:
-            self._frame(self._any_frame(0x100 + 16 * random.randrange(33) + node))
-        elif kind == 2:
-            first = random.choice((0, self._next_block * self._block, random.randrange(2**32), 2**32 - 1))
-            self._frame(Frame(0x040 + node, struct.pack("<I", first) + bytes(random.choice((0, 0, 0, 1)))))
-        elif kind == 3:
-            self._frame(Frame(0x020 + node, random.randbytes(random.choice((0, 7, 6)))))
-        else:
-            self._mangled_output()
-
-    def _any_frame(self, identifier: int) -> Frame:
-        fd = self.random.random() < (0.8 if self.choice.fd else 0.1)
-        return Frame(identifier, self.random.randbytes(self.random.choice(FD_LENGTHS if fd else range(9))), fd)
-
-    def _mangled_output(self) -> None:
-        """A block of outputs of which frames are lost, doubled, swapped, or contradict each other."""
-        random = self.random
-        number = max(0, self._next_block + self._setting(Parameter.QUEUE) + random.choice((0, 0, 0, 1, 20, 200)))
-        frames = self._frames(number, self.counts(self._block))
-        for _ in range(random.randrange(1, 4)):
-            at = random.randrange(len(frames)) if frames else 0
-            kind = random.randrange(5)
-            if frames and kind == 0:
-                del frames[at]
-            elif frames and kind == 1:
-                frames.insert(random.randrange(len(frames)), frames[at])
-            elif frames and kind == 2:
-                frames.append(frames.pop(at))
-            elif frames and kind == 3 and frames[at].data:
-                data = bytearray(frames[at].data)
-                data[random.randrange(len(data))] ^= 1 << random.randrange(8)
-                frames.insert(at, frames[at]._replace(data=bytes(data)))
-            elif frames:
-                frames[at] = frames[at]._replace(data=frames[at].data[:-1])
-        for one in frames:
-            if not one.fd or len(one.data) in FD_LENGTHS:
-                self._frame(one)
+            nonsense_on_the_bus(self)
 
     # -- a whole script --------------------------------------------------------------------------------------------------
 
@@ -343,6 +276,6 @@ class Host:
 
     def pause(self) -> None:
         short, long = self._block_us, self._setting(Parameter.WATCHDOG_US)
-        most = 3e5 if self._block > 1 else 1e5
+        most = 3e5 if self.block > 1 else 1e5
         self.wait(min(most, self.random.choice((7, 0.3 * short, 1.3 * short, 5 * short, long, 1.1 * long, 120_000))))
         self.happens(Kind.NOTHING)

@@ -9,14 +9,13 @@ import pytest
 
 from rig.wire.messages import Command, DeviceFlag, Parameter
 from tests.firmware.building import built
+from tests.firmware.comparing import differences, sort_out
 from tests.firmware.differential import (
     choices_that_are_refused,
     compare,
-    differences,
     far_script,
     random_script,
     run_firmware,
-    sort_out,
 )
 from tests.firmware.events import CAN, CAN_FD, SERIAL, Choice, Event, Kind
 from tests.firmware.host import Host
