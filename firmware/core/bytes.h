@@ -27,6 +27,18 @@ static inline int32_t vl_count(const uint8_t *bytes, uint32_t n_bytes)
     return word < 0x80000000u ? (int32_t)word : (int32_t)(word - 0x80000000u) - INT32_MAX - 1;
 }
 
+static inline uint8_t *vl_put_count(uint8_t *bytes, int32_t count, uint32_t n_bytes)
+{
+    const uint32_t word = (uint32_t)count;
+    bytes[0] = (uint8_t)word;
+    bytes[1] = (uint8_t)(word >> 8);
+    if (n_bytes == 4) {
+        bytes[2] = (uint8_t)(word >> 16);
+        bytes[3] = (uint8_t)(word >> 24);
+    }
+    return bytes + n_bytes;
+}
+
 static inline uint8_t *vl_put(uint8_t *bytes, uint64_t value, uint32_t n_bytes)
 {
     for (uint32_t i = 0; i < n_bytes; i++)

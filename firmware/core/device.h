@@ -3,6 +3,8 @@
 #ifndef VL_DEVICE_H
 #define VL_DEVICE_H
 
+#include <stdint.h> /* before stdatomic.h, for clang with newlib */
+
 #include <stdatomic.h>
 
 #include "board.h"

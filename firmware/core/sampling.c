@@ -211,9 +211,11 @@ void vl_input(const int32_t counts[], bool overload)
         begin_block();
     if (overload)
         seen |= VL_OVERLOAD;
-    if (into)
-        for (uint32_t channel = 0; channel < vl_about->n_channels; channel++)
-            into = vl_put(into, (uint32_t)counts[channel], vl_count_bytes());
+    if (into) {
+        const uint32_t n_channels = vl_about->n_channels, n_bytes = vl_count_bytes();
+        for (uint32_t channel = 0; channel < n_channels; channel++)
+            into = vl_put_count(into, counts[channel], n_bytes);
+    }
     end_row();
 }
 

@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -14,7 +15,7 @@ from rig.conformance.timing import SLOW_TEST
 from rig.conformance.ways_out import last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
-from rig.errors import NotArmed
+from rig.errors import DaqError, NotArmed
 
 __all__ = ["Finding", "check_driver", "require_arming"]
 
@@ -77,6 +78,8 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     slow = False
     for name in sorted(names, key=lambda name: name != SLOW_TEST):
         found = _found(contract, name) if not slow else _left_out(contract, name)
+        if found.outcome == "failed":
+            _clear_if_virtual(bench)
         yield found
         slow = slow or (name == SLOW_TEST and found.outcome == "failed")
 
@@ -90,6 +93,13 @@ def _found(contract: DriverContract, name: str) -> Finding:
     except Exception as error:  # a driver may fail in any way: that is what is looked for
         return Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
     return Finding(words, duty, "passed")
+
+
+def _clear_if_virtual(bench: Bench) -> None:
+    """Clear what a test that failed has left latched, or all that follow fail as well; never where something moves."""
+    with suppress(DaqError), make_daq(bench) as daq:
+        if daq.capabilities.virtual:
+            daq.clear()
 
 
 def _left_out(contract: DriverContract, name: str) -> Finding:

@@ -28,8 +28,8 @@ void reset(void);
 void reset(void)
 {
     COPROCESSOR_ACCESS |= FPU_FOR_ALL;
-    memcpy(&data_begin, &data_in_flash, (size_t)((char *)&data_end - (char *)&data_begin));
-    memset(&bss_begin, 0, (size_t)((char *)&bss_end - (char *)&bss_begin));
+    memcpy(&data_begin, &data_in_flash, (uintptr_t)&data_end - (uintptr_t)&data_begin);
+    memset(&bss_begin, 0, (uintptr_t)&bss_end - (uintptr_t)&bss_begin);
     paint_stack();
     semihosting_exit(main());
 }
