@@ -289,7 +289,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t n)
     range_is_less = what % 3 != 2;
     number = 0;
     now_us = 1000000;
-    struct bench_choice choice = {FUZZ_WIRE, n_channels, bits, node, what % 3, what & 8, 1000, 20000000, 1000, 4000000000, 1};
+    struct bench_choice choice = {FUZZ_WIRE, n_channels, bits, node, what % 3, 0, what & 8, 1000, 20000000, 1000, 4000000000, 1};
     bench_limit(MOST_INSTANTS);
     if (!bench_begin(&choice, now_us))
         return 0;

@@ -18,6 +18,12 @@ from tests.firmware.events import CAN, CAN_FD, SERIAL, Choice, Event, events_in
 from tests.firmware.host import Host
 from tests.firmware.python_device import PythonDevice
 
+REFUSED = 2
+"""Exit status of the script's program for a device that does not fit the protocol."""
+
+DEFECTS = range(1, 7)
+"""Of a description: a channel without a name, range or scale, an output without range or scale."""
+
 RATES_MHZ = (1_000_000, 997_013, 5_003_009)
 """Sample rates of the scripts: a period of whole microseconds, and two others."""
 
@@ -28,6 +34,12 @@ def run_firmware(program: Path, script: bytes) -> list[Event]:
     if ended.returncode:
         raise RuntimeError(ended.stderr.decode(errors="replace")[:4000])
     return list(events_in(ended.stdout))
+
+
+def is_refused(program: Path, choice: Choice) -> bool:
+    """Whether the firmware refuses to be such a device."""
+    done = subprocess.run([program], input=choice.header(), capture_output=True, timeout=60, check=False)
+    return done.returncode == REFUSED and b"refused" in done.stderr
 
 
 def replayed(choice: Choice, events: Sequence[Event]) -> PythonDevice:
@@ -76,6 +88,7 @@ def random_choice(random: Random) -> Choice:
         random.randrange(16),
         random.randrange(3),
         random.random() < 0.15,
+        0,
         random.choice((rate_mhz, rate_mhz // 3)),
         rate_mhz,
     )
@@ -121,6 +134,7 @@ def choices_that_are_refused() -> list[Choice]:
         Choice(CAN, node=16),
         Choice(CAN_FD, bits=32),
         Choice(CAN_FD, node=16),
+        *(Choice(defect=defect) for defect in DEFECTS),
     ]
 
 
@@ -152,7 +166,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, help="a folder for scripts, as inputs of the program")
     chosen = parser.parse_args(arguments)
-    total, seed, differing = Sum(), chosen.seed, 0
+    total, seed = Sum(), chosen.seed
+    differing = sum(not is_refused(chosen.program, choice) for choice in choices_that_are_refused())
     began = time.monotonic()
     while total.requests < chosen.requests:
         host = random_script(seed, chosen.actions)

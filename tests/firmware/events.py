@@ -9,7 +9,7 @@ from typing import NamedTuple
 from rig.wire.can.frames import Frame
 from rig.wire.can.protocol import Protocol, protocol
 
-HEADER = struct.Struct("<BBBBBBIIIIIQ")
+HEADER = struct.Struct("<BBBBBBBIIIIIQ")
 RECORD = struct.Struct("<QBI")
 FRAME = struct.Struct("<HB")
 
@@ -42,6 +42,8 @@ class Choice(NamedTuple):
     node: int = 1
     simulated: int = 1
     lockstep: bool = False
+    defect: int = 0
+    """Of its description: ``make_a_mistake`` in firmware/boards/script/bench.c."""
     lowest_rate_mhz: int = 1_000
     highest_rate_mhz: int = 1_000_000
     shortest_watchdog_us: int = 1_000

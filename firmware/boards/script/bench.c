@@ -291,6 +291,19 @@ static void describe(void)
     };
 }
 
+static void make_a_mistake(void)
+{
+    switch (chosen.defect) {
+    case 1: channels[0].name = NULL; break;
+    case 2: channels[0].name = ""; break;
+    case 3: channels[0].range_v = 0.0f; break;
+    case 4: channels[0].v_per_count = 0.0f; break;
+    case 5: about.output_range_v = 0.0f; break;
+    case 6: about.output_v_per_count = 0.0f; break;
+    default: break;
+    }
+}
+
 /* An interrupt of the sampling timer that comes while nothing is sampled. */
 static void be_early(void)
 {
@@ -305,6 +318,7 @@ bool bench_begin(const struct bench_choice *choice, uint64_t time_us)
 {
     chosen = *choice;
     describe();
+    make_a_mistake();
     now_us = time_us;
     is_locked = is_pressed = is_sampling = is_missed = false;
     is_open = true;

@@ -16,7 +16,8 @@ enum bench_wire { BENCH_SERIAL, BENCH_CAN, BENCH_CAN_FD };
 /* What the device is; the rest of its description is the same for all. */
 struct bench_choice {
     uint8_t wire, n_channels, bits, node, simulated;
-    bool lockstep; /* measure a block once it is due, instead of by the clock */
+    uint8_t defect; /* of its description, which is refused; 0: none */
+    bool lockstep;  /* measure a block once it is due, instead of by the clock */
     uint32_t lowest_rate_mhz, highest_rate_mhz;
     uint32_t shortest_watchdog_us, longest_watchdog_us;
     uint32_t boot;

@@ -1,8 +1,8 @@
 /* The core driven by a script: records from standard input, what the device does to standard output. All numbers are
  * little-endian.
  *
- * Header: u8 wire, n_channels, bits, node, simulated, lockstep; u32 lowest rate, highest rate (mHz), shortest
- * watchdog, longest watchdog (us), boot; u64 time, us.
+ * Header: u8 wire, n_channels, bits, node, simulated, lockstep, defect; u32 lowest rate, highest rate (mHz),
+ * shortest watchdog, longest watchdog (us), boot; u64 time, us.
  * Record, in the order of time: u64 time, us; u8 kind; u32 length; data.
  *
  *   0  nothing but time      3  press the emergency stop      5  the wire takes nothing any more
@@ -20,7 +20,7 @@
 
 #include "bytes.h"
 
-enum { HEADER_BYTES = 34, RECORD_BYTES = 13, FRAME_HEAD = 3, MOST_BYTES = 1 << 20 };
+enum { HEADER_BYTES = 35, RECORD_BYTES = 13, FRAME_HEAD = 3, MOST_BYTES = 1 << 20 };
 enum { NOTHING, BYTES, FRAME, PRESS, RELEASE, SHUT, OPEN, RESET, MISS, COUNTERS };
 
 static uint8_t data[MOST_BYTES];
@@ -85,13 +85,14 @@ static uint64_t begin(void)
         .node = head[3],
         .simulated = head[4],
         .lockstep = head[5],
-        .lowest_rate_mhz = vl_u32(head + 6),
-        .highest_rate_mhz = vl_u32(head + 10),
-        .shortest_watchdog_us = vl_u32(head + 14),
-        .longest_watchdog_us = vl_u32(head + 18),
-        .boot = vl_u32(head + 22),
+        .defect = head[6],
+        .lowest_rate_mhz = vl_u32(head + 7),
+        .highest_rate_mhz = vl_u32(head + 11),
+        .shortest_watchdog_us = vl_u32(head + 15),
+        .longest_watchdog_us = vl_u32(head + 19),
+        .boot = vl_u32(head + 23),
     };
-    uint64_t time_us = vl_u64(head + 26);
+    uint64_t time_us = vl_u64(head + 27);
     if (!bench_begin(&choice, time_us))
         fail("the description is refused");
     return time_us;
