@@ -13,7 +13,7 @@ import pytest
 __all__ = ["FOLDER", "built", "need"]
 
 FOLDER = Path(__file__).parents[2] / "firmware"
-NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc")}
+NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc", "newlib")}
 """Programs that a target needs; others need those of this computer."""
 HOSTS = ("make", "cc")
 MAKING_S = 900.0
@@ -41,9 +41,20 @@ def _made(target: str) -> Path:
     return program
 
 
+@cache
+def _is_there(name: str) -> bool:
+    if name != "newlib":
+        return shutil.which(name) is not None
+    command = ["arm-none-eabi-gcc", "-print-file-name=nosys.specs"]  # the bare name where it has none
+    return _is_there(command[0]) and os.sep in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
 def need(*programs: str) -> None:
-    """Skip the test where a program is missing; with ``VIBROLOCK_FIRMWARE=required`` fail instead."""
-    missing = [name for name in programs if shutil.which(name) is None]
+    """Skip the test where a program, or the C library ``newlib`` for ARM, is missing.
+
+    With ``VIBROLOCK_FIRMWARE=required`` the test fails instead.
+    """
+    missing = [name for name in programs if not _is_there(name)]
     if missing:
         why = f"the firmware needs {' and '.join(missing)} to be built or run"
         if os.environ.get("VIBROLOCK_FIRMWARE") == "required":

@@ -26,7 +26,7 @@ def options():
     ids=["cc", "arm"],
 )
 def test_the_board_of_the_page_links_with_the_core(compiler, tmp_path):
-    need(compiler[0])
+    need(compiler[0], *(["newlib"] if compiler[0] != "cc" else []))
     (board,) = (block.text for block in blocks(PAGE) if block.language == "c")
     source = tmp_path / "board.c"
     source.write_text(board, encoding="utf-8")
