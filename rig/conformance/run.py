@@ -1,6 +1,5 @@
 """The contract without pytest: every test once over an installed driver, with what came out."""
 
-import contextlib
 import inspect
 from collections.abc import Iterator
 from contextlib import suppress
@@ -73,25 +72,25 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
 
     ``output_log``: where the device is an emulator that writes its outputs down (``rig emulate --log-output``), that file.
     A driver that is too slow for any test is not tested further, for it would take hours. The watchdog that latches because a
-    test kills the host is cleared after that test; whatever else latches stays so.
+    test kills the host is cleared after that test, and after a failure whatever has latched in a virtual device; all else stays latched.
     """
     contract = _OnBench(bench, output_log)
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
     slow = False
     for name in sorted(names, key=lambda name: name != SLOW_TEST):
         found = _found(contract, name) if not slow else _left_out(contract, name)
-        if found.outcome == "failed":
-            _clear_if_virtual(bench)
         yield found
-        if name == KILLING_TEST:
-            _clear(contract)
+        _clear_after(found, name, contract)
         slow = slow or (name == SLOW_TEST and found.outcome == "failed")
 
 
-def _clear(contract: DriverContract) -> None:
-    """Clear what has latched in the device."""
-    with contextlib.suppress(DaqError), contract.make() as daq:
-        daq.clear()
+def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
+    """Clear the watchdog that a test makes latch, or that a failure has left latched where nothing moves."""
+    if name != KILLING_TEST and found.outcome != "failed":
+        return
+    with suppress(DaqError), contract.make() as daq:
+        if name == KILLING_TEST or daq.capabilities.virtual:
+            daq.clear()
 
 
 def _found(contract: DriverContract, name: str) -> Finding:
@@ -103,13 +102,6 @@ def _found(contract: DriverContract, name: str) -> Finding:
     except Exception as error:  # a driver may fail in any way: that is what is looked for
         return Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
     return Finding(words, duty, "passed")
-
-
-def _clear_if_virtual(bench: Bench) -> None:
-    """Clear what a test that failed has left latched, or all that follow fail as well; never where something moves."""
-    with suppress(DaqError), make_daq(bench) as daq:
-        if daq.capabilities.virtual:
-            daq.clear()
 
 
 def _left_out(contract: DriverContract, name: str) -> Finding:
