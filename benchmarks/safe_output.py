@@ -1,10 +1,10 @@
-"""How long a device stays driven after something died: ``python -m benchmarks.safe_output [--json] [--repeats N] [CASE...]``.
+"""How long a device stays driven after something died: ``python -m benchmarks.safe_output [--firmware PROGRAM] [CASE...]``.
 
 A tone is held on the magnet beam over an emulated serial device at wall-clock pace, which writes down the output of every
 block. In the middle of it the campaign's process or the loop's process is killed (``kill -9``), the cable is unplugged (a
-relay between two pseudo-terminals is killed), Ctrl-C is pressed, or the device's emergency stop. Measured is the time from
-there to the last block whose output was not 0 V. What is promised: a ramp (the bench's ``ramp_down_s``) where the loop
-lives, the device's watchdog and its ramp where it does not.
+relay between two pseudo-terminals is killed) or flooded (the relay passes on nothing but garbage), Ctrl-C is pressed, or the
+device's emergency stop. Measured is the time from there to the last block whose output was not 0 V. What is promised: a ramp
+(the bench's ``ramp_down_s``) where the loop lives, the device's watchdog and its ramp where it does not.
 
 Looked at besides: what the recording says, whether any process of the campaign is left, and whether the same device takes
 the next run. A run that the watchdog ends before the accident, on a machine that stalls for longer than ``--watchdog-ms``,
@@ -57,18 +57,32 @@ class EndedEarlyError(Exception):
 
 
 def relay(port: str) -> None:
-    """A cable: bytes between ``port`` and a new pseudo-terminal, whose name is printed, until it is killed."""
+    """A cable: bytes between ``port`` and a new pseudo-terminal, whose name is printed, until it is killed.
+
+    From SIGUSR1 on it passes on nothing, and floods the device with garbage.
+    """
+    flooded = False
+
+    def flood(_number: int, _frame: object) -> None:
+        nonlocal flooded
+        flooded = True
+
+    signal.signal(signal.SIGUSR1, flood)
     far = os.open(port, os.O_RDWR | os.O_NOCTTY)
     near = open_pseudo_terminal()
     with suppress(AttributeError, OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     print(near.path, flush=True)
-    while True:
+    while not flooded:
         for source in select.select([far, near.descriptor], [], [])[0]:
             passed = os.read(source, 4096)
             if not passed:  # the device is gone
                 return
             os.write(near.descriptor if source == far else far, passed)
+    with suppress(AttributeError, OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # garbage takes no processor from the device
+    while True:
+        os.write(far, os.urandom(4096))
 
 
 def child_of(process: int) -> int:
@@ -157,13 +171,15 @@ def started_again(bench: Bench) -> str:
         return f"DOES NOT START: {error}"
 
 
-def accident(case: str, bench: Bench, options: dict[str, float]) -> dict[str, Any]:
+def accident(case: str, bench: Bench, options: dict[str, float], firmware: str | None) -> dict[str, Any]:
     """One campaign, one accident."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         log, bench_file, output = folder / "output.log", folder / "bench.json", folder / "run.h5"
-        emulator = stack.enter_context(Emulator(bench, "serial", options=options, lockstep=False, log_output=log))
-        reached, cable = plugged(stack, emulator.bench) if case == "unplugged cable" else (emulator.bench, None)
+        emulator = stack.enter_context(
+            Emulator(bench, "serial", options=options, lockstep=False, log_output=log, firmware=firmware)
+        )
+        reached, cable = plugged(stack, emulator.bench) if case in CABLE else (emulator.bench, None)
         bench_file.write_text(reached.model_dump_json())
         command = [sys.executable, "-c", RUN, str(bench_file), str(output)]
         campaign = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
@@ -174,6 +190,7 @@ def accident(case: str, bench: Bench, options: dict[str, float]) -> dict[str, An
             "kill -9 of the campaign": campaign.kill,
             "kill -9 of the loop": lambda: os.kill(loop, signal.SIGKILL),
             "unplugged cable": cable.kill if cable is not None else campaign.kill,
+            "flooded cable": lambda: cable.send_signal(signal.SIGUSR1) if cable is not None else None,
             "Ctrl-C": lambda: campaign.send_signal(signal.SIGINT),
             "emergency stop": emulator.press_emergency_stop,
         }
@@ -181,6 +198,8 @@ def accident(case: str, bench: Bench, options: dict[str, float]) -> dict[str, An
         actions[case]()
         complained = campaign.communicate(timeout=LONGEST_S)[1].strip()
         time.sleep(max(0.0, began + 1.0 + bench.limits.ramp_down_s - time.monotonic()))
+        if cable is not None:
+            cable.kill()
         driven = [at - began for at, v in volts(log.read_text()) if at > began and v > 0.0]
         return {
             "ms": 1e3 * max(driven, default=0.0),
@@ -191,12 +210,12 @@ def accident(case: str, bench: Bench, options: dict[str, float]) -> dict[str, An
         }
 
 
-def measure(case: str, bench: Bench, options: dict[str, float]) -> dict[str, Any]:
+def measure(case: str, bench: Bench, options: dict[str, float], firmware: str | None = None) -> dict[str, Any]:
     """An accident that happens; how many runs ended before theirs is said with it."""
     before = set(Path("/dev/shm").glob("*"))
     for early in range(TRIES):
         try:
-            found = accident(case, bench, options)
+            found = accident(case, bench, options, firmware)
         except EndedEarlyError:
             print(f"{case}: ended before the accident, begun anew", file=sys.stderr)
             continue
@@ -205,7 +224,8 @@ def measure(case: str, bench: Bench, options: dict[str, float]) -> dict[str, Any
     raise SystemExit(f"{case}: {TRIES} runs ended before the accident; try a longer --watchdog-ms")
 
 
-CASES = ("kill -9 of the campaign", "kill -9 of the loop", "unplugged cable", "Ctrl-C", "emergency stop")
+CABLE = ("unplugged cable", "flooded cable")
+CASES = ("kill -9 of the campaign", "kill -9 of the loop", *CABLE, "Ctrl-C", "emergency stop")
 
 
 def main() -> None:
@@ -215,6 +235,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--watchdog-ms", type=float, default=20.0)
     parser.add_argument("--ramp-ms", type=float, default=0.0, help="of the device's watchdog; 0 drops the output")
+    parser.add_argument("--firmware", help="program of the firmware, instead of the emulator")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--relay", metavar="PORT", help=argparse.SUPPRESS)
     wanted = parser.parse_args()
@@ -223,7 +244,9 @@ def main() -> None:
         return
     bench = load_bench("magnet-beam").model_copy(update={"block": 10})
     options = {"watchdog_s": 1e-3 * wanted.watchdog_ms, "ramp_s": 1e-3 * wanted.ramp_ms}
-    found = {case: [measure(case, bench, options) for _ in range(wanted.repeats)] for case in wanted.cases}
+    found = {
+        case: [measure(case, bench, options, wanted.firmware) for _ in range(wanted.repeats)] for case in wanted.cases
+    }
     if wanted.json:
         json.dump(found, sys.stdout, indent=2)
         return

@@ -1,8 +1,9 @@
-"""One backbone over several wires, side by side: ``python -m benchmarks.wires [--json] [--lockstep] [PLAN]``.
+"""One backbone over several wires, side by side: ``python -m benchmarks.wires [--lockstep] [--firmware PROGRAM] [PLAN]``.
 
-The plan runs unchanged on the virtual rig, on an emulated serial device and on an emulated CAN FD device, each in its own
-process, the emulators at wall-clock pace (or in lockstep). Frequency and damping of every point are compared with those of
-the virtual rig, whose loop has neither the devices' queue nor their blocks.
+The plan runs unchanged on the virtual rig, on an emulated serial device, and on emulated devices on CAN FD and classical CAN,
+each in its own process, the emulators at wall-clock pace (or in lockstep); with ``--firmware`` that is run in their place.
+Frequency and damping of every point are compared with those of the virtual rig, whose loop has neither the devices' queue nor
+their blocks.
 """
 
 import argparse
@@ -19,28 +20,34 @@ from rig.bench import Bench
 from rig.campaigns.plans import bench_of, load_plan
 from rig.emulator.emulated import emulated
 
-BLOCKS = {"serial": 14, "can": 14}
+BLOCK = 14
 QUEUE = 2
-WIRES = {"virtual": None, "serial": "serial", "can": "can"}
+WIRES: dict[str, dict[str, Any] | None] = {
+    "virtual": None,
+    "serial": {"wire": "serial"},
+    "can": {"wire": "can"},
+    "classical": {"wire": "can", "fd": False},
+}
 
 
 @contextmanager
-def bench_behind(wire: str | None, bench: Bench, lockstep: bool) -> Iterator[Bench]:
+def bench_behind(wire: dict[str, Any] | None, bench: Bench, lockstep: bool, firmware: str | None) -> Iterator[Bench]:
     """The bench itself, or an emulated device with it behind a wire."""
     if wire is None:
         yield bench
         return
-    blocked = bench.model_copy(update={"block": BLOCKS[wire]})
-    with emulated(blocked, wire=wire, lockstep=lockstep, options={"queue_blocks": QUEUE}) as reached:
+    blocked = bench.model_copy(update={"block": BLOCK})
+    with emulated(blocked, lockstep=lockstep, options={"queue_blocks": QUEUE}, firmware=firmware, **wire) as reached:
         yield reached
 
 
-def measure(plan_name: str, lockstep: bool) -> dict[str, dict[str, Any]]:
+def measure(plan_name: str, lockstep: bool, firmware: str | None = None) -> dict[str, dict[str, Any]]:
     """Points and loop statistics by wire."""
     plan = load_plan(plan_name)
     out: dict[str, dict[str, Any]] = {}
     for name, wire in WIRES.items():
-        with bench_behind(wire, bench_of(plan, plan_name), lockstep) as bench, rig.run(plan, bench=bench) as done:
+        behind = bench_behind(wire, bench_of(plan, plan_name), lockstep, firmware)
+        with behind as bench, rig.run(plan, bench=bench) as done:
             latest = done.recording.latest
             points = [point for point in latest.values() if point["accepted"]]
             end = done.recording.parts[-1].end or {}
@@ -66,7 +73,7 @@ def compare(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, float]]:
     for name, one in found.items():
         _, mine, theirs = np.intersect1d(one["number"], truth["number"], return_indices=True)
         differ = {
-            key: float(np.max(np.abs(np.array(one[key])[mine] / np.array(truth[key])[theirs] - 1.0))) * 100.0
+            key: 100.0 * float(np.abs(np.array(one[key])[mine] / np.array(truth[key])[theirs] - 1.0).max(initial=0.0))
             for key in ("frequency_hz", "damping_ratio")
         }
         out[name] = {"points": float(len(one["frequency_hz"])), **{f"{k}_percent": v for k, v in differ.items()}}
@@ -87,8 +94,9 @@ def main() -> None:
     parser.add_argument("plan", nargs="?", default="magnet-beam/backbone")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--lockstep", action="store_true")
+    parser.add_argument("--firmware", help="program of the firmware, instead of the emulator")
     wanted = parser.parse_args()
-    found = measure(wanted.plan, wanted.lockstep)
+    found = measure(wanted.plan, wanted.lockstep, wanted.firmware)
     differences = compare(found)
     if wanted.json:
         json.dump({"found": found, "differences": differences}, sys.stdout, indent=2)

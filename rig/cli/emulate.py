@@ -40,6 +40,9 @@ def emulate(
     bitrate: Annotated[int, typer.Option(help="CAN: bit/s.")] = 1_000_000,
     data_bitrate: Annotated[int, typer.Option(help="CAN FD: bit/s within the data.")] = DATA_BIT_RATE_HZ,
     log_output: Annotated[Path | None, typer.Option(help="File for the device's output, a line a block.")] = None,
+    firmware: Annotated[
+        Path | None, typer.Option(help="Firmware to run as the device: its program, or its image for ARM.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Put a virtual rig behind a wire, at the pace of the clock, until Ctrl-C."""
@@ -66,6 +69,7 @@ def emulate(
         "node": node,
         "bitrate": bitrate,
         "data_bitrate": data_bitrate,
+        "firmware": firmware,
     }
     settings = validated(EmulatorSettings, table, "rig emulate")
     _check_bench_file(bench_file)

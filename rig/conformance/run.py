@@ -3,6 +3,7 @@
 import contextlib
 import inspect
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -79,6 +80,8 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     slow = False
     for name in sorted(names, key=lambda name: name != SLOW_TEST):
         found = _found(contract, name) if not slow else _left_out(contract, name)
+        if found.outcome == "failed":
+            _clear_if_virtual(bench)
         yield found
         if name == KILLING_TEST:
             _clear(contract)
@@ -100,6 +103,13 @@ def _found(contract: DriverContract, name: str) -> Finding:
     except Exception as error:  # a driver may fail in any way: that is what is looked for
         return Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
     return Finding(words, duty, "passed")
+
+
+def _clear_if_virtual(bench: Bench) -> None:
+    """Clear what a test that failed has left latched, or all that follow fail as well; never where something moves."""
+    with suppress(DaqError), make_daq(bench) as daq:
+        if daq.capabilities.virtual:
+            daq.clear()
 
 
 def _left_out(contract: DriverContract, name: str) -> Finding:

@@ -14,7 +14,7 @@ from rig.wire.serial.port import open_pseudo_terminal
 if TYPE_CHECKING:
     from rig.wire.can.bus import FrameBus
 
-__all__ = ["device_end"]
+__all__ = ["device_end", "driver_options_of", "largest_block", "named", "pseudo_terminal"]
 
 
 @contextmanager
@@ -27,23 +27,35 @@ def device_end(settings: EmulatorSettings) -> Iterator[tuple[Link, dict[str, Any
         if settings.wire == "can" and settings.interface not in (None, "slcan"):
             link, options = _can_interface(settings)
         else:
-            descriptor, path = stack.enter_context(_pseudo_terminal(settings.link))
-            link, options = _slcan(settings, descriptor, path) if settings.wire == "can" else _serial(descriptor, path)
+            descriptor, path = stack.enter_context(pseudo_terminal(settings.link))
+            link = _slcan(settings, descriptor) if settings.wire == "can" else SerialLink.on(descriptor, path)
+            options = driver_options_of(settings, path)
         link.open()
         stack.callback(link.close)
         yield link, options
 
 
-def _serial(descriptor: int, path: str) -> tuple[Link, dict[str, Any]]:
-    return SerialLink.on(descriptor, path), {"port": path}
+def driver_options_of(settings: EmulatorSettings, path: str) -> dict[str, Any]:
+    """Driver options with which a bench finds a device at the other end of a port."""
+    if settings.wire == "serial":
+        return {"port": path}
+    return {"interface": "slcan", "channel": path, **_can_options(settings)}
 
 
-def _slcan(settings: EmulatorSettings, descriptor: int, path: str) -> tuple[Link, dict[str, Any]]:
+def largest_block(settings: EmulatorSettings) -> int | None:
+    """Largest number of samples in a block that the frames of a bus can number; None on a serial line."""
+    if settings.wire == "serial":
+        return None
+    from rig.wire.can.protocol import protocol
+
+    return protocol(len(settings.bench.channels), settings.fd, settings.node).shape.largest_block
+
+
+def _slcan(settings: EmulatorSettings, descriptor: int) -> Link:
     """An adapter on a pseudo-terminal, and the device on the bus behind it."""
     from rig.wire.can.slcan import SlcanBus
 
-    bus = SlcanBus(descriptor, settings.timing, adapter=True)
-    return _can_link(settings, bus), {"interface": "slcan", "channel": path, **_can_options(settings)}
+    return _can_link(settings, SlcanBus(descriptor, settings.timing, adapter=True))
 
 
 def _can_interface(settings: EmulatorSettings) -> tuple[Link, dict[str, Any]]:
@@ -68,22 +80,32 @@ def _can_options(settings: EmulatorSettings) -> dict[str, Any]:
 
 
 @contextmanager
-def _pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
+def pseudo_terminal(link: Path | None) -> Iterator[tuple[int, str]]:
     """Descriptor of the near end and path of the far end; the path of the symbolic link, if there is one."""
     try:
         line = open_pseudo_terminal()
     except (ImportError, OSError) as error:
         raise DaqRefused(f"this system has no pseudo-terminals: {error}") from error
     try:
-        if link is not None:
-            _name(link, line.path)
-        yield line.descriptor, str(link.absolute()) if link is not None else line.path
+        with named(line.path, link) as path:
+            yield line.descriptor, path
     finally:
-        if link is not None:
-            with suppress(OSError):  # the link may be gone or lead elsewhere by now
-                if link.readlink() == Path(line.path):
-                    link.unlink()
         line.close()
+
+
+@contextmanager
+def named(port: str, link: Path | None) -> Iterator[str]:
+    """The path of a port: that of a symbolic link to it while the context lasts, if one is wanted."""
+    if link is None:
+        yield port
+        return
+    _name(link, port)
+    try:
+        yield str(link.absolute())
+    finally:
+        with suppress(OSError):  # the link may be gone or lead elsewhere by now
+            if link.readlink() == Path(port):
+                link.unlink()
 
 
 def _name(link: Path, path: str) -> None:

@@ -11,9 +11,10 @@ import numpy as np
 
 from rig.emulator.device import Device
 from rig.emulator.faults import Faults
-from rig.emulator.parameters import described
+from rig.emulator.firmware import started
+from rig.emulator.parameters import LARGEST_BLOCK, described
 from rig.emulator.plant import LoggedPlant, Plant, VirtualPlant, Wiring
-from rig.emulator.ports import device_end
+from rig.emulator.ports import device_end, driver_options_of, largest_block
 from rig.emulator.settings import EmulatorSettings
 from rig.system.privileges import prepare
 from rig.wire.link import Link
@@ -96,25 +97,55 @@ def run_emulator(
     parent. SIGUSR1 presses the emergency stop. Raises `ConfigurationError`, `rig.errors.DaqError`.
     """
     should_end = _End(parent)
-    plant = _plant(settings)
+    run = _run_device if settings.firmware is None else _run_firmware
+    return run(settings, _warm(_plant(settings), settings.bench.block), when_ready, should_end)
+
+
+def _run_device(
+    settings: EmulatorSettings, plant: Plant, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
+) -> dict[str, int]:
+    if settings.log_output is not None:
+        plant = LoggedPlant(plant, settings.log_output)
     with device_end(settings) as (link, options):
         device = _device(settings, plant, link)
-        if hasattr(signal, "SIGUSR1"):
-            signal.signal(signal.SIGUSR1, lambda *_: device.press_emergency_stop())
-        scheduling = "ordinary scheduling" if settings.lockstep else ask_for_priority()
-        when_ready(Ready(settings.wire, options, settings.lockstep, scheduling, link.largest_block))
+        _when_pressed(device.press_emergency_stop)
+        when_ready(Ready(settings.wire, options, settings.lockstep, _scheduling(settings), link.largest_block))
         keep_serving(device, should_end)
     return {**device.counts, **{name: count for name, count in link.counters.items() if count}}
+
+
+def _run_firmware(
+    settings: EmulatorSettings, plant: Plant, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
+) -> dict[str, int]:
+    scheduling = _scheduling(settings)  # before it starts, for a child inherits it
+    with started(settings, plant) as firmware:
+        _when_pressed(firmware.press_emergency_stop)
+        options, most = driver_options_of(settings, firmware.port), largest_block(settings) or LARGEST_BLOCK
+        when_ready(Ready(settings.wire, options, settings.lockstep, scheduling, min(most, LARGEST_BLOCK)))
+        if not firmware.serve(should_end):
+            raise firmware.failure()
+        return firmware.end()
+
+
+def _scheduling(settings: EmulatorSettings) -> str:
+    return "ordinary scheduling" if settings.lockstep else ask_for_priority()
+
+
+def _when_pressed(press: Callable[[], None]) -> None:
+    if hasattr(signal, "SIGUSR1"):
+        signal.signal(signal.SIGUSR1, lambda *_: press())
 
 
 def _plant(settings: EmulatorSettings) -> Plant:
     names = tuple(channel.name for channel in settings.bench.channels)
     wiring = Wiring(names, settings.flip, settings.dead, settings.swap)
-    plant: Plant = VirtualPlant(settings.bench, settings.seed, wiring)
-    if settings.log_output is not None:
-        plant = LoggedPlant(plant, settings.log_output)
+    return VirtualPlant(settings.bench, settings.seed, wiring)
+
+
+def _warm(plant: Plant, block: int) -> Plant:
+    """Compile the kernels before a host waits for samples."""
     plant.reset()
-    plant.step(np.zeros(settings.bench.block))  # compile the kernels before a host waits for samples
+    plant.step(np.zeros(block))
     plant.reset()
     return plant
 

@@ -53,6 +53,8 @@ class EmulatorSettings(Configured):
     """CAN: number of the device on its bus."""
     faults: dict[str, Any] = Field(default_factory=dict)
     """Faults of the device; fields of `Faults`."""
+    firmware: Path | None = None
+    """Program of the firmware, built for this computer, or its image for ARM, which QEMU runs."""
 
     @property
     def timing(self) -> BusTiming:
@@ -68,4 +70,12 @@ class EmulatorSettings(Configured):
             raise ValueError(f"interface = {self.interface!r}: a serial device has none")
         if self.interface not in (None, "slcan") and self.channel is None:
             raise ValueError(f"channel: is missing, interface {self.interface!r} has several")
+        if self.firmware is not None:
+            self._allowed_with_a_firmware()
         return self
+
+    def _allowed_with_a_firmware(self) -> None:
+        if self.faults:
+            raise ValueError(f"faults: {min(self.faults)!r}: a firmware has none; allowed is no fault")
+        if self.interface not in (None, "slcan"):
+            raise ValueError(f"interface = {self.interface!r}: allowed with a firmware is 'slcan'")

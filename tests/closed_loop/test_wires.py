@@ -48,6 +48,12 @@ def without_wire() -> dict[str, list[dict[str, Any]]]:
     ids=["serial", "classical CAN", "CAN FD"],
 )
 def test_points_over_a_wire_are_those_of_the_virtual_rig_with_the_same_queue(wire, settings, rate, without_wire):
+    require_points_of_the_virtual_rig(wire, rate, without_wire, **settings)
+
+
+def require_points_of_the_virtual_rig(
+    wire: str, rate: str, without_wire: dict[str, list[dict[str, Any]]], **settings: Any
+) -> None:
     with (
         emulated(bench_at(rate), wire, lockstep=True, seed=1, **settings) as bench,
         rig.run(PLAN, bench=bench, seed=1) as run,

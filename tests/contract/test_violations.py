@@ -11,7 +11,7 @@ from rig.bench import DriverChoice
 from rig.cli import app
 from rig.daq import State
 from rig.drivers.virtual import VirtualDAQ
-from rig.errors import DaqRefused
+from rig.errors import DaqRefused, DaqWatchdog
 
 
 class OpensItself(VirtualDAQ):
@@ -170,6 +170,33 @@ class SleepsForASecond(VirtualDAQ):
         super()._exchange(voltages, inputs)
 
 
+class TripsOnce(VirtualDAQ):
+    """Its device's watchdog bites after some starts, and stays latched until it is cleared."""
+
+    is_latched, starts, moves = False, 0, False
+
+    @property
+    def capabilities(self):
+        return super().capabilities.model_copy(update={"virtual": not self.moves})
+
+    def start(self, block=1):
+        if TripsOnce.is_latched:
+            raise DaqWatchdog("the watchdog had latched")
+        TripsOnce.starts += 1
+        super().start(block)
+
+    def _exchange(self, voltages, inputs):
+        if TripsOnce.starts == 5:
+            TripsOnce.is_latched = True
+            raise DaqWatchdog("no output came")
+        super()._exchange(voltages, inputs)
+
+    run_fused = None
+
+    def clear(self):
+        TripsOnce.is_latched = False
+
+
 class WritesIntoTheVoltages(VirtualDAQ):
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -221,6 +248,15 @@ def test_a_driver_that_keeps_all_rules_passes_in_words_and_the_command_succeeds(
     assert "failed" not in [line.split()[0] for line in lines]
     assert summary.startswith("driver virtual: ")
     assert " 0 failed, 2 not applicable" in summary
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_what_a_test_leaves_latched_is_cleared_before_the_next_only_where_nothing_moves(moves, monkeypatch):
+    for name, value in {"is_latched": False, "starts": 0, "moves": moves}.items():
+        monkeypatch.setattr(TripsOnce, name, value)
+    done = conformance(monkeypatch, TripsOnce, "--json", *(["--arm"] if moves else []))
+    failed = [test for test in json.loads(done.stdout)["tests"] if test["outcome"] == "failed"]
+    assert (len(failed) > 1) == moves
 
 
 def test_what_is_broken_stands_in_words_too(monkeypatch):

@@ -6,6 +6,7 @@ from rig.bench import DriverChoice
 from rig.conformance import DriverContract, NotApplicable, last_output_v
 from rig.drivers import make_daq
 from rig.emulator.emulated import emulated
+from tests.firmware.building import built
 from tests.rig.rigs import bench_with
 
 KILLED = "test_the_output_comes_to_0_v_without_the_host"
@@ -64,9 +65,11 @@ def test_a_driver_that_does_not_claim_it_is_told_what_arming_asks_for(of_files):
 
 
 @pytest.mark.parametrize("wire", ["serial", "can"])
-def test_the_watchdog_of_a_device_on_a_wire_brings_the_output_down(wire, tmp_path):
+@pytest.mark.parametrize("target", [None, "host"], ids=["emulator", "firmware"])
+def test_the_watchdog_of_a_device_on_a_wire_brings_the_output_down(target, wire, tmp_path):
     log, options = tmp_path / "log", {"watchdog_s": 0.3}
-    with emulated(bench_with({"block": 10}), wire, options=options, log_output=log) as bench:
+    settings = {"firmware": built(target)} if target else {}
+    with emulated(bench_with({"block": 10}), wire, options=options, log_output=log, **settings) as bench:
         contract = OverABench(bench, lambda: last_output_v(log))
         contract.safe_within_s = 20.0  # of a busy machine
         getattr(contract, KILLED)()

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-SETUP = re.compile(r"(python3?|py|pip|pytest|git|export|cd)\b")
+SETUP = re.compile(r"(python3?|py|pip|pytest|git|make|export|cd)\b")
 FILE = re.compile(r"# file: (\S+)")
 NOTE = re.compile(r"<!--\s*(.*?)\s*-->")
 INTERRUPTED = "interrupted after the first point"

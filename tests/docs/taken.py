@@ -1,4 +1,4 @@
-"""Pages that go on with files of other pages: which files, and of which page.
+"""Pages that go on with files of other pages, or with programs of the firmware: which files, and of which page.
 
 The other page is followed once a session, in a folder of its own, and its files are copied.
 """
@@ -14,6 +14,7 @@ from joblib.externals.loky import get_reusable_executor
 
 from tests.docs.pages import ROOT
 from tests.docs.reader import Reader
+from tests.firmware.building import built
 
 RECORDINGS = "docs/tutorials/recordings-to-prediction.md"
 EXCITER, SWEEP, PNLSS = (
@@ -42,6 +43,9 @@ TAKES: dict[str, dict[str, tuple[str, ...]]] = {
     },
 }
 
+BUILT = {"docs/how-to/try-the-firmware.md": {"host": Path("firmware/build/host")}}
+"""Targets of the firmware's Makefile that a page builds, and where it finds them."""
+
 
 def follower(new_folder: Callable[[str], Path], recording: Path, needs: dict[str, str]) -> Callable[[str], Path]:
     """A function that follows a page, named as in TAKES, once, and returns the folder in which that was done.
@@ -57,6 +61,9 @@ def follower(new_folder: Callable[[str], Path], recording: Path, needs: dict[str
         for source, names in TAKES.get(page, {}).items():
             for name in names:
                 copy(followed(source) / name, folder)
+        for target, place in BUILT.get(page, {}).items():
+            (folder / place).parent.mkdir(parents=True)
+            shutil.copy(built(target), folder / place)
         with alone_in(folder):
             Reader(ROOT / page).follow()
         return folder

@@ -48,6 +48,7 @@ NOT_RUN = {
     ("docs/how-to/compare-ways-to-run.md", "takes a minute by the clock"),
     ("docs/how-to/swap-in-a-driver.md", "needs the device"),
     ("docs/how-to/test-my-bench-with-pytest.md", "takes half a minute each; tests/hardware runs the same"),
+    ("docs/how-to/try-the-firmware.md", "runs until Ctrl-C"),
     ("docs/how-to/try-without-hardware.md", "runs until Ctrl-C"),
     ("docs/how-to/watch-a-run-in-a-terminal.md", "runs until Ctrl-C"),
     ("docs/how-to/watch-a-run.md", "runs until Ctrl-C"),
@@ -57,6 +58,7 @@ NOT_RUN = {
     ("docs/how-to/reproduce-the-paper.md", "takes a quarter of an hour"),
     ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/reference/benchmarks.md", "takes minutes"),
+    ("docs/reference/firmware-sizes.md", "takes minutes and needs a compiler for ARM and QEMU"),
 }
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rig.conformance import with_loopback
 from rig.daq import LOST, State
 from rig.drivers import make_daq
 from rig.drivers.wire import WireOptions
@@ -115,6 +116,16 @@ def test_filter_delay_that_the_device_tells_is_part_of_the_latency() -> None:
         daq.start(1)
         assert daq.filter_delay_samples == pytest.approx(reference.filter_delay_samples, abs=1e-5)
         assert daq.latency_samples == pytest.approx(1.5 + reference.filter_delay_samples, abs=1e-5)
+
+
+@pytest.mark.parametrize(("index", "remarks"), [(-2, 1), (-1, 0)], ids=["sensor", "loopback"])
+def test_a_skew_that_the_bench_gives_a_loopback_is_no_difference_from_the_device(index: int, remarks: int) -> None:
+    bench = with_loopback(bench_with())
+    assert bench is not None
+    channels = list(bench.channels)
+    channels[index] = channels[index].model_copy(update={"skew_samples": -0.5})
+    with MemoryDAQ(bench.model_copy(update={"channels": tuple(channels)})) as daq:
+        assert len([remark for remark in daq.remarks if "skew_samples = -0.5" in remark]) == remarks
 
 
 def test_lost_blocks_are_gaps_in_their_place() -> None:

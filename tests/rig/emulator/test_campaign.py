@@ -1,5 +1,7 @@
 """A whole run over a wire is the virtual driver's with the same queue, bit for bit."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,11 @@ def virtual() -> np.ndarray:
 
 @pytest.mark.parametrize("wire", ["serial", pytest.param("can", marks=pytest.mark.slow)])
 def test_every_recorded_row_is_that_of_the_virtual_driver(wire: str, virtual: np.ndarray) -> None:
-    with emulated(bench_with({"block": BLOCK}), wire, seed=5, options={"queue_blocks": QUEUE}) as bench:
+    require_rows_of_the_virtual_driver(wire, virtual)
+
+
+def require_rows_of_the_virtual_driver(wire: str, virtual: np.ndarray, **settings: Any) -> None:
+    with emulated(bench_with({"block": BLOCK}), wire, seed=5, options={"queue_blocks": QUEUE}, **settings) as bench:
         over_the_wire = recorded(bench)
     assert over_the_wire.dtype == virtual.dtype
     n = virtual.size

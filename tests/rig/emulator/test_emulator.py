@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,6 +33,7 @@ from tests.rig.emulator.host_process import BLOCK, RAMP_S
 from tests.rig.rigs import bench_with
 from tests.waiting import LONG_S, wait_until
 
+RATE_HZ = 5000.0
 WATCHDOG_S = 2.0  # a host on a busy machine still feeds it
 
 
@@ -118,24 +120,31 @@ def test_a_device_that_sends_other_channels_than_it_says_is_not_believed() -> No
 
 def test_a_host_that_is_killed_leaves_the_output_at_0_v_after_the_watchdog_s_ramp(tmp_path: Path) -> None:
     # How long the watchdog waits, tests/rig/emulator/test_device.py asks with a clock of its own.
-    log = tmp_path / "output.txt"
-    with Emulator(bench_with(), lockstep=False, log_output=str(log)) as emulator:
+    require_0_v_after_a_kill(tmp_path / "output.txt")
+
+
+def require_0_v_after_a_kill(log: Path, **settings: Any) -> np.ndarray:
+    """Kill a host that drives, and look at the output by the device's own clock; returns the log, as `logged`."""
+    with Emulator(bench_with(), lockstep=False, log_output=str(log), **settings) as emulator:
         port = str(emulator.bench.driver.options["port"])
         with driving(port, WATCHDOG_S):
             killed_s = time.monotonic()
-
-        def is_down() -> bool:
-            """It has brought the output to 0 V, and goes on sampling."""
-            at_s, _, volts = logged(log)
-            return bool((at_s[-6:] > killed_s).all() and not volts[-6:].any())
-
-        wait_until(is_down, "0 V after the host was killed")
+        dead_s = time.monotonic()
+        wait_until(lambda: is_down(log, dead_s), "0 V after the host was killed")
     at_s, first, volts = logged(log)
     driven, full = np.flatnonzero(volts), np.flatnonzero(volts > 0.199)
     assert volts[at_s < killed_s][-1] == pytest.approx(0.2, abs=1e-3)
-    assert first[driven[-1]] - first[full[-1]] <= RAMP_S * 5000.0 + BLOCK  # in samples, which are the device's clock
+    assert first[driven[-1]] - first[full[-1]] <= RAMP_S * RATE_HZ + BLOCK  # in samples, which are the device's clock
     assert (np.diff(volts[full[-1] :]) <= 0.0).all()
+    assert first[driven[-1]] - first[at_s > dead_s][0] <= (WATCHDOG_S + RAMP_S) * RATE_HZ + 1 + BLOCK
     assert emulator.counted["watchdog_trips"] == 1
+    return np.vstack([at_s, first, volts])
+
+
+def is_down(log: Path, since_s: float) -> bool:
+    """Whether the device has brought the output to 0 V since, and goes on sampling."""
+    at_s, _, volts = logged(log)
+    return bool((at_s[-6:] > since_s).all() and not volts[-6:].any())
 
 
 def logged(path: Path) -> np.ndarray:

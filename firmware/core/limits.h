@@ -1,0 +1,45 @@
+/* Sizes of the core's memory. A board sets others on the compiler's command line (-DVL_LARGEST_BLOCK=64). */
+
+#ifndef VL_LIMITS_H
+#define VL_LIMITS_H
+
+/* Input channels, at most 31 by the protocol. */
+#ifndef VL_MOST_CHANNELS
+#define VL_MOST_CHANNELS 31
+#endif
+
+/* Samples a block. */
+#ifndef VL_LARGEST_BLOCK
+#define VL_LARGEST_BLOCK 1000
+#endif
+
+/* Blocks between the handing over of an output and the converter. */
+#ifndef VL_LARGEST_QUEUE
+#define VL_LARGEST_QUEUE 64
+#endif
+
+/* Bytes of a count: 2, or 4 for converters of more than 16 bits. */
+#ifndef VL_MOST_COUNT_BYTES
+#define VL_MOST_COUNT_BYTES 4
+#endif
+
+/* Blocks beyond the queue by which a host may be early with its outputs. */
+#define VL_BLOCKS_AHEAD 4
+
+/* Bytes for blocks that are measured and not sent yet; at least two blocks must fit. */
+#ifndef VL_SAMPLE_BYTES
+#define VL_SAMPLE_BYTES (3 * VL_LARGEST_BLOCK * VL_MOST_CHANNELS * VL_MOST_COUNT_BYTES)
+#endif
+
+/* Blocks that are measured and not sent yet, at most. */
+#ifndef VL_MOST_BLOCKS
+#define VL_MOST_BLOCKS 64
+#endif
+
+/* The largest payload of the protocol on a serial line, bytes. */
+#define VL_LARGEST_PAYLOAD 65536
+
+/* Outputs that are kept until they are due. */
+#define VL_OUTPUTS ((VL_LARGEST_QUEUE + VL_BLOCKS_AHEAD) * VL_LARGEST_BLOCK)
+
+#endif

@@ -1,0 +1,1 @@
+"""The firmware as it is built: devices in C, run as processes."""

@@ -1,0 +1,71 @@
+"""The firmware, built by its Makefile into a folder of this process."""
+
+import atexit
+import os
+import shutil
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+__all__ = ["FOLDER", "built", "need"]
+
+FOLDER = Path(__file__).parents[2] / "firmware"
+NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc", "newlib")}
+"""Programs that a target needs; others need those of this computer."""
+HOSTS = ("make", "cc")
+MAKING_S = 900.0
+
+
+@cache
+def _build_folder() -> Path:
+    folder = tempfile.mkdtemp(prefix="vibrolock-firmware-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+@cache
+def _made(target: str) -> Path:
+    folder = _build_folder()
+    done = subprocess.run(
+        ["make", "-C", str(FOLDER), f"BUILD={folder}", target],
+        capture_output=True,
+        text=True,
+        timeout=MAKING_S,
+        check=False,
+    )
+    assert done.returncode == 0, f"make {target}:\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+    (program,) = (path for path in (folder / target, folder / f"{target}.elf") if path.is_file())
+    return program
+
+
+@cache
+def _is_there(name: str) -> bool:
+    if name != "newlib":
+        return shutil.which(name) is not None
+    command = ["arm-none-eabi-gcc", "-print-file-name=nosys.specs"]  # the bare name where it has none
+    return _is_there(command[0]) and os.sep in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def need(*programs: str) -> None:
+    """Skip the test where a program, or the C library ``newlib`` for ARM, is missing.
+
+    With ``VIBROLOCK_FIRMWARE=required`` the test fails instead.
+    """
+    missing = [name for name in programs if not _is_there(name)]
+    if missing:
+        why = f"the firmware needs {' and '.join(missing)} to be built or run"
+        if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
+            pytest.fail(why)
+        pytest.skip(why)
+
+
+def built(target: str) -> Path:
+    """The program of a target (``host``, ``host-sanitized``, ``script``, ``mps2-an386``), built once a process.
+
+    Skips or fails as `need` does where a program that builds it is missing.
+    """
+    need(*NEEDS.get(target, HOSTS))
+    return _made(target)
