@@ -3,8 +3,8 @@
 The rule. All times in s, T = block / sample rate:
 
 - **Answer time** of a block: from the instant of its last sample to the arrival of the outputs that it leads to. It is
-  ``RESERVE`` times the largest lateness of a block that was seen (`lateness_s`), plus the median round trip, plus the time
-  that the wire needs for the block.
+  ``RESERVE`` times the largest lateness of a block that was seen (`rig.loop.arrivals.lateness_s`), plus the median round trip,
+  plus the time that the wire needs for the block.
 - **Queue**: the outputs of a block are due q blocks after it, so q T must last for the answer time and the part ``1 - BUSY`` of
   a block more, in which the controller computes. The shortest such q is taken, and a longer block where q is more than the
   device has.
@@ -20,26 +20,14 @@ A setting of the bench that fulfils the rule is kept, but for a queue of more th
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from rig.daq import Adjustable
 
-__all__ = [
-    "Recommendation",
-    "Settings",
-    "Timing",
-    "answer_s",
-    "complaints",
-    "lateness_s",
-    "reached_blocks_s",
-    "recommend",
-]
+__all__ = ["BUSY", "REACHED", "Recommendation", "Settings", "Timing", "answer_s", "complaints", "recommend"]
 
 RESERVE = 1.5  # of the largest lateness: one or two seconds do not see the largest of a test
 BUSY = 0.5  # of a block for the driver's computing; controller and recorder need the rest
 GAPS = 3.0  # of the longest time between two blocks
 REACHED = 0.99  # of the sample rate
-HORIZON_S = 0.5  # a block is late only if the device's clock is seen to go on within this time
 KEPT_QUEUE = 2  # times the queue that is needed: a longer one of the bench is not kept
 
 
@@ -74,37 +62,6 @@ class Recommendation(NamedTuple):
     """Whether the rule is fulfilled; False if even the longest block and queue do not last."""
     reasons: dict[str, str]
     """One line for ``block``, ``queue_blocks``, ``watchdog_s`` and ``largest_rate_hz``."""
-
-
-def lateness_s(arrivals_s: np.ndarray, period_s: float, horizon_s: float = HORIZON_S) -> np.ndarray:
-    """Return how late each block arrived, s, float64[n]; ``arrivals_s`` float64[n] in order, with one block each ``period_s``.
-
-    A block is late by the most that it could have come earlier, as later blocks show: arrivals less their number of periods,
-    above the lowest such value among those that follow within ``horizon_s`` to twice that. A stall of the host is made up for,
-    block by block, and counts. A device whose clock has stood still is not made up for, and does not count.
-    """
-    since = arrivals_s - period_s * np.arange(arrivals_s.size)
-    out = np.zeros(since.size)
-    window = max(1, math.ceil(horizon_s / period_s))
-    for first in range(0, since.size, window):
-        ahead = since[first : first + 2 * window]
-        lowest = np.minimum.accumulate(ahead[::-1])[::-1]
-        out[first : first + window] = (ahead - lowest)[:window]
-    return out
-
-
-def reached_blocks_s(arrivals_s: np.ndarray, period_s: float) -> float:
-    """Return the blocks per second of ``arrivals_s`` float64[n]; 0 if there are too few.
-
-    They are counted from the block that is least late in the first fifth to that in the last fifth, so that a block late at
-    either end does not count as a lower rate.
-    """
-    if arrivals_s.size < 2:
-        return 0.0
-    since = arrivals_s - period_s * np.arange(arrivals_s.size)
-    part = max(1, arrivals_s.size // 5)
-    first, last = int(np.argmin(since[:part])), arrivals_s.size - part + int(np.argmin(since[-part:]))
-    return (last - first) / max(1e-9, float(arrivals_s[last] - arrivals_s[first]))
 
 
 def answer_s(timing: Timing, wire_s: float) -> float:

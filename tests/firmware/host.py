@@ -205,10 +205,11 @@ class Host:
         noise = np.frombuffer(self.random.randbytes(2 * n), np.int16) / 2**15
         return np.rint(level * noise).astype(self._dtype)
 
-    def output(self, number: int, amiss: int = 0, longer: int = 0) -> None:
+    def output(self, number: int, amiss: int = 0, longer: int = 0, counts: np.ndarray | None = None) -> None:
         """The outputs of a block, as they should be; or, on a serial line, at a sample beside it or of another length."""
         self.requests += 1
-        counts = self.counts(max(0, self.block + longer))
+        if counts is None:
+            counts = self.counts(max(0, self.block + longer))
         if self.choice.wire == SERIAL:
             first = (number * self.block + amiss) % 2**64
             self._payload(struct.pack("<BBHQ", 1, 4, number & 0xFFFF, first) + counts.tobytes())
@@ -222,6 +223,12 @@ class Host:
         if number * stream.groups % (stream.wrap // 2) < stream.groups:
             frames.insert(0, Frame(0x040 + self.choice.node, struct.pack("<I", number * self.block & 0xFFFFFFFF)))
         return frames
+
+    @property
+    def half_a_wrap(self) -> int:
+        """Blocks of outputs that half of the sequence numbers count."""
+        stream = StreamFrames(self._protocol, FrameKind.OUTPUT, self.block)
+        return stream.wrap // 2 // stream.groups
 
     def some_output(self) -> None:
         """Outputs of the block under way or another one."""

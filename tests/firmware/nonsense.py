@@ -41,7 +41,7 @@ def nonsense_on_the_line(host: "Host") -> None:
 
 def nonsense_on_the_bus(host: "Host") -> None:
     random, node = host.random, host.choice.node
-    kind = random.randrange(6)
+    kind = random.randrange(7)
     if kind == 0:
         identifier = random.choice((random.randrange(1, 0x800), 0x010 + node, 0x030 + node, 0x300 + node))
         host.send_frame(_any_frame(host, identifier))
@@ -52,6 +52,8 @@ def nonsense_on_the_bus(host: "Host") -> None:
         host.send_frame(Frame(0x040 + node, struct.pack("<I", first) + bytes(random.choice((0, 0, 0, 1)))))
     elif kind == 3:
         host.send_frame(Frame(0x020 + node, random.randbytes(random.choice((0, 7, 6)))))
+    elif kind == 4:
+        _send_torn_outputs(host)
     else:
         _send_mangled_output(host)
 
@@ -61,14 +63,27 @@ def _any_frame(host: "Host", identifier: int) -> Frame:
     return Frame(identifier, host.random.randbytes(host.random.choice(FD_LENGTHS if fd else range(9))), fd)
 
 
+def _send_torn_outputs(host: "Host") -> None:
+    """The first frames of more blocks than may be incomplete at a time, and then what was missing of some."""
+    numbers = [host.next_block + host.queue + ahead for ahead in range(host.random.choice((2, 5, 6, 7)))]
+    blocks = [host.output_frames(number, host.counts(host.block)) for number in numbers]
+    host.random.shuffle(blocks)
+    for frames in blocks:
+        for one in frames[:-1]:
+            host.send_frame(one)
+    for frames in host.random.sample(blocks, 2):
+        host.send_frame(frames[-1])
+
+
 def _send_mangled_output(host: "Host") -> None:
     """A block of outputs of which frames are lost, doubled, swapped, or contradict each other."""
     random = host.random
-    number = max(0, host.next_block + host.queue + random.choice((0, 0, 0, 1, 20, 200)))
+    half = host.half_a_wrap
+    number = max(0, host.next_block + host.queue + random.choice((0, 0, 0, 1, 20, 200, half - 1, half, half + 1)))
     frames = host.output_frames(number, host.counts(host.block))
     for _ in range(random.randrange(1, 4)):
         at = random.randrange(len(frames)) if frames else 0
-        kind = random.randrange(5)
+        kind = random.randrange(6)
         if frames and kind == 0:
             del frames[at]
         elif frames and kind == 1:
@@ -79,6 +94,8 @@ def _send_mangled_output(host: "Host") -> None:
             data = bytearray(frames[at].data)
             data[random.randrange(len(data))] ^= 1 << random.randrange(8)
             frames.insert(at, frames[at]._replace(data=bytes(data)))
+        elif frames and kind == 4:
+            frames[at] = frames[at]._replace(identifier=frames[at].identifier + 16)
         elif frames:
             frames[at] = frames[at]._replace(data=frames[at].data[:-1])
     for one in frames:

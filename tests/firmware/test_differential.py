@@ -2,11 +2,15 @@
 
 from collections import Counter
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
 
-from rig.wire.messages import Command, DeviceFlag, Parameter
+from rig.wire.can.codec import CanCodec
+from rig.wire.messages import ARM_KEY, Command, DeviceFlag, Message, Parameter, Samples, Stream
+from rig.wire.serial.codec import Codec
+from rig.wire.serial.frames import FrameReader
 from tests.firmware.building import built
 from tests.firmware.comparing import differences, sort_out
 from tests.firmware.differential import (
@@ -17,7 +21,7 @@ from tests.firmware.differential import (
     random_script,
     run_firmware,
 )
-from tests.firmware.events import CAN, CAN_FD, SERIAL, Choice, Event, Kind
+from tests.firmware.events import CAN, CAN_FD, SERIAL, Choice, Event, Kind, frame_of, protocol_of
 from tests.firmware.host import Host
 from tests.firmware.python_device import PythonDevice
 
@@ -58,6 +62,7 @@ def test_the_scripts_come_to_all_that_can_happen(hosts: list[Host]) -> None:
     ):
         assert counted[name] > 0, name
     assert {host.choice.wire for host in hosts} == set(WIRES)
+    assert any(host.choice.lockstep and host.python.plant.blocks for host in hosts)
     ramped = [block for host in hosts for block in host.python.plant.blocks if (block != block.round()).any()]
     assert ramped
 
@@ -97,7 +102,7 @@ def test_nothing_differs_beyond_65536_blocks(wire: int, program: Path) -> None:
 
 
 def test_a_switch_that_stays_pressed_is_not_cleared(program: Path) -> None:
-    host = Host(Choice(), random_script(1, 0).random)
+    host = Host(Choice(), Random(1))
     host.switch()
     for command in (Command.CLEAR, Command.START, Command.STOP):
         host.request(command)
@@ -105,6 +110,69 @@ def test_a_switch_that_stays_pressed_is_not_cleared(program: Path) -> None:
     host.request(Command.CLEAR)
     host.request(Command.GET, Parameter.STATE)
     assert compare(program, host.choice, host.events) == []
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_what_the_wire_does_not_take_is_lost_and_counted_and_no_index_is_wrong(wire: int, program: Path) -> None:
+    host = far_script(Choice(wire, 3), blocks=600)
+    shut_us = host.events[len(host.events) // 4].time_us
+    events = [*host.events, Event(shut_us, Kind.SHUT), Event(shut_us + 300_000, Kind.OPEN)]
+    ours = _heard(host, host.python.link.sent)
+    theirs = _heard(host, run_firmware(program, host.python.script(events)))
+    assert 0 < len(ours) - len(theirs) < 300
+    for first, (counts, dropped) in theirs.items():
+        np.testing.assert_array_equal(counts, ours[first][0])
+        if wire == SERIAL:  # in every block; on a bus in heartbeats
+            assert dropped == sum(one not in theirs for one in range(first))
+    assert theirs[max(theirs)][1] == min(len(ours) - len(theirs), 255)
+
+
+def _heard(host: Host, sent: list[Event]) -> dict[int, tuple[np.ndarray, int]]:
+    """Blocks of one sample as a host understands them: counts and what the device has dropped, by index."""
+    choice = host.choice
+    stream = Stream(choice.n_channels, 1, 1000.0, choice.bits, 3)
+    messages: list[Message | None] = []
+    if choice.wire == SERIAL:
+        codec = Codec()
+        codec.configure(stream)
+        messages += FrameReader(codec, {}).feed(b"".join(one.data for one in sent if one.kind == Kind.BYTES))
+    else:
+        bus = CanCodec(protocol_of(choice.n_channels, choice.fd, choice.node), False, {})
+        bus.configure(stream)
+        messages += [bus.decode(frame_of(one.data)) for one in sent if one.kind == Kind.FRAME]
+    return {one.first: (one.counts, one.dropped) for one in messages if isinstance(one, Samples)}
+
+
+EVERYTHING = [
+    *(Choice(SERIAL, n_channels, bits) for n_channels, bits in ((1, 16), (31, 32))),
+    *(Choice(CAN, n_channels, simulated=0) for n_channels in (1, 3, 4, 5, 8, 9, 16)),
+    *(Choice(CAN_FD, n_channels, simulated=2) for n_channels in (1, 2, 4, 7, 15, 16, 31)),
+]
+
+
+@pytest.mark.parametrize("choice", EVERYTHING, ids=lambda choice: f"{choice.wire}-{choice.n_channels}")
+def test_both_tell_the_same_of_every_parameter_and_item(choice: Choice, program: Path) -> None:
+    host = Host(choice, Random(1))
+    items = {item for _, item in host.python.device.words}
+    for parameter in (*range(68), 255):
+        for item in sorted(items | {8 * choice.n_channels, choice.n_channels, 255}):
+            host.request(Command.GET, parameter, item)
+    assert compare(program, choice, host.events) == []
+
+
+def test_a_run_without_a_zero_at_the_very_end_of_a_frame(program: Path) -> None:
+    host = Host(Choice(SERIAL, 1, simulated=2), Random(1))
+    host.request(Command.SET, Parameter.BLOCK, 0, 125)
+    host.request(Command.SET, Parameter.WATCHDOG_US, 0, 1_000_000)
+    host.request(Command.START)
+    host.request(Command.ARM, value=ARM_KEY)
+    counts = np.frombuffer(bytes(range(1, 251)), "<i2")
+    for number in range(1, 20):
+        host.output(number, counts=np.roll(counts, number) // 2 | 0x0101)
+        host.wait(125_000)
+    sent = run_firmware(program, host.python.script(host.events))
+    assert any(one.data[-256:-255] == b"\xff" for one in sent if one.kind == Kind.BYTES)  # 254 bytes and nothing behind
+    assert differences(host.python, sent) == []
 
 
 @pytest.mark.parametrize("block", [1, 4])

@@ -18,7 +18,7 @@ static struct vl_description about;
 static const double filter_delay_s = 0.00025;
 
 static uint64_t now_us;
-static bool is_locked, is_pressed, is_open;
+static bool is_locked, is_pressed, is_open, is_fed;
 
 static bool is_sampling;
 static uint64_t origin_us;   /* of sample instant 0 */
@@ -117,6 +117,7 @@ bool board_stop_is_pressed(void)
 
 void board_feed_watchdog(void)
 {
+    is_fed = true;
 }
 
 size_t board_read(uint8_t *bytes, size_t room)
@@ -220,12 +221,24 @@ void bench_serve(void)
     }
 }
 
+/* The chip's watchdog is fed after a sample instant, and not again before the next. */
+static void mind_the_watchdog(void)
+{
+    bool was_fed = is_fed;
+    is_fed = false;
+    vl_serve();
+    if (!was_fed || (is_fed && is_sampling))
+        abort();
+}
+
 void bench_pass(uint64_t time_us)
 {
     while (!chosen.lockstep && has_come(time_us)) {
         now_us = origin_us + instant * 1000000000 / rate_mhz;
+        is_fed = false;
         take_instant();
         bench_serve();
+        mind_the_watchdog();
     }
     now_us = time_us;
 }

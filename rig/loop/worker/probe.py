@@ -11,7 +11,8 @@ from rig.bench import Bench
 from rig.daq import DAQ, HELD, LOST, flag_names
 from rig.drivers import make_daq
 from rig.errors import DaqError
-from rig.loop.recommendation import Timing, lateness_s, reached_blocks_s
+from rig.loop.arrivals import lateness_s, reached_blocks_s
+from rig.loop.recommendation import Timing
 from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
@@ -39,7 +40,7 @@ def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
 def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
     """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the timing.
 
-    ``block_us``: time between two blocks; ``late_us``: how late blocks came (`rig.loop.recommendation.lateness_s`; of a device
+    ``block_us``: time between two blocks; ``late_us``: how late blocks came (`rig.loop.arrivals.lateness_s`; of a device
     with a clock); ``driver_us``: computing time of the driver a block; ``rate_hz``: samples received per second;
     ``statistics``: measurements of the driver itself. A device that is armed by its driver is armed, at 0 V, so that it tells
     which outputs it has held. No blocks are exchanged with a device that has something ``latched``.
