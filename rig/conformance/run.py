@@ -72,7 +72,7 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
 
     ``output_log``: where the device is an emulator that writes its outputs down (``rig emulate --log-output``), that file.
     A driver that is too slow for any test is not tested further, for it would take hours. The watchdog that latches because a
-    test kills the host is cleared after that test, and after a failure whatever has latched in a virtual device; all else stays latched.
+    test kills the host is cleared after that test, and what a failure has left latched where the device is virtual.
     """
     contract = _OnBench(bench, output_log)
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]

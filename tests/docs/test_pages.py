@@ -48,6 +48,10 @@ NOT_RUN = {
     ("docs/how-to/compare-ways-to-run.md", "takes a minute by the clock"),
     ("docs/how-to/swap-in-a-driver.md", "needs the device"),
     ("docs/how-to/build-a-device.md", "needs the device"),
+    (
+        "docs/how-to/write-a-board.md",
+        "take a quarter of an hour to an hour; tests/firmware/test_checks.py and test_differential.py run shorter forms",
+    ),
     ("docs/how-to/write-a-board.md", "a test compiles the board above with these options"),
     ("docs/how-to/test-my-bench-with-pytest.md", "takes half a minute each; tests/hardware runs the same"),
     ("docs/how-to/try-the-firmware.md", "runs until Ctrl-C"),
