@@ -1,6 +1,5 @@
 """The contract without pytest: every test once over an installed driver, with what came out."""
 
-import contextlib
 import inspect
 from collections.abc import Iterator
 from contextlib import suppress
@@ -90,7 +89,7 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
 
 def _clear(contract: DriverContract) -> None:
     """Clear what has latched in the device."""
-    with contextlib.suppress(DaqError), contract.make() as daq:
+    with suppress(DaqError), contract.make() as daq:
         daq.clear()
 
 
