@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from enum import Enum
 from types import TracebackType
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -21,7 +21,7 @@ from rig.bench.configuration import Configured
 from rig.errors import DaqError, DaqRefused, RigError, as_daq_error
 from vibrolock.compiled import bound, kernel
 
-__all__ = ["DAQ", "HELD", "LOST", "Capabilities", "Channel", "Role", "State", "flag_names"]
+__all__ = ["DAQ", "HELD", "LOST", "Adjustable", "Capabilities", "Channel", "Role", "State", "flag_names"]
 
 LOST = 1 << 15
 """Bit of `DAQ.flags`: the sample was lost in transfer; its inputs are NaN."""
@@ -48,6 +48,26 @@ class Capabilities(Configured):
     safe_without_host: bool = False
     """Whether the output comes to 0 V by the device's own means when the host's process is killed. The conformance suite
     kills one; where it is false, a person arms, or a hardware emergency stop is declared."""
+
+
+class Adjustable(NamedTuple):
+    """What a driver's options set against outputs that come too late, and how far; for ``rig doctor --daq``.
+
+    A driver that has them names its options ``queue_blocks`` and ``watchdog_s``.
+    """
+
+    watchdog_s: float
+    """Watchdog that is in force with the present options, s."""
+    largest_queue: int
+    """Longest queue of driver and device, blocks."""
+    watchdog_range_s: tuple[float, float]
+    """Shortest and longest watchdog that driver and device allow, s."""
+    rate_range_hz: tuple[float, float]
+    """Lowest and highest sample rate of the device, Hz."""
+    wire_share: dict[int, float]
+    """Part of the wire's capacity that the stream takes at the bench's sample rate, by samples a block; 0 without a limit."""
+    largest_wire_share: float
+    """Part of the wire's capacity that a stream may take."""
 
 
 class State(Enum):
@@ -161,6 +181,11 @@ class DAQ(ABC):
 
     def clear(self) -> None:  # noqa: B027 (most devices latch nothing)
         """Reset the conditions in `latched`, but none that latched later; only for an armed run."""
+
+    @property
+    def adjustable(self) -> Adjustable | None:
+        """What the driver's options set against late outputs; known once open, None where there is nothing to set."""
+        return None
 
     @property
     def identity(self) -> dict[str, str]:

@@ -1,34 +1,163 @@
-"""``rig doctor``: what this machine and a bench's device can promise."""
+"""``rig doctor``: what this machine and a bench's device can promise, which settings hold, and all ways to run side by side."""
 
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rig.cli.options import Json
 
+if TYPE_CHECKING:
+    from rig.bench import Bench
+
 __all__ = ["doctor"]
+
+UNITS = {"block": "samples", "queue_blocks": "blocks", "watchdog_s": "s", "largest_rate_hz": "Hz"}
+MATRIX_BENCH = "magnet-beam"
 
 
 def doctor(
+    others: Annotated[
+        list[Path] | None,
+        typer.Argument(help="With --matrix: files of rows that others have measured, to be shown too."),
+    ] = None,
     daq: Annotated[
         str | None, typer.Option(help="Bench whose device to look at: a name or TOML file. It is given 0 V only.")
     ] = None,
+    seconds: Annotated[
+        float,
+        typer.Option(help="With --daq: for how long to measure before settings are recommended.", min=0.5, max=600),
+    ] = 1.5,
+    matrix: Annotated[
+        bool, typer.Option("--matrix", help="Measure every way to run without a rig, side by side; half a minute.")
+    ] = False,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="With --matrix: also run the conformance suite over each; two minutes.")
+    ] = False,
+    firmware: Annotated[
+        list[Path] | None,
+        typer.Option(help="With --matrix: firmware to measure as well, built for this machine or for ARM (QEMU)."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File for the rows that were measured: TOML or JSON.")
+    ] = None,
     json: Json = False,
 ) -> None:
-    """What this machine can promise: clock, privileges, disk, drivers; with --daq, what a bench's device answers."""
+    """What this machine can promise: clock, privileges, disk, drivers; with --daq, what a bench's device answers.
+
+    With --daq it also recommends block, queue, watchdog and the largest sample rate, and says whether they held when tried.
+    """
+    from rig.loop.doctor import examine
+
+    _check_options(daq, matrix, [*(others or ()), *(firmware or ()), *([Path("--verify")] if verify else ())], output)
+    device = None if daq is None else _examined(daq, seconds)
+    if matrix:
+        _matrix(device, others or [], firmware or [], verify, output, json)
+        return
+    if device is not None and output is not None:
+        from rig.matrix import write_rows
+        from rig.matrix.measuring import device_row
+
+        write_rows(output, [device_row(*device)])
+    _show(device[1] if device else examine(Path.cwd()), json)
+
+
+def _examined(daq: str, seconds: float) -> tuple["Bench", dict[str, Any]]:
+    """Return a bench, and what was found of its device."""
     from rig.bench import load_bench
-    from rig.loop.doctor import examine, examine_bench
+    from rig.loop.doctor import examine_bench
+
+    bench = load_bench(daq)
+    return bench, examine_bench(bench, seconds=seconds)
+
+
+def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], output: Path | None) -> None:
+    """Refuse options that would have no effect."""
+    from rig.errors import ConfigurationError
+
+    if of_the_matrix and not matrix:
+        raise ConfigurationError(f"{of_the_matrix[0]}: allowed with --matrix alone")
+    if output is not None and not (matrix or daq is not None):
+        raise ConfigurationError(f"-o {output}: allowed with --matrix or --daq")
+    if output is not None and output.suffix not in (".toml", ".json"):
+        raise ConfigurationError(f"-o {output}: allowed is a file .toml or .json")
+
+
+def _matrix(
+    device: tuple["Bench", dict[str, Any]] | None,
+    others: list[Path],
+    firmware: list[Path],
+    verify: bool,
+    output: Path | None,
+    json: bool,
+) -> None:
+    """Measure every way, and show it with what others have measured; ``device``: a bench and what was found of its device."""
+    from rig.bench import load_bench
+    from rig.matrix import read_rows, write_rows
+    from rig.matrix.measuring import device_row, matrix_rows
+    from rig.matrix.table import print_matrix
+    from rig.text.console import print_json
+
+    theirs = [row for path in others for row in read_rows(path)]
+    rows = [] if device is None else [device_row(*device)]
+    for row in matrix_rows(load_bench(MATRIX_BENCH), firmware, verify=verify):
+        rows.append(row)
+        print(f"measured: {row.way}", file=sys.stderr, flush=True)
+    if output is not None:
+        write_rows(output, rows)
+    if json:
+        print_json({"row": [row.model_dump(mode="json", exclude_none=True) for row in [*rows, *theirs]]})
+    else:
+        print_matrix([*rows, *theirs])
+
+
+def _show(facts: dict[str, Any], json: bool) -> None:
+    """Print what was found of this machine, or of a device."""
     from rig.text.console import print_json
     from rig.text.printable import printable_strings
 
-    facts = examine(Path.cwd()) if daq is None else examine_bench(load_bench(daq))
     if json:
         print_json(facts)
     else:
-        for name, value in printable_strings(facts).items():
-            text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
-            text = "; ".join(value) or "none" if isinstance(value, list) else text
-            print(f"{name.replace('_', ' '):22} {text}")
+        advice = facts.get("recommendation")
+        for name, value in printable_strings({key: facts[key] for key in facts if key != "recommendation"}).items():
+            _print(name, value)
+        if advice is not None:
+            _print_advice(printable_strings(advice))
     if facts.get("failure"):
         raise typer.Exit(1)
+
+
+def _print(name: str, value: Any) -> None:
+    text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
+    text = "; ".join(value) or "none" if isinstance(value, list) else text
+    print(f"{name.replace('_', ' '):22} {text}")
+
+
+def _print_advice(advice: Mapping[str, Any]) -> None:
+    """Print the recommended settings, each with its reason, what was tried, and lines for the bench file."""
+    print("\nrecommended")
+    settings, reasons = advice["settings"], advice["reasons"]
+    for name in (*settings, *(name for name in reasons if name not in settings)):
+        value = f"{settings[name]:g} {UNITS[name]}" if name in settings else "as it is"
+        print(f"  {name.replace('_', ' '):20} {value:14} {reasons.get(name, '')}")
+    if "delay_s" in advice:
+        print(f"  {'delay of the loop':20} {1e3 * advice['delay_s']:.3g} ms")
+    for told in advice["tried"]:
+        print(f"  {'tried, at 0 V':20} {_tried(told)}")
+    if advice.get("bench_lines"):
+        print("\nfor the bench file\n" + "\n".join(f"  {line}".rstrip() for line in advice["bench_lines"]))
+
+
+def _tried(told: Mapping[str, Any]) -> str:
+    """Return one line on settings that were tried."""
+    names = ("block", "queue_blocks", "watchdog_s", "sample_rate_hz")
+    what = ", ".join(f"{name} {told[name]:g}" for name in names if name in told)
+    if told.get("latched") or told.get("failure"):
+        return f"{what}: {told.get('latched') or told['failure']}"
+    return (
+        f"{what}: {told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost, "
+        f"{told['reached_hz']:g} Hz reached"
+    )

@@ -12,7 +12,7 @@ from rig.conformance.contract import DriverContract
 from rig.conformance.loopback import with_loopback
 from rig.conformance.subject import NotApplicable
 from rig.conformance.timing import SLOW_TEST
-from rig.conformance.ways_out import last_output_v
+from rig.conformance.ways_out import KILLING_TEST, last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import DaqError, NotArmed
@@ -56,7 +56,7 @@ class _OnBench(DriverContract):
 def require_arming(bench: Bench, arm: bool) -> None:
     """Raise `NotArmed` where something physical would move and nobody has said that it may; opens the device to ask it.
 
-    What it has latched until then is cleared; what latches from then on stays so.
+    What it has latched until then is cleared; what latches from then on stays so, but for what `check_driver` makes latch.
     """
     with make_daq(bench) as daq:
         if not daq.capabilities.virtual and not arm:
@@ -71,17 +71,26 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     """Every test of the contract over the bench's driver, one after the other. Nothing is asked about arming here.
 
     ``output_log``: where the device is an emulator that writes its outputs down (``rig emulate --log-output``), that file.
-    A driver that is too slow for any test is not tested further, for it would take hours.
+    A driver that is too slow for any test is not tested further, for it would take hours. The watchdog that latches because a
+    test kills the host is cleared after that test, and what a failure has left latched where the device is virtual.
     """
     contract = _OnBench(bench, output_log)
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
     slow = False
     for name in sorted(names, key=lambda name: name != SLOW_TEST):
         found = _found(contract, name) if not slow else _left_out(contract, name)
-        if found.outcome == "failed":
-            _clear_if_virtual(bench)
         yield found
+        _clear_after(found, name, contract)
         slow = slow or (name == SLOW_TEST and found.outcome == "failed")
+
+
+def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
+    """Clear the watchdog that a test makes latch, or that a failure has left latched where nothing moves."""
+    if name != KILLING_TEST and found.outcome != "failed":
+        return
+    with suppress(DaqError), contract.make() as daq:
+        if name == KILLING_TEST or daq.capabilities.virtual:
+            daq.clear()
 
 
 def _found(contract: DriverContract, name: str) -> Finding:
@@ -93,13 +102,6 @@ def _found(contract: DriverContract, name: str) -> Finding:
     except Exception as error:  # a driver may fail in any way: that is what is looked for
         return Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
     return Finding(words, duty, "passed")
-
-
-def _clear_if_virtual(bench: Bench) -> None:
-    """Clear what a test that failed has left latched, or all that follow fail as well; never where something moves."""
-    with suppress(DaqError), make_daq(bench) as daq:
-        if daq.capabilities.virtual:
-            daq.clear()
 
 
 def _left_out(contract: DriverContract, name: str) -> Finding:

@@ -16,7 +16,9 @@ from rig.conformance.subject import DriverUnderTest
 from rig.daq import DAQ, State
 from rig.errors import DaqError
 
-__all__ = ["WaysOutTests", "last_output_v"]
+__all__ = ["KILLING_TEST", "WaysOutTests", "last_output_v"]
+
+KILLING_TEST = "test_the_output_comes_to_0_v_without_the_host"
 
 STILL = 0.1  # of the amplitude: an output below it counts as 0 V
 LOOKS_S = 0.02

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 
 from rig.emulator.faults import Faults, FaultySender
-from rig.emulator.parameters import Parameters, Words
+from rig.emulator.parameters import Parameters, Words, carried
 from rig.emulator.plant import Plant
 from rig.emulator.sampling import Sampling
 from rig.emulator.states import Life
@@ -48,7 +48,7 @@ class Device:
         self.faults = faults or Faults()
         self.counts: Counter[str] = Counter()
         """Counts of events since the device was switched on."""
-        self._parameters = Parameters(words, self.faults)
+        self._parameters = Parameters(carried(words, plant, link), self.faults)
         self._sampling = Sampling(plant, lockstep=lockstep)
         self._life = Life(self._sampling, self._parameters, self.counts, self._beat)
         self._sender = FaultySender(link, self.faults)
@@ -79,6 +79,16 @@ class Device:
         return self._sampling.output_v
 
     @property
+    def is_sampling(self) -> bool:
+        """Whether it samples."""
+        return self._sampling.on
+
+    @property
+    def due_s(self) -> float:
+        """When the block under way will be complete; never while it does not sample, or in lockstep."""
+        return self._sampling.due_s
+
+    @property
     def wake_s(self) -> float:
         """Time by which `advance` must be called."""
         life, sender = self._life, self._sender
@@ -88,8 +98,7 @@ class Device:
         """Carry out a message."""
         if now_s >= self._deaf_s:
             return
-        self._mind_a_stall(now_s)
-        self._life.watch(now_s)
+        self._catch_up(now_s)
         if isinstance(message, Output):
             self._take_output(message, now_s)
         elif isinstance(message, Request):
@@ -120,7 +129,7 @@ class Device:
     def _carry_out(self, request: Request, now_s: float) -> tuple[Status, int]:
         life, parameters = self._life, self._parameters
         match request.command:
-            case Command.GET if request.parameter == Parameter.STATE:
+            case Command.GET if request.parameter == Parameter.STATE and request.item == 0:
                 return Status.DONE, int(life.state)
             case Command.GET:
                 return parameters.get(request.parameter, request.item)
@@ -157,13 +166,26 @@ class Device:
         """Press the device's own emergency stop, also from a signal handler; it acts at the next `advance`."""
         self._pressed = True
 
+    def set_emergency_stop(self, pressed: bool, now_s: float) -> None:
+        """Press or release an emergency stop that stays as it is."""
+        self._catch_up(now_s)
+        self._life.is_pressed = pressed
+        self._mind_the_switch(now_s)
+
+    def _mind_the_switch(self, now_s: float) -> None:
+        life = self._life
+        if self._pressed or (life.is_pressed and not life.latch & DeviceFlag.EMERGENCY_STOP):
+            self._pressed = False
+            life.emergency_stop(now_s)
+
     def switch_off(self, now_s: float) -> None:
         """Switch off: output to 0 V."""
         self._life.stop(now_s)
 
-    def _reset(self, now_s: float) -> None:
+    def reset(self, now_s: float) -> None:
         """Restart the device, as after a loss of supply."""
-        self._life.begin_anew(now_s)
+        self._life.begin_anew()
+        self._parameters.begin_anew()
         self.words[Parameter.BOOT, 0] = (self.words[Parameter.BOOT, 0] + 1) & 0xFFFFFFFF
         self._last = None
         self._reset_s = math.inf
@@ -171,18 +193,22 @@ class Device:
 
     def advance(self, now_s: float) -> None:
         """Measure and send blocks that are due, check the watchdog, send heartbeats."""
-        if self._pressed:
-            self._pressed = False
-            self._life.emergency_stop(now_s)
+        self._mind_the_switch(now_s)
         if now_s >= self._reset_s:
-            self._reset(now_s)
-        self._mind_a_stall(now_s)
-        self._life.watch(now_s)
+            self.reset(now_s)
+        self._catch_up(now_s)
         while self._sampling.is_due(now_s):
             self._measure(now_s)
         if now_s >= self._beat_s + BEAT_S:
             self._beat(now_s)
         self._sender.flush(now_s)
+
+    def _catch_up(self, now_s: float) -> None:
+        """Measure the blocks that were complete before a time, and before the watchdog bit; check the watchdog."""
+        self._mind_a_stall(now_s)
+        while self._sampling.due_s < min(now_s, self._life.bites_s):
+            self._measure(now_s)
+        self._life.watch(now_s)
 
     def _mind_a_stall(self, now_s: float) -> None:
         if now_s <= self._sampling.due_s:
@@ -196,7 +222,7 @@ class Device:
     def _measure(self, now_s: float) -> None:
         flags = self._life.latch
         first, readings, seen, held = self._sampling.measure()
-        if held and self.state is DeviceState.ARMED:
+        if held:
             flags |= DeviceFlag.OUTPUT_HELD
             self.counts["held_blocks"] += 1
         if self.faults.channels_sent is not None:

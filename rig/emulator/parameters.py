@@ -2,10 +2,11 @@
 
 from rig.emulator.faults import Faults
 from rig.emulator.plant import Plant
+from rig.wire.link import Link
 from rig.wire.messages import VERSION, Parameter, Status
 from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_words
 
-__all__ = ["SETTINGS", "Parameters", "Words", "described"]
+__all__ = ["SETTINGS", "Parameters", "Words", "carried", "described"]
 
 Words = dict[tuple[int, int], int]
 """Words by parameter and item."""
@@ -79,6 +80,12 @@ def described(
     return words
 
 
+def carried(words: Words, plant: Plant, link: Link) -> Words:
+    """The words of a device whose blocks are no larger than its wire carries."""
+    carried_block = link.largest_block_of(len(plant.names), plant.bits)
+    return {**words, (Parameter.LARGEST_BLOCK, 0): min(words[Parameter.LARGEST_BLOCK, 0], carried_block)}
+
+
 class Parameters:
     """The words of a device as it reports them, with those that ``faults`` falsify."""
 
@@ -90,6 +97,11 @@ class Parameters:
         for channel, name in enumerate(faults.channel_names or ()):
             for number, word in enumerate(text_words(name)):
                 self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word
+        self._settings = {(int(one), 0): self.words[one, 0] for one in SETTINGS}
+
+    def begin_anew(self) -> None:
+        """Forget what was set."""
+        self.words.update(self._settings)
 
     def value(self, parameter: Parameter) -> int:
         """The value of a parameter in force."""

@@ -14,7 +14,8 @@ __all__ = ["Life"]
 class Life:
     """States and the transitions between them.
 
-    ``changed`` is called with the time at every change of state. Commands return the status and value of their answer.
+    ``changed`` is called with the time at every change of the state or of what has latched. Commands return the status and
+    value of their answer.
     """
 
     def __init__(
@@ -24,6 +25,8 @@ class Life:
         self.state = DeviceState.IDLE
         self.latch = 0
         """What has latched, as `DeviceFlag`."""
+        self.is_pressed = False
+        """Whether the device's own emergency stop is pressed and stays so."""
         self._fed_s = math.inf
         self._watchdog_s = 1.0
 
@@ -36,7 +39,6 @@ class Life:
         """Note a valid output. One that is entirely late reaches no converter, so it does not feed the watchdog."""
         if self.state is DeviceState.ARMED:
             self._fed_s = now_s if in_time else self._fed_s
-            self._sampling.has_output = True
 
     def stand_still(self, late_s: float) -> None:
         """Extend the watchdog by a time for which the device clock stood still."""
@@ -47,8 +49,8 @@ class Life:
         bites_s = self.bites_s
         if now_s >= bites_s and self.state is DeviceState.ARMED:
             self._counts["watchdog_trips"] += 1
-            self.latch |= DeviceFlag.WATCHDOG
-            self._bring_down(bites_s, DeviceState.LATCHED, 1e-6 * self._parameters.value(Parameter.RAMP_US))
+            ramp_s = 1e-6 * self._parameters.value(Parameter.RAMP_US)
+            self._bring_down(bites_s, DeviceState.LATCHED, ramp_s, DeviceFlag.WATCHDOG)
 
     def start(self, now_s: float) -> tuple[Status, int]:
         """Begin to sample with the present settings."""
@@ -77,9 +79,11 @@ class Life:
         return Status.DONE, 0
 
     def disarm(self, now_s: float) -> tuple[Status, int]:
-        """Set the output to 0 V at once; sampling continues."""
+        """Set the output to 0 V at once, also from the watchdog's ramp; sampling continues."""
         if self.state is DeviceState.ARMED:
             self._bring_down(now_s, DeviceState.RUNNING)
+        elif self._sampling.is_ramping:
+            self._bring_down(now_s, self.state)
         return Status.DONE, int(self.state)
 
     def stop(self, now_s: float) -> tuple[Status, int]:
@@ -91,33 +95,33 @@ class Life:
         return Status.DONE, int(self.state)
 
     def clear(self, now_s: float) -> tuple[Status, int]:
-        """Clear latched flags."""
+        """Clear latched flags, unless the emergency stop is still pressed."""
         if self._sampling.on:
             return Status.WRONG_STATE, int(self.state)
-        self.latch = 0
-        self._become(DeviceState.IDLE, now_s)
-        return Status.DONE, 0
+        if self.latch and self.is_pressed:
+            return Status.LATCHED, self.latch
+        self._become(DeviceState.IDLE, now_s, latch=0)
+        return Status.DONE, int(self.state)
 
     def emergency_stop(self, now_s: float) -> None:
         """Set the output to 0 V at once, and latch."""
         self._counts["emergency_stops"] += 1
-        self.latch |= DeviceFlag.EMERGENCY_STOP
-        self._bring_down(now_s, DeviceState.LATCHED)
+        self._bring_down(now_s, DeviceState.LATCHED, flag=DeviceFlag.EMERGENCY_STOP)
 
-    def begin_anew(self, now_s: float) -> None:
-        """Reset, as after a loss of supply."""
-        self.stop(now_s)
-        self.latch = 0
-        self.state = DeviceState.IDLE
+    def begin_anew(self) -> None:
+        """Reset, as after a loss of supply: nobody is told of it."""
+        self._sampling.stop()
         self._sampling.measured = 0
+        self._fed_s = math.inf
+        self.state, self.latch = DeviceState.IDLE, 0
 
-    def _become(self, state: DeviceState, now_s: float) -> None:
-        changed = state is not self.state
-        self.state = state
-        if changed:
+    def _become(self, state: DeviceState, now_s: float, latch: int | None = None) -> None:
+        before = self.state, self.latch
+        self.state, self.latch = state, self.latch if latch is None else latch
+        if (self.state, self.latch) != before:
             self._changed(now_s)
 
-    def _bring_down(self, at_s: float, state: DeviceState, ramp_s: float = 0.0) -> None:
+    def _bring_down(self, at_s: float, state: DeviceState, ramp_s: float = 0.0, flag: int = 0) -> None:
         self._sampling.bring_down(at_s, ramp_s)
         self._fed_s = math.inf
-        self._become(state, at_s)
+        self._become(state, at_s, self.latch | flag)

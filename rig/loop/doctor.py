@@ -10,10 +10,11 @@ from typing import Any
 from rig.bench import Bench
 from rig.errors import RigError
 
-__all__ = ["examine", "examine_bench"]
+__all__ = ["examine", "examine_bench", "measure_bench"]
 
 RATE_HZ = 1000.0
 SECONDS = 1.0
+MEASURED_S = 1.5  # of a device, before settings are recommended and tried
 
 
 def examine(folder: Path) -> dict[str, Any]:
@@ -48,17 +49,28 @@ def examine(folder: Path) -> dict[str, Any]:
     }
 
 
-def examine_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:
-    """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the statistics; nothing is driven.
+def examine_bench(bench: Bench, seed: int = 0, seconds: float = MEASURED_S) -> dict[str, Any]:
+    """Exchange 0 V with a bench's device; return timing, measured for some ``seconds``, and recommended settings, tried.
+
+    What is done and returned: `rig.loop.worker.examination.examine_device`. Nothing is driven.
+
+    Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the device cannot be opened.
+    """
+    from rig.loop.worker.examination import examine_device
+    from rig.loop.worker.spawn import ask, supported
+
+    return dict(ask("examination", bench, seed, seconds)) if supported() else examine_device(bench, seed, seconds)
+
+
+def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:
+    """Exchange 0 V with a bench's device as the bench has it for some seconds; return the timing. Nothing is driven.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the device cannot be opened.
     """
     from rig.loop.worker.probe import round_trips
     from rig.loop.worker.spawn import ask, supported
 
-    if supported():
-        return dict(ask("round trips", bench, seed, seconds))
-    return round_trips(bench, seed, seconds)
+    return dict(ask("round trips", bench, seed, seconds)) if supported() else round_trips(bench, seed, seconds)
 
 
 def _probed(*, privileged: bool) -> dict[str, Any]:

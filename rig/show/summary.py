@@ -5,6 +5,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from rig.campaigns.evaluation.device_faults import pages_on
 from rig.campaigns.evaluation.drift import drift_of
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
@@ -114,7 +115,9 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
 
 def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[Any]]) -> list[str]:
     """Return the names of what ended the run early or spoilt points, by which the documentation explains them."""
-    names = [*(end["reason"] for end in ends[-1:]), *(str(point.quality) for point in points if not point.accepted)]
+    failed = [point for point in points if not point.accepted]
+    names = [*(end["reason"] for end in ends[-1:]), *(page for point in failed for page in pages_on(point.reason))]
+    names += [str(point.quality) for point in failed]
     return list(dict.fromkeys(page_of(name) for name in names if page_of(name) not in UNEXPLAINED))
 
 

@@ -64,6 +64,11 @@ class Link(ABC):
         """Largest number of samples in a block on this wire."""
         return 1 << 16
 
+    def largest_block_of(self, n_channels: int, bits: int) -> int:
+        """Largest number of samples in a block of so many channels and so many bits a count."""
+        del n_channels, bits  # which the largest block of most wires does not depend on
+        return self.largest_block
+
     @property
     def layout_crc(self) -> int:
         """CRC-32 of the definition that both ends must share; 0 if the wire has none."""

@@ -33,7 +33,7 @@ VERSION = 1
 """Version of the protocol that this package speaks."""
 
 HEARTBEATS_HZ = 10
-"""Heartbeats per second; every change of state sends a further one."""
+"""Heartbeats per second; every change of state or of what has latched sends a further one."""
 
 
 class Command(IntEnum):
@@ -211,7 +211,7 @@ class Output(NamedTuple):
 
 
 class Heartbeat(NamedTuple):
-    """Device to host, ten times a second and at every change of state."""
+    """Device to host, ten times a second and at every change of state or of what has latched."""
 
     state: int
     """`DeviceState`."""

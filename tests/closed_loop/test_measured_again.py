@@ -1,7 +1,8 @@
 """Points refused for something that passes are measured again; what does not pass is not tried again."""
 
 import json
-from contextlib import contextmanager
+import re
+from contextlib import ExitStack, contextmanager
 from functools import partial
 
 import numpy as np
@@ -106,6 +107,27 @@ def test_a_disturbance_that_never_passes_ends_refused_and_says_how_often_it_was_
         assert point.attempts == 4
         assert point.reason.endswith("; refused in 4 attempts")
     assert skipped.startswith("2 of 2 points skipped")
+
+
+@pytest.mark.parametrize("wire", [None, "serial"])
+def test_a_point_whose_held_outputs_break_the_settle_rule_says_that_they_were_held(wire):
+    """Outputs are held for half a second, so long that the phase is off for as many periods as the rule averages."""
+    plan = backbone_with(levels_v=(0.5, 0.8), retries=0, record_periods=100)
+    faults = {"held_per_s": 0.7, "held_s": 0.5}
+    with ExitStack() as stack:
+        bench = late_bench(faults)
+        if wire is not None:
+            bench = stack.enter_context(emulated(bench, wire, lockstep=True, options={"queue_blocks": 2}))
+        run = stack.enter_context(rig.run(plan, bench=bench))
+        points = points_of(run.recording)
+        shown = summarise_recording(run.recording)["messages"]
+    assert points
+    for point in points:
+        assert not point.accepted
+        assert re.search(r"outputs came too late: held in [1-9]\d* samples of \d+, `rig doctor --daq`", point.reason)
+        assert "settle rule" not in point.reason
+    assert Quality.DISTURBED in {point.quality for point in points}
+    assert "held-outputs" in shown
 
 
 def test_what_has_not_settled_is_not_tried_again():

@@ -46,7 +46,9 @@ def _is_there(name: str) -> bool:
     if name != "newlib":
         return shutil.which(name) is not None
     command = ["arm-none-eabi-gcc", "-print-file-name=nosys.specs"]  # the bare name where it has none
-    return _is_there(command[0]) and os.sep in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return (
+        _is_there(command[0]) and os.sep in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    )
 
 
 def need(*programs: str) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from identification import Channel, PeriodicVibration, nonlinear_mode
 from identification.signals.fourier import vibration_in
 from rig.bench import Bench
+from rig.campaigns.evaluation.device_faults import DISTURBED, faults_text, why_disturbed
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.rows import Rows, phases
@@ -39,13 +40,16 @@ VOLTAGE = Channel("voltage", "monitor", "V")
 
 WHY = {
     Outcome.NOT_SETTLED: "not settled within {longest:g} periods",
-    Outcome.DISTURBED: "the settle rule was broken while recording",
+    Outcome.DISTURBED: DISTURBED,
     Outcome.LOST_LOCK: "phase lock lost",
     Outcome.UNREACHABLE: "out of reach: the output stood at its voltage limit",
     Outcome.OUTSIDE_WINDOW: "the frequency stood at an end of its window: another mode, or a resonance outside",
     Outcome.NOT_LOCKED: "the phase error stayed that of a lost lock",
     Outcome.INTERRUPTED: "interrupted",
 }
+
+SPOILT_BY_THE_DEVICE = {Outcome.NOT_SETTLED, Outcome.LOST_LOCK, Outcome.NOT_LOCKED, Outcome.OUTSIDE_WINDOW}
+"""Outcomes that held outputs or lost samples may explain."""
 
 POLARITY_DEG = 60.0  # a larger phase error does not come from a settling time that is too short
 FEW_BITS = 20.0  # below this, quantisation may change the damping by a percent unless noise dithers it
@@ -59,13 +63,19 @@ def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -
 def failed_point(
     plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
 ) -> Point[Any]:
-    """Return a point that was not measured, with the reason.
+    """Return a point that was not measured, with the reason: held outputs and lost samples before anything else.
 
     ``at_start``: no lock was gained at the start voltage. ``locked``: a lock had been gained before, so the polarity is right.
     """
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
+    held, lost = int(outcome["held"]), int(outcome["lost"])
+    samples = int(outcome["end_sample"]) - int(outcome["first_sample"])
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
+    if code is Outcome.DISTURBED:
+        why = why_disturbed(held, lost, samples)
+    elif code in SPOILT_BY_THE_DEVICE and (said := faults_text(held, lost, samples)):
+        why = f"{why}; {said}"
     if at_start:
         why = f"no lock at the start voltage: {why}"
     if target.frequency_hz is not None:

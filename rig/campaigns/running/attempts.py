@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.campaigns.evaluation.device_faults import faults_text, why_disturbed
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.tick.sequencer.layout import RING, Drive, Outcome
@@ -65,13 +66,11 @@ def _reason(entry: np.void, plays: bool) -> str:
     """Return why a record was refused."""
     samples = int(entry["end_sample"]) - int(entry["first_sample"])
     held, lost = int(entry["held"]), int(entry["lost"])
-    told = [f"outputs came too late: held in {held} samples"] if held else []
-    told += [f"{lost} of {samples} samples were lost on their way"] if lost else []
     if int(entry["outcome"]) != Outcome.DISTURBED:
-        return ", ".join(told)
+        return faults_text(held, lost, samples, final=False)
     error_deg, drift = math.degrees(float(entry["mean_error_rad"])), 100.0 * float(entry["drift"])
     course = f" (averaged phase error {error_deg:.2f} deg, amplitude drift {drift:.3g} %)" if not plays else ""
-    return "; ".join([f"the settle rule was broken while recording{course}", *told])
+    return why_disturbed(held, lost, samples, course, final=False)
 
 
 def attempt_at(point: Point[Any]) -> Attempt:

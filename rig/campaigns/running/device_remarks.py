@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rig.campaigns.evaluation.device_faults import faults_text
 from rig.campaigns.evaluation.lost_samples import lost_rows, lost_warnings
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows, stretches
@@ -21,7 +22,7 @@ def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) 
     """Add to a point the number of its lost samples, and a warning for each flag raised while it was recorded.
 
     ``counters`` are those of the driver. A point is not accepted if the device held more than 5 % of its outputs because they
-    came too late.
+    came too late. A point that was refused for another reason, and had outputs held, says that first.
     """
     names = flag_names(counters)
     counts, lost = dict.fromkeys(names, 0), 0
@@ -34,6 +35,9 @@ def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) 
         name: f"{name.replace('_', ' ')} in {count} of {rows.size} samples" for name, count in counts.items() if count
     }
     out = replace(point, lost_samples=lost).warned(*lost_warnings(lost, rows.size), *said.values())
-    if counts.get(HELD, 0) > LARGEST_HELD * rows.size and point.accepted:
-        return out.refused(f"outputs came too late: {said[HELD]}, allowed is {LARGEST_HELD:.0%}")
+    held = counts.get(HELD, 0)
+    if held > LARGEST_HELD * rows.size and point.accepted:
+        return out.refused(f"{faults_text(held, 0, rows.size)}; allowed is {LARGEST_HELD:.0%}")
+    if held and not point.accepted:
+        return replace(out, reason=f"{faults_text(held, 0, rows.size)}; {point.reason}")
     return out

@@ -251,7 +251,8 @@ class Execution:
         first = self._point_begins(first)
         if first > 0 and not settled:
             first = self._point_begins(first - 1)
-        return int(self.tick.outcomes["faults"][first:end].sum())
+        outcomes = self.tick.outcomes[first:end]
+        return int(outcomes["held"].sum() + outcomes["lost"].sum())
 
     def _measured(self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
         """Evaluate the points in rows that begin with sample ``first``.

@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from rig.bench import Bench
-from rig.daq import DAQ, Capabilities
-from rig.drivers.wire.connection import Connection
+from rig.daq import DAQ, Adjustable, Capabilities
+from rig.drivers.wire.connection import MOST_LOAD, Connection
 from rig.drivers.wire.dialogue import latched_text
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
-from rig.drivers.wire.options import WireOptions, raised_remark
+from rig.drivers.wire.options import LARGEST_QUEUE, WireOptions, raised_remark, watchdog_range_s, watchdog_s
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
@@ -20,6 +20,7 @@ from rig.wire.messages import EmergencyStop, Stream
 __all__ = ["WireDAQ"]
 
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
+BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # of which the load of the wire is told
 LARGEST_UNKNOWN_BLOCK = 65536  # before the device has been asked
 
 
@@ -118,6 +119,28 @@ class WireDAQ(DAQ):
             self._connection.clear()
 
     @property
+    def adjustable(self) -> Adjustable | None:
+        """Queue, watchdog and rates that driver and device allow, and the load of the wire by blocks of several sizes."""
+        connection, facts, bench = self._connection, self._facts, self._bench
+        if connection is None or facts is None:
+            return None
+        block_s = bench.block / bench.sample_rate_hz
+        largest = self.capabilities.largest_block
+        queue = self._options.queue_blocks
+        shares = {}
+        for block in sorted({bench.block, *(size for size in BLOCKS if size <= largest)}):
+            stream = Stream(len(bench.channels), block, bench.sample_rate_hz, facts.bits, queue)
+            shares[block] = connection.link.load(stream).share
+        return Adjustable(
+            watchdog_s=watchdog_s(self._options, facts, block_s),
+            largest_queue=min(LARGEST_QUEUE, facts.largest_queue),
+            watchdog_range_s=watchdog_range_s(facts, block_s),
+            rate_range_hz=facts.rate_hz,
+            wire_share=shares,
+            largest_wire_share=MOST_LOAD,
+        )
+
+    @property
     def statistics(self) -> dict[str, float]:
         """Round trips of pings, load of the wire, and the highest sample rate that the wire would carry."""
         connection = self._connection
@@ -142,14 +165,13 @@ class WireDAQ(DAQ):
         return out
 
     def _open(self) -> None:
-        link = self._make_link()
-        link.open()
-        self._connection = Connection(link, self.clock)
-        self._streaming = None
+        connection = Connection(self._make_link(), self.clock)
         try:
-            self._connection.meet(self._bench, self._options.queue_blocks)
+            connection.link.open()
+            self._connection, self._streaming = connection, None
+            connection.meet(self._bench, self._options.queue_blocks)
         except BaseException:
-            self._connection.let_go()
+            connection.let_go()  # also a port whose adapter did not answer
             raise
 
     def _start(self) -> None:

@@ -6,22 +6,23 @@ from rig.bench.configuration import Configured
 from rig.drivers.wire.facts import DeviceFacts
 from rig.errors import DaqRefused
 
-__all__ = ["WireOptions", "raised_remark", "watchdog_s"]
+__all__ = ["LARGEST_QUEUE", "WireOptions", "raised_remark", "watchdog_range_s", "watchdog_s"]
 
-LONGEST_S = 4000.0  # microseconds in an unsigned word of four bytes
+LARGEST_QUEUE = 64
+MOST_S = 4000.0  # microseconds in an unsigned word of four bytes
 
 
 class WireOptions(Configured):
     """Options that all wires share; each driver adds those that locate the device."""
 
-    queue_blocks: int = Field(1, ge=1, le=64)
+    queue_blocks: int = Field(1, ge=1, le=LARGEST_QUEUE)
     """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop."""
-    watchdog_s: float | None = Field(None, gt=0, le=LONGEST_S)
+    watchdog_s: float | None = Field(None, gt=0, le=MOST_S)
     """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s or 4 blocks, or the shortest
     that the device can do, whichever is longest. Where something moves, at most 1 s, or 10 blocks if longer."""
-    ramp_s: float = Field(0.05, ge=0, le=LONGEST_S)
+    ramp_s: float = Field(0.05, ge=0, le=MOST_S)
     """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
-    timeout_s: float | None = Field(None, gt=0, le=LONGEST_S)
+    timeout_s: float | None = Field(None, gt=0, le=MOST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
 
 
@@ -34,13 +35,23 @@ def _default_s(block_s: float) -> float:
     return max(DEFAULT_S, DEFAULT_BLOCKS * block_s)
 
 
+def _longest_s(block_s: float) -> float:
+    return max(LONGEST_S, LONGEST_BLOCKS * block_s)
+
+
+def watchdog_range_s(facts: DeviceFacts, block_s: float) -> tuple[float, float]:
+    """Shortest and longest watchdog time that driver and device allow, s; `LONGEST_S` also for a device that moves nothing."""
+    shortest_s, longest_s = facts.watchdog_s
+    return max(shortest_s, SHORTEST_BLOCKS * block_s), min(longest_s, _longest_s(block_s))
+
+
 def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> float:
     """Watchdog time to set, s.
 
     Raises `DaqRefused` if it is shorter than two blocks, or too long for a device that moves something.
     """
     chosen_s = options.watchdog_s or max(_default_s(block_s), facts.watchdog_s[0])
-    shortest_s, longest_s = SHORTEST_BLOCKS * block_s, max(LONGEST_S, LONGEST_BLOCKS * block_s)
+    shortest_s, longest_s = SHORTEST_BLOCKS * block_s, _longest_s(block_s)
     if chosen_s < shortest_s:
         raise DaqRefused(
             f"driver.options.watchdog_s = {chosen_s:g}: allowed is from {shortest_s:g} s on, {SHORTEST_BLOCKS} blocks"

@@ -2,20 +2,26 @@
 
 import gc
 import time
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.bench import Bench
+from rig.daq import DAQ, HELD, LOST, flag_names
 from rig.drivers import make_daq
 from rig.errors import DaqError
+from rig.loop.arrivals import lateness_s, reached_blocks_s
+from rig.loop.recommendation import Timing
 from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
 
-__all__ = ["probe", "round_trips"]
+__all__ = ["probe", "round_trips", "smallest_steps_v", "timing_of"]
 
 SETTLE_BLOCKS = 10
+ROUNDING = 1e-9  # of the largest reading: a smaller difference is none
+KEPT_ROWS = 20_000  # of readings, for the smallest step between two
 
 
 def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
@@ -34,8 +40,10 @@ def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
 def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
     """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the timing.
 
-    ``block_us``: time between two blocks; ``rate_hz``: samples received per second; ``statistics``: measurements of the driver
-    itself. No blocks are exchanged with a device that has something ``latched``.
+    ``block_us``: time between two blocks; ``late_us``: how late blocks came (`rig.loop.arrivals.lateness_s`; of a device
+    with a clock); ``driver_us``: computing time of the driver a block; ``rate_hz``: samples received per second;
+    ``statistics``: measurements of the driver itself. A device that is armed by its driver is armed, at 0 V, so that it tells
+    which outputs it has held. No blocks are exchanged with a device that has something ``latched``.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
@@ -54,23 +62,101 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
             return out | {"latched": daq.latched, "remarks": [*daq.remarks]}
         prepare(privileged=out["paced_by"] == "device")  # else the loop would hog the processor
         daq.start(bench.block)
-        zeros = np.zeros(bench.block)
+        return out | _report(daq, _exchanged(daq, seconds), out["paced_by"] == "device")
+
+
+def timing_of(facts: dict[str, Any]) -> Timing:
+    """Return what the recommendation needs of the report of `round_trips`."""
+    return Timing(
+        late_s=1e-6 * facts["late_us"]["largest"],
+        gap_s=1e-6 * facts["block_us"]["largest"],
+        round_trip_s=1e-6 * facts["statistics"].get("round_trip_p50_us", 0.0),
+        busy_s=1e-6 * facts["driver_us"],
+    )
+
+
+class _Exchanged(NamedTuple):
+    """Blocks of 0 V that were exchanged with a running device."""
+
+    arrivals_s: np.ndarray
+    """float64[1 + n]: the beginning, and when each block was there, s."""
+    busy_s: float
+    """Computing time of this thread."""
+    held: int
+    """Blocks with a held output."""
+    lost: int
+    """Blocks that were lost."""
+    readings_v: np.ndarray
+    """float64[m, n_channels]: the first of the readings."""
+    failure: str
+    """Error that ended it; empty if there was none."""
+
+
+def _exchanged(daq: DAQ, seconds: float) -> _Exchanged:
+    """Exchange blocks of 0 V for a time."""
+    block, names = daq.block, flag_names(daq.counters)
+    held_flag = 1 << names.index(HELD) if HELD in names else 0
+    zeros = np.zeros(block)
+    arrivals: list[float] = []
+    readings: list[np.ndarray] = []
+    held = lost = 0
+    failure = ""
+    began_s, computed_s = time.monotonic(), time.thread_time()
+    try:
         for _ in range(SETTLE_BLOCKS):
             daq.exchange(zeros)
-        histogram, samples = Histogram(), 0
-        began = before = time.monotonic_ns()
-        failure = ""
-        try:
-            while before - began < 1e9 * seconds:
-                daq.exchange(zeros)
-                now = time.monotonic_ns()
-                histogram.add(now - before)
-                before, samples = now, samples + bench.block
-        except DaqError as error:
-            failure = f"{type(error).__name__}: {error}"
-        out |= {"block_us": histogram.report(), "latency_samples": daq.latency_samples}
-        out["reached_hz"] = round(1e9 * samples / max(1, before - began), 1)
-        out |= {"failure": failure} if failure else {}
-        out |= {"statistics": dict(daq.statistics), "counters": dict(daq.counters)}
-        out["remarks"] = [*daq.remarks]
-        return out
+        began_s, computed_s = time.monotonic(), time.thread_time()
+        while not arrivals or arrivals[-1] - began_s < seconds:
+            inputs = daq.exchange(zeros)
+            arrivals.append(time.monotonic())
+            if daq.flags.any():
+                flags = int(np.bitwise_or.reduce(daq.flags))
+                held += flags & held_flag != 0
+                lost += flags & LOST != 0
+            if len(readings) * block < KEPT_ROWS:
+                readings.append(inputs)
+    except DaqError as error:
+        failure = f"{type(error).__name__}: {error}"
+    kept = np.vstack(readings) if readings else np.empty((0, len(daq.channels)))
+    times = np.array([began_s, *arrivals])
+    return _Exchanged(times, time.thread_time() - computed_s, held, lost, kept, failure)
+
+
+def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> dict[str, Any]:
+    times, blocks = seen.arrivals_s, seen.arrivals_s.size - 1
+    out: dict[str, Any] = {"block_us": _quantiles_us(np.diff(times)), "latency_samples": daq.latency_samples}
+    if by_device:
+        out["late_us"] = _quantiles_us(lateness_s(times[1:], daq.block / daq.sample_rate_hz))
+    out["driver_us"] = round(1e6 * seen.busy_s / max(1, blocks), 2)
+    out["reached_hz"] = round(
+        reached_blocks_s(times, daq.block / daq.sample_rate_hz if by_device else 0.0) * daq.block, 1
+    )
+    out |= {"queue_blocks": daq.queue_blocks, "blocks": blocks, "held_blocks": seen.held, "lost_blocks": seen.lost}
+    out["smallest_step_v"] = smallest_steps_v([channel.name for channel in daq.channels], seen.readings_v)
+    out |= {"failure": seen.failure} if seen.failure else {}
+    out |= {"statistics": dict(daq.statistics), "counters": dict(daq.counters)}
+    out["remarks"] = [*daq.remarks]
+    return out
+
+
+def _quantiles_us(times_s: np.ndarray) -> dict[str, float]:
+    """Return the quantiles p50, p99 and p99.9, and the largest time, us; zeros without any."""
+    histogram = Histogram()
+    for nanoseconds in (1e9 * times_s).astype(np.int64).tolist():
+        histogram.add(nanoseconds)
+    return histogram.report()
+
+
+def smallest_steps_v(names: Sequence[str], readings_v: np.ndarray) -> dict[str, float]:
+    """Return the smallest step between two different readings float64[n, n_channels], V, by channel.
+
+    Channels whose reading never changed are left out. The step of a converter is seen where noise or signal takes neighbouring
+    values.
+    """
+    out = {}
+    for name, column in zip(names, readings_v.T, strict=True):
+        levels = np.unique(column[np.isfinite(column)])
+        if levels.size > 1:
+            steps = np.diff(levels)
+            out[name] = float(steps[steps > ROUNDING * np.abs(levels).max()].min())
+    return out

@@ -14,6 +14,7 @@ from rig.bench import Bench
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, DaqError, RigError
+from rig.loop.worker.examination import examine_device
 from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, packed
 from rig.loop.worker.pace import pacing_of
@@ -38,6 +39,8 @@ def main() -> None:
             facts.send(("probed", probe(*arguments)))
         elif name == "round trips":
             facts.send(("round trips", round_trips(*arguments)))
+        elif name == "examination":
+            facts.send(("examination", examine_device(*arguments)))
         elif name == "open":
             _serve(commands, facts, memory, *arguments)
     except (EOFError, BrokenPipeError):

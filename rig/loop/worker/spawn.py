@@ -114,7 +114,7 @@ def rebuilt(names: tuple[str, ...], message: str) -> RigError:
 
 
 def ask(*command: Any) -> Any:
-    """Run a loop process for one order, ``probe`` or ``round trips``, and return its answer."""
+    """Run a loop process for one order, ``probe``, ``round trips`` or ``examination``, and return its answer."""
     worker = Worker()
     try:
         worker.send(*command)

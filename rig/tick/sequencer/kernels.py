@@ -62,7 +62,8 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
     entry.periods = progress.cycle - progress.start_cycle
     entry.mean_error_rad = settling.mean_error_rad
     entry.drift = settling.drift
-    entry.faults = progress.held + progress.lost
+    entry.held = progress.held
+    entry.lost = progress.lost
     progress.segment += 1
     progress.entered = 0
 

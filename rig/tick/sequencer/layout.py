@@ -110,11 +110,12 @@ OUTCOME = np.dtype(
         ("periods", "f8"),
         ("mean_error_rad", "f8"),
         ("drift", "f8"),
-        ("faults", "i8"),
+        ("held", "i8"),
+        ("lost", "i8"),
     ]
 )
-"""Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, samples
-with a held output or lost."""
+"""Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, number
+of samples with a held output and of lost ones."""
 
 REFUSED = np.dtype(
     [
@@ -130,8 +131,7 @@ REFUSED = np.dtype(
         ("force_n", "f8"),
     ]
 )
-"""A record that was refused and is measured again: what `OUTCOME` says of it, the number of samples with a held output and of
-lost ones, and the force's fundamental, N."""
+"""A record that was refused and is measured again: what `OUTCOME` says of it, and the force's fundamental, N."""
 
 RING = 64
 """Refused records that are kept for the campaign, which reads them every few hundredths of a second."""

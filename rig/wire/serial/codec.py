@@ -81,6 +81,11 @@ class Codec:
         width = stream.bits // 8
         return SAMPLES_HEAD.size + width * stream.block * stream.n_channels, OUTPUT_HEAD.size + width * stream.block
 
+    @staticmethod
+    def largest_block(n_channels: int, bits: int) -> int:
+        """Samples of the largest block that one payload holds."""
+        return (LARGEST_PAYLOAD - SAMPLES_HEAD.size) // (bits // 8 * n_channels)
+
     def encode(self, message: Message) -> bytes:
         """The payload of a message; counts must have the shape agreed on."""
         if message.__class__ is Samples:

@@ -144,6 +144,10 @@ class SerialLink(Link):
         unlimited = not self._baud or is_pseudo_terminal(self._descriptor)
         return line_load(stream, None if unlimited else self._baud)
 
+    def largest_block_of(self, n_channels: int, bits: int) -> int:
+        """Largest number of samples in a block: the payload of a frame is bounded."""
+        return Codec.largest_block(n_channels, bits)
+
     def close(self) -> None:
         """Close the port."""
         self._descriptor, self._input = -1, NoInput()

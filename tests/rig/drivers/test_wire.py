@@ -673,3 +673,39 @@ def test_a_driver_that_replaces_its_flags_is_told_so() -> None:
         daq.start()
         with pytest.raises(DaqError, match="replaced `flags`"):
             daq.exchange(np.zeros(1))
+
+
+def test_a_port_whose_adapter_does_not_answer_is_closed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    daq = MemoryDAQ(bench_with())
+    opened = []
+
+    def open_halfway(link: MemoryLink) -> None:
+        link.is_open = True
+        opened.append(link)
+        raise DaqDisconnected("the adapter is gone")
+
+    monkeypatch.setattr(MemoryLink, "open", open_halfway)
+    with pytest.raises(DaqDisconnected):
+        daq.open()
+    assert [link.is_open for link in opened] == [False]
+    assert daq.state is State.CLOSED
+
+
+def test_what_can_be_set_against_late_outputs_is_told_once_open() -> None:
+    """The device's own bounds, the driver's, and the load of the wire: 8 (12 + 2 n c) bits a block of n samples, c channels."""
+    bench = bench_with({"block": 4})
+    daq = MemoryDAQ(bench, 0, WireOptions(watchdog_s=0.3), available_bit_s=2e6)
+    assert daq.adjustable is None
+    daq.device.words[Parameter.LARGEST_QUEUE, 0] = 32
+    daq.device.words[Parameter.LONGEST_WATCHDOG_US, 0] = 800_000
+    with daq:
+        told = daq.adjustable
+    assert told is not None
+    assert told.watchdog_s == 0.3
+    assert told.largest_queue == 32
+    assert told.watchdog_range_s[1] == pytest.approx(0.8)
+    assert told.rate_range_hz[1] == pytest.approx(5000.0)
+    n_channels = len(bench.channels)
+    for block in (1, 4, 100):
+        bits_s = 5000.0 / block * 8.0 * (12 + 2 * block * n_channels)
+        assert told.wire_share[block] == pytest.approx(bits_s / 2e6)

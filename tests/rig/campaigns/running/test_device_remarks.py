@@ -25,13 +25,18 @@ def test_a_point_with_more_than_a_twentieth_of_its_outputs_held_is_not_accepted(
     assert point.warnings[0] == "before"
     assert (f"output held in {held} of 1000 samples" in point.warnings) is (held > 0)
     if not accepted:
-        assert "output held in 51 of 1000" in point.reason
+        assert point.reason.startswith(
+            "outputs came too late: held in 51 samples of 1000, `rig doctor --daq` recommends"
+        )
 
 
-def test_a_point_that_failed_for_another_reason_keeps_it() -> None:
-    rows = rows_with(1 << (DEVICE_SHIFT + 2), 900)
-    point = with_device_remarks(made_point(quality=Quality.REJECTED, reason="not settled"), rows, COUNTERS)
-    assert point.reason == "not settled"
+def test_a_point_that_failed_for_another_reason_keeps_it_behind_the_outputs_that_were_held() -> None:
+    refused = made_point(quality=Quality.REJECTED, reason="another mode")
+    point = with_device_remarks(refused, rows_with(1 << (DEVICE_SHIFT + 2), 7), COUNTERS)
+    assert point.reason.startswith("outputs came too late: held in 7 samples of 1000, ")
+    assert point.reason.endswith("; another mode")
+    point = with_device_remarks(refused, rows_with(1 << DEVICE_SHIFT, 7), COUNTERS)
+    assert point.reason == "another mode"
 
 
 def test_overloads_warn_and_lost_samples_are_counted() -> None:

@@ -1,0 +1,58 @@
+# Checks of the core: fuzzing, branch coverage, static analysis.
+
+RUNS ?= 10000000
+FUZZER = clang
+FUZZ = $(filter-out core/can_layout.c,$(CORE)) boards/script/bench.c checks/fuzz.c # a checksum of constants takes most of the time
+FUZZ_LIMITS = -DVL_LARGEST_BLOCK=100 -DVL_MOST_BLOCKS=8
+FUZZ_FLAGS = -max_len=256 -print_final_stats=1
+
+.PHONY: fuzz fuzz-serial fuzz-can fuzz-can-fd
+fuzz: fuzz-serial fuzz-can fuzz-can-fd ## RUNS=n inputs by libFuzzer under sanitizers, in all (ten million)
+fuzz-serial: $(BUILD)/fuzz-serial ## of these, two fifths over a serial line
+fuzz-can: $(BUILD)/fuzz-can ## one fifth over classical CAN
+fuzz-can-fd: $(BUILD)/fuzz-can-fd ## two fifths over CAN FD
+fuzz-serial fuzz-can-fd: FIFTHS = 2
+fuzz-can: FIFTHS = 1
+
+$(BUILD)/fuzz-serial: WIRE = 0
+$(BUILD)/fuzz-can: WIRE = 1
+$(BUILD)/fuzz-can-fd: WIRE = 2
+$(BUILD)/fuzz-serial $(BUILD)/fuzz-can $(BUILD)/fuzz-can-fd: $(FUZZ) $(HEADERS) | $(BUILD)
+	$(FUZZER) $(WARNINGS) -O2 -g -fsanitize=fuzzer,address,undefined -fno-sanitize-coverage=trace-cmp \
+	    -fno-sanitize-recover=all -DFUZZ_WIRE=$(WIRE) \
+	    $(FUZZ_LIMITS) -Icore $(FUZZ) -o $@
+
+fuzz-serial fuzz-can fuzz-can-fd:
+	mkdir -p $(BUILD)/corpus/$@
+	$(BUILD)/$@ $(FUZZ_FLAGS) -runs=$$(($(RUNS) * $(FIFTHS) / 5)) -artifact_prefix=$(BUILD)/ $(BUILD)/corpus/$@
+
+# Branch coverage of the core by random scripts (tests/firmware/differential.py) and by what the fuzzer has found.
+PYTHON ?= python3
+REQUESTS ?= 20000
+LEAST ?= 95
+COVERAGE = $(BUILD)/coverage
+GCOV = gcc -std=c11 -O0 -g --coverage -fprofile-abs-path -Icore
+
+.PHONY: coverage
+coverage: $(COVERAGE)/script $(COVERAGE)/replay-0 $(COVERAGE)/replay-1 $(COVERAGE)/replay-2 ## branches of the core that scripts and the fuzzer's inputs reach
+	find $(COVERAGE) -name '*.gcda' -delete
+	cd .. && $(PYTHON) -m tests.firmware.differential $(abspath $(COVERAGE)/script) --requests $(REQUESTS)
+	for wire in 0:serial 1:can 2:can-fd; do find $(BUILD)/corpus/fuzz-$${wire#*:} -type f 2>/dev/null \
+	    | xargs -r $(COVERAGE)/replay-$${wire%:*} || exit 1; done
+	gcovr --root . --filter core/ --object-directory $(COVERAGE) --branches --fail-under-branch $(LEAST) \
+	    --txt $(COVERAGE)/report.txt --print-summary $(COVERAGE)
+	cat $(COVERAGE)/report.txt
+
+$(COVERAGE)/script: $(SCRIPT) $(HEADERS)
+	mkdir -p $(COVERAGE)
+	$(GCOV) $(SCRIPT) -o $@
+$(COVERAGE)/replay-%: $(FUZZ) checks/replay.c $(HEADERS)
+	mkdir -p $(COVERAGE)
+	$(GCOV) -DFUZZ_WIRE=$* $(FUZZ_LIMITS) $(FUZZ) checks/replay.c -o $@
+
+CPPCHECK = cppcheck --error-exitcode=1 --std=c11 --quiet --force -Icore -Iboards/plant
+
+.PHONY: cppcheck
+cppcheck: ## static analysis; members of structures that are registers are never "used", so without style there
+	$(CPPCHECK) --enable=warning,style,performance,portability core boards/host boards/plant boards/script checks/*.c
+	$(CPPCHECK) --enable=warning,performance,portability boards/mps2-an386 checks/arm

@@ -1,0 +1,278 @@
+"""Examination of a bench's device at 0 V for ``rig doctor --daq``: measured, recommended, and tried."""
+
+import contextlib
+import math
+import time
+from typing import Any, NamedTuple
+
+from rig.bench import Bench, DriverChoice
+from rig.daq import Adjustable
+from rig.drivers import make_daq
+from rig.errors import DaqRefused, DaqWatchdog, RigError
+from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, complaints, recommend
+from rig.loop.worker.probe import round_trips, timing_of
+
+__all__ = ["bench_lines", "examine_device", "with_settings"]
+
+LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
+MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0
+TRIES = 3  # of settings, each with twice the queue or a longer block
+MUCH_LONGER = 4  # times the block, where the rate is not reached
+RATE_TRIES = 2
+LONGER_BLOCKS = (2, 5, 10, 20, 50, 100, 200, 500, 1000)
+LONGEST_BLOCK_S = 0.2  # as `rig.bench.Bench` allows
+HIGHER = 1.05  # a largest rate that is not more than this many times the bench's is not tried
+
+
+def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> dict[str, Any]:
+    """Exchange 0 V with a bench's device for some seconds; return the timing and a ``recommendation`` with its reasons.
+
+    For ``seconds`` the device has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the
+    settings that `rig.loop.recommendation` gives are tried, with a longer queue or block if they do not hold; then a higher
+    sample rate if device and wire have one; last the settings of the bench, unless its watchdog would end that. The report is
+    that of `rig.loop.worker.probe.round_trips` with the bench's settings, where they were tried. Nothing is driven, and nothing
+    that has latched is cleared: an examination that has made the watchdog latch ends there.
+
+    Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
+    """
+    began = time.monotonic()
+    opened, (allowed, now, by_device), refusal = _that_opens(bench, seed)
+    if by_device:
+        opened = with_settings(opened, _patient(now, allowed), bench.sample_rate_hz)
+    facts = round_trips(opened, seed, seconds)
+    if "latched" not in facts and "failure" not in facts:
+        if by_device:
+            examination = _Examination(bench, seed, now._replace(block=bench.block), allowed, facts)
+            facts = examination.report(refusal)
+        else:
+            facts = _without_clock(facts)
+    return facts | {"examined_s": round(time.monotonic() - began, 1)}
+
+
+def with_settings(bench: Bench, settings: Settings, rate_hz: float) -> Bench:
+    """Return a bench with other settings and another sample rate; queue and watchdog only if its driver has them."""
+    options = dict(bench.driver.options)
+    if settings.watchdog_s is not None:
+        options |= {"queue_blocks": settings.queue_blocks, "watchdog_s": settings.watchdog_s}
+    driver = DriverChoice(name=bench.driver.name, options=options)
+    return bench.model_copy(update={"driver": driver, "block": settings.block, "sample_rate_hz": rate_hz})
+
+
+class _Asked(NamedTuple):
+    """What a device lets one set."""
+
+    allowed: Adjustable | None
+    now: Settings
+    """Those of the bench."""
+    by_device: bool
+    """Whether the device has a clock of its own."""
+
+
+def bench_lines(differs: dict[str, Any]) -> list[str]:
+    """Return lines of a bench file with the settings that differ from those of the bench; empty if none do."""
+    options = [f"{name} = {differs[name]:g}" for name in ("queue_blocks", "watchdog_s") if name in differs]
+    block = [f"block = {differs['block']}"] if "block" in differs else []
+    return [*block, *([""] if block and options else []), *(["[driver.options]", *options] if options else [])]
+
+
+def _that_opens(bench: Bench, seed: int) -> tuple[Bench, _Asked, str]:
+    """Return the bench, or, if the device or its wire refuses that, with the shortest block that is not; and the refusal."""
+    try:
+        return bench, _asked(bench, seed), ""
+    except DaqRefused as error:
+        for block in LONGER_BLOCKS:
+            if bench.block < block <= LONGEST_BLOCK_S * bench.sample_rate_hz:
+                longer = bench.model_copy(update={"block": block})
+                with contextlib.suppress(DaqRefused):
+                    return longer, _asked(longer, seed), str(error)
+        raise
+
+
+def _asked(bench: Bench, seed: int) -> _Asked:
+    """Open a device, and return what it lets one set."""
+    with make_daq(bench, seed) as daq:
+        allowed, capabilities = daq.adjustable, daq.capabilities
+        queue = bench.driver.options.get("queue_blocks", 1)
+        watchdog_s = allowed.watchdog_s if allowed else None
+        by_device = capabilities.paced and not capabilities.repeatable
+        return _Asked(allowed, Settings(bench.block, queue if isinstance(queue, int) else 1, watchdog_s), by_device)
+
+
+def _patient(now: Settings, allowed: Adjustable | None) -> Settings:
+    """Return the settings with the longest queue and watchdog."""
+    if allowed is None:
+        return now
+    return Settings(now.block, allowed.largest_queue, max(now.watchdog_s or 0.0, allowed.watchdog_range_s[1]))
+
+
+def _without_clock(facts: dict[str, Any]) -> dict[str, Any]:
+    """Return the report on a device that waits for the host: no output can be late."""
+    why = "the device waits for the host: no output is late, and neither queue nor watchdog needs to be changed"
+    told = {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": [], "bench_lines": []}
+    return facts | {"recommendation": told}
+
+
+class _Examination:
+    """What follows the first measurement of a device with a clock."""
+
+    def __init__(
+        self, bench: Bench, seed: int, now: Settings, allowed: Adjustable | None, facts: dict[str, Any]
+    ) -> None:
+        self._bench, self._seed, self._now, self._allowed, self._facts = bench, seed, now, allowed, facts
+        self._timing, self._rate_hz = timing_of(facts), bench.sample_rate_hz
+        self._tried: list[dict[str, Any]] = []
+        self._as_is: dict[str, Any] | None = None  # report with the settings of the bench
+
+    def report(self, refusal: str) -> dict[str, Any]:
+        """Try settings and rates; return the whole report. ``refusal``: of the settings of the bench, empty without one."""
+        advice = recommend(self._timing, self._now, self._rate_hz, self._allowed, self._facts["largest_block"])
+        advice = self._try_settings(advice)
+        rate_hz, rate_was_tried = self._try_rates(advice)
+        facts = self._facts if refusal else self._try_bench()
+        remarks = complaints(self._timing, self._now, self._rate_hz, self._allowed, facts["reached_hz"])
+        remarks = [*facts["remarks"], *([refusal] if refusal else _said(self._as_is)), *remarks]
+        remarks += [LATCHED] if self._has_latched() else []
+        chosen = advice.settings._asdict() | {"largest_rate_hz": rate_hz}
+        reasons = dict(advice.reasons)
+        reasons["largest_rate_hz"] += "; tried" if rate_was_tried else ""
+        differs = {
+            name: value for name, value in advice.settings._asdict().items() if value != getattr(self._now, name)
+        }
+        told = {
+            "settings": {name: value for name, value in chosen.items() if value is not None},
+            "differs": differs,
+            "reasons": reasons,
+            "measured": {name: round(value, 7) for name, value in self._timing._asdict().items()},
+            "delay_s": self._delay_s(advice.settings),
+            "holds": bool(self._tried and self._holds(advice.settings)),
+            "tried": self._tried,
+            "bench_lines": bench_lines(differs),
+        }
+        return facts | {"remarks": remarks, "recommendation": told}
+
+    def _delay_s(self, settings: Settings) -> float:
+        """Time from the middle of a block to that of the block of outputs that it leads to, s."""
+        return round((1 + settings.queue_blocks) * settings.block / self._rate_hz, 7)
+
+    def _attempt(self, settings: Settings, rate_hz: float, seconds: float) -> dict[str, Any]:
+        """Try settings at 0 V; return the report, or what was refused."""
+        try:
+            facts = round_trips(with_settings(self._bench, settings, rate_hz), self._seed, seconds)
+        except RigError as error:
+            facts = {"failure": f"{type(error).__name__}: {error}"}
+        if settings == self._now and rate_hz == self._rate_hz and "block_us" in facts:
+            self._as_is = facts
+        counts = ("blocks", "held_blocks", "lost_blocks", "reached_hz", "failure", "latched")
+        told = {
+            **settings._asdict(),
+            "sample_rate_hz": rate_hz,
+            **{name: facts[name] for name in counts if name in facts},
+        }
+        self._tried.append({name: value for name, value in told.items() if value is not None})
+        return facts
+
+    def _holds(self, settings: Settings) -> bool:
+        """Whether settings were tried at the bench's rate, and no output was held or sample lost in the last such try."""
+        for told in reversed(self._tried):
+            if (told["block"], told["queue_blocks"]) == settings[:2] and told["sample_rate_hz"] == self._rate_hz:
+                return _is_good(told)
+        return False
+
+    def _try_settings(self, advice: Recommendation) -> Recommendation:
+        """Try the recommended settings, and longer queues while outputs are held."""
+        for _ in range(TRIES):
+            self._attempt(advice.settings, self._rate_hz, TRIED_S)
+            told = self._tried[-1]
+            if _is_good(told) or _has_ended(told) or self._allowed is None:
+                break
+            longer = self._longer(advice.settings, told)
+            if longer is None:
+                break
+            name = "queue_blocks" if longer.block == advice.settings.block else "block"
+            why = f"{advice.reasons[name]}; tried with {getattr(advice.settings, name)}: {_count(told)}"
+            advice = advice._replace(settings=longer, reasons=advice.reasons | {name: why})
+        return advice
+
+    def _longer(self, settings: Settings, told: dict[str, Any]) -> Settings | None:
+        """Return settings with twice the queue, or with a longer block where the queue has no room or the rate is not reached.
+
+        A longer block takes a queue of the same duration. None if there is nothing longer.
+        """
+        assert self._allowed is not None
+        largest = self._allowed.largest_queue
+        if _is_quick(told) and settings.queue_blocks < largest:
+            return settings._replace(queue_blocks=min(2 * settings.queue_blocks, largest))
+        blocks = sorted(size for size in self._allowed.wire_share if size <= self._facts["largest_block"])
+        longer = [
+            size for size in blocks if size >= (settings.block + 1 if _is_quick(told) else MUCH_LONGER * settings.block)
+        ]
+        if not longer:
+            return None
+        queue = math.ceil(settings.queue_blocks * settings.block / longer[0] + 1.0 - BUSY)
+        return settings._replace(block=longer[0], queue_blocks=min(queue, largest))
+
+    def _try_rates(self, advice: Recommendation) -> tuple[float, bool]:
+        """Try the largest rate, then one between; return the largest that held, and whether it was tried."""
+        settings, rate_hz = advice.settings, advice.largest_rate_hz
+        if self._allowed is None or rate_hz <= HIGHER * self._rate_hz or not self._holds(settings):
+            return (self._rate_hz if self._holds(settings) else rate_hz), False
+        for _ in range(RATE_TRIES):
+            queue = math.ceil(settings.queue_blocks * rate_hz / self._rate_hz)
+            longer = settings._replace(queue_blocks=min(queue, self._allowed.largest_queue))
+            self._attempt(longer, rate_hz, TRIED_S)
+            if _is_good(self._tried[-1]):
+                return rate_hz, True
+            if _has_ended(self._tried[-1]) and "blocks" in self._tried[-1]:  # a rate that is refused has ended nothing
+                break
+            rate_hz = float(f"{math.sqrt(rate_hz * self._rate_hz):.2g}")
+        return self._rate_hz, True
+
+    def _try_bench(self) -> dict[str, Any]:
+        """Return the report with the settings of the bench; that of the first measurement if they are not tried."""
+        if self._as_is is None and not self._has_latched() and not self._would_trip():
+            self._attempt(self._now, self._rate_hz, AS_IS_S)
+        return self._as_is or self._facts
+
+    def _has_latched(self) -> bool:
+        """Whether the device's watchdog has tripped while settings were tried."""
+        return any(told.get("failure", "").startswith(DaqWatchdog.__name__) for told in self._tried)
+
+    def _would_trip(self) -> bool:
+        """Whether by what was measured the bench's watchdog trips: it is too short, or the usual output comes too late."""
+        if self._now.watchdog_s is None:
+            return False
+        lasts_us = 1e6 * max(1, self._now.queue_blocks) * self._now.block / self._rate_hz
+        return self._now.watchdog_s < self._timing.gap_s or lasts_us < self._facts["late_us"]["p50"]
+
+
+def _is_good(told: dict[str, Any]) -> bool:
+    """Whether settings that were tried hold: nothing failed, no output was held, no block lost, and the rate was reached."""
+    return not _has_ended(told) and told["held_blocks"] == told["lost_blocks"] == 0 and _is_quick(told)
+
+
+def _is_quick(told: dict[str, Any]) -> bool:
+    return bool(told["reached_hz"] >= REACHED * told["sample_rate_hz"])
+
+
+def _has_ended(told: dict[str, Any]) -> bool:
+    """Whether nothing more can be tried: the device has failed, or its watchdog has latched."""
+    return "failure" in told or "latched" in told
+
+
+def _count(told: dict[str, Any]) -> str:
+    held = f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
+    return f"{held}, {told['reached_hz']:g} Hz reached"
+
+
+def _said(facts: dict[str, Any] | None) -> list[str]:
+    """Return what is wrong in the report with the settings of the bench."""
+    if facts is None:
+        return [
+            "the settings of the bench were not tried: the watchdog has ended it, or would have by what was measured"
+        ]
+    out = []
+    if facts["held_blocks"]:
+        out.append(f"outputs were held in {facts['held_blocks']} of {facts['blocks']} blocks: they came too late")
+    if facts["lost_blocks"]:
+        out.append(f"{facts['lost_blocks']} of {facts['blocks']} blocks were lost on their way")
+    return out

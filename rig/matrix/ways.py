@@ -1,0 +1,87 @@
+"""Ways to run a test without a rig: the virtual driver, emulators of each wire, firmware for the host or in QEMU."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rig.bench import Bench
+from rig.emulator.emulated import emulated
+
+__all__ = ["EMULATED_BLOCK", "Way", "way_benches"]
+
+EMULATED_BLOCK = 10  # samples, 2 ms at 5 kHz: what a host with ordinary scheduling keeps up with
+ARM = 40  # machine in the header of an ELF file
+CLASSICAL_PART = 0.5  # of the bench's rate: classical CAN cannot carry 5 kHz sample by sample
+FILTER_PART = 0.4  # of the sample rate, for the virtual converter's filter at another rate
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to run a test."""
+
+    name: str
+    wire: str | None = None
+    """``serial`` or ``can``; None for the virtual driver in this process."""
+    lockstep: bool = True
+    """Whether the device waits for the host."""
+    rate_part: float = 1.0
+    """Sample rate, as a part of the bench's."""
+    settings: dict[str, Any] = field(default_factory=dict)
+    """Further settings of the emulator (`rig.emulator.settings.EmulatorSettings`)."""
+
+    def scaled(self, bench: Bench) -> Bench:
+        """Return the bench at the rate and with the block of this way."""
+        changes: dict[str, Any] = {}
+        if self.wire is not None:
+            changes["block"] = max(bench.block, EMULATED_BLOCK)
+        if self.rate_part != 1.0:
+            rate_hz = self.rate_part * bench.sample_rate_hz
+            converter = {**bench.driver.options.get("converter", {}), "anti_alias_hz": FILTER_PART * rate_hz}
+            options = {**bench.driver.options, "converter": converter}
+            changes |= {"sample_rate_hz": rate_hz, "driver": bench.driver.model_copy(update={"options": options})}
+        return bench.model_copy(update=changes)
+
+    @contextmanager
+    def opened(self, bench: Bench, output_log: Path) -> Iterator[Bench]:
+        """Give a bench that reaches the device while the context lasts; its outputs are written to ``output_log``."""
+        bench = self.scaled(bench)
+        if self.wire is None:
+            yield bench
+            return
+        with emulated(bench, self.wire, lockstep=self.lockstep, log_output=output_log, **self.settings) as reached:
+            yield reached
+
+
+def way_benches(firmware: Sequence[Path] = ()) -> list[Way]:
+    """Return the ways that there are on every machine, and those over ``firmware``: files for the host or for ARM (QEMU)."""
+    out = [Way("virtual")]
+    out += [way for lockstep in (False, True) for way in _wires("emulator", lockstep)]
+    for path in firmware:
+        settings = {"firmware": path}
+        if is_arm(path):  # time in QEMU is not real, and its serial line is slow
+            out.append(Way(f"serial, {path.name} in QEMU, in lockstep", "serial", settings=settings))
+            continue
+        out += [way for lockstep in (False, True) for way in _wires(path.name, lockstep, **settings)]
+    return out
+
+
+def _wires(device: str, lockstep: bool, **settings: Any) -> list[Way]:
+    """Return serial, CAN FD and classical CAN to a device."""
+    how = "in lockstep" if lockstep else "by the clock"
+    return [
+        Way(f"serial, {device} {how}", "serial", lockstep, settings=settings),
+        Way(f"CAN FD, {device} {how}", "can", lockstep, settings=settings),
+        Way(f"classical CAN, {device} {how}", "can", lockstep, CLASSICAL_PART, {"fd": False, **settings}),
+    ]
+
+
+def is_arm(path: Path) -> bool:
+    """Return whether a file is an ELF file of machine code for ARM, 32 bit; False if it cannot be read."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(20)
+    except OSError:
+        return False
+    return head[:4] == b"\x7fELF" and int.from_bytes(head[18:20], "little") == ARM

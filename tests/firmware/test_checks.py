@@ -1,0 +1,74 @@
+"""The checks of the firmware's core in short: fuzzing, branch coverage, static analysis, both compilers."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.building import FOLDER
+
+CHECKS_S = 500.0
+RUNS = 10_000
+"""Inputs in all; the long run has ten million."""
+REQUESTS = 5000
+LEAST_BRANCHES = 85.0
+"""Per cent, with so few requests and inputs; those of the long run are at least 95."""
+
+
+def _needs(*programs: str) -> None:
+    """Skip where a program is missing; with ``VIBROLOCK_FIRMWARE=required``, fail."""
+    missing = [name for name in programs if shutil.which(name) is None]
+    if not missing:
+        return
+    why = f"the check needs {' and '.join(missing)}"
+    if os.environ.get("VIBROLOCK_FIRMWARE") == "required":
+        pytest.fail(why)
+    pytest.skip(why)
+
+
+def _make(target: str, build: Path, **variables: object) -> str:
+    command = ["make", "-C", str(FOLDER), f"BUILD={build}", *(f"{name}={value}" for name, value in variables.items())]
+    done = subprocess.run([*command, target], capture_output=True, text=True, timeout=CHECKS_S, check=False)
+    said = done.stdout + done.stderr
+    assert done.returncode == 0, said[-6000:]
+    return said
+
+
+def _python() -> str:
+    """This interpreter, with this tree's packages wherever make is."""
+    return f"env PYTHONPATH={FOLDER.parent} {sys.executable}"
+
+
+def test_the_fuzzer_finds_nothing(tmp_path: Path) -> None:
+    _needs("make", "clang")
+    said = _make("fuzz", tmp_path, RUNS=RUNS)
+    assert re.findall(r"Done (\d+) runs", said) == [str(2 * RUNS // 5), str(RUNS // 5), str(2 * RUNS // 5)]
+    reached = [int(found) for found in re.findall(r"DONE +cov: (\d+)", said)]
+    assert min(reached) > 250  # edges: it comes beyond the frames, to states and streams
+
+
+@pytest.mark.slow
+def test_scripts_and_fuzzing_reach_the_branches_of_the_core(tmp_path: Path) -> None:
+    _needs("make", "gcc", "gcovr", "clang")
+    _make("fuzz", tmp_path, RUNS=20 * RUNS)
+    said = _make("coverage", tmp_path, PYTHON=_python(), REQUESTS=REQUESTS, LEAST=LEAST_BRANCHES)
+    (branches,) = re.findall(r"branches: ([\d.]+)%", said)
+    assert float(branches) >= LEAST_BRANCHES
+
+
+def test_cppcheck_says_nothing() -> None:
+    _needs("make", "cppcheck")
+    said = subprocess.run(
+        ["make", "-s", "-C", str(FOLDER), "cppcheck"], capture_output=True, text=True, timeout=CHECKS_S, check=False
+    )
+    assert (said.returncode, said.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_both_compilers_say_nothing(compiler: str, tmp_path: Path) -> None:
+    _needs("make", compiler)
+    assert "warning" not in _make("script", tmp_path, CC=compiler)

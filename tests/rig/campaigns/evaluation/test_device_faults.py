@@ -1,0 +1,68 @@
+"""A point that failed because outputs were held or samples lost says that, with the count and the remedy."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rig.campaigns.evaluation.device_faults import DISTURBED, faults_text, pages_on, why_disturbed
+from rig.campaigns.evaluation.point import Quality
+from rig.campaigns.evaluation.vibrations import failed_point
+from rig.campaigns.plans import load_plan
+from rig.tick.sequencer.layout import OUTCOME, Outcome
+
+PLAN = load_plan("magnet-beam/backbone")
+
+
+def failed(outcome, held=0, lost=0, samples=2000):
+    entry = np.zeros(1, OUTCOME)[0]
+    entry["outcome"], entry["held"], entry["lost"] = outcome, held, lost
+    entry["first_sample"], entry["end_sample"] = 5000, 5000 + samples
+    entry["mean_error_rad"] = math.radians(3.0)
+    return failed_point(PLAN, PLAN.targets()[0], entry)
+
+
+def test_a_record_with_held_outputs_says_how_many_and_what_helps():
+    point = failed(Outcome.DISTURBED, held=14)
+    assert point.quality is Quality.DISTURBED
+    assert point.reason.startswith(
+        "outputs came too late: held in 14 samples of 2000, `rig doctor --daq` recommends a queue"
+    )
+    assert "averaged phase error 3.00 deg" in point.reason
+    assert DISTURBED not in point.reason
+
+
+def test_a_disturbance_without_faults_of_the_device_keeps_its_words():
+    assert failed(Outcome.DISTURBED).reason.startswith(f"{DISTURBED} (averaged phase error 3.00 deg")
+    assert pages_on(failed(Outcome.DISTURBED).reason) == []
+
+
+@pytest.mark.parametrize(("lost", "spoilt"), [(1, False), (100, False), (101, True)])
+def test_lost_samples_are_the_reason_above_a_twentieth_and_told_below(lost, spoilt):
+    reason = failed(Outcome.DISTURBED, lost=lost).reason
+    assert reason.startswith(f"{lost} of 2000 samples were lost") is spoilt
+    assert (DISTURBED in reason) is not spoilt
+    assert pages_on(reason) == ["samples-lost"]
+
+
+def test_a_point_that_did_not_settle_while_outputs_were_held_says_both():
+    reason = failed(Outcome.NOT_SETTLED, held=300).reason
+    assert reason.startswith("not settled within 600 periods; outputs came too late: held in 300 samples of 2000")
+    assert pages_on(reason) == ["held-outputs"]
+
+
+def test_a_level_out_of_reach_is_not_put_down_to_the_device():
+    assert "too late" not in failed(Outcome.UNREACHABLE, held=300).reason
+
+
+def test_an_attempt_that_is_measured_again_needs_no_remedy():
+    assert faults_text(14, 3, 2000, final=False) == (
+        "outputs came too late: held in 14 samples of 2000, 3 of 2000 samples were lost on their way"
+    )
+    assert "doctor" not in why_disturbed(14, 0, 2000, final=False)
+    assert "doctor" in why_disturbed(14, 0, 2000)
+
+
+def test_nothing_is_said_of_nothing():
+    assert faults_text(0, 0, 100) == ""
+    assert why_disturbed(0, 0, 100, " (x)") == f"{DISTURBED} (x)"
