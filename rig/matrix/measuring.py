@@ -98,6 +98,7 @@ def _row(way: Way, bench: Bench, log: Path, verify: bool) -> Row:
 def _with_settings_that_hold(bench: Bench) -> tuple[Bench, dict[str, Any]]:
     """Return the bench with the settings that are recommended here, and the report of `rig.loop.doctor` with them."""
     facts = examine_bench(bench)
+    _clear_if_virtual(bench)  # the settings that the bench had may have ended with the watchdog
     advice = facts.get("recommendation", {})
     if not advice.get("differs"):
         return bench, facts
@@ -105,6 +106,13 @@ def _with_settings_that_hold(bench: Bench) -> tuple[Bench, dict[str, Any]]:
     settings = Settings(told["block"], told["queue_blocks"], told.get("watchdog_s"))
     better = with_settings(bench, settings, bench.sample_rate_hz)
     return better, {**measure_bench(better, seconds=MEASURED_S), "recommendation": advice}
+
+
+def _clear_if_virtual(bench: Bench) -> None:
+    """Clear what has latched in a device that moves nothing."""
+    with make_daq(bench) as daq:
+        if daq.capabilities.virtual:
+            daq.clear()
 
 
 def _waiting(bench: Bench, way: Way) -> Bench:

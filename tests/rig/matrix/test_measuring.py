@@ -11,6 +11,7 @@ from rig.drivers import make_daq
 from rig.matrix import measuring
 from rig.matrix.measuring import device_row, matrix_rows
 from rig.matrix.ways import Way, is_arm, way_benches
+from rig.wire.messages import EmergencyStop
 from tests.rig.rigs import bench_with
 
 BENCH = bench_with()
@@ -70,6 +71,33 @@ def test_a_row_of_the_virtual_driver_has_no_clock_and_no_watchdog(one_way):
     assert row.late_p99_9_ms is row.watchdog_s is row.to_0v_s is None
     assert row.to_0v == "ends with its process"
     assert row.resolution_mv == pytest.approx(dict.fromkeys(row.resolution_mv, STEP_MV), rel=1e-4)
+
+
+def test_what_latched_while_settings_were_tried_does_not_spoil_the_row(one_way, monkeypatch):
+    """The examination of an emulated device ends with a latch; it is cleared, for nothing moves."""
+    examined = measuring.examine_bench
+
+    def ends_latched(bench):
+        facts = examined(bench)
+        with make_daq(bench) as daq:
+            daq.start(bench.block)
+            daq.exchange(np.zeros(bench.block))
+            for _ in range(3):
+                daq._connection.link.send(EmergencyStop())
+        return facts
+
+    monkeypatch.setattr(measuring, "examine_bench", ends_latched)
+    one_way(Way("serial", "serial"))
+    latched = []
+    monkeypatch.setattr(measuring, "_driven", lambda bench, log: latched.append(_latched(bench)) or {})
+    (row,) = matrix_rows(BENCH)
+    assert latched == [""]
+    assert row.blocks > 0
+
+
+def _latched(bench):
+    with make_daq(bench) as daq:
+        return daq.latched
 
 
 def test_what_the_suite_has_found_is_counted(one_way, monkeypatch):
