@@ -3,7 +3,8 @@
 A tone is held on the magnet beam over an emulated serial device at wall-clock pace, which writes down the output of every
 block. In the middle of it the campaign's process or the loop's process is killed (``kill -9``), the cable is unplugged (a
 relay between two pseudo-terminals is killed) or flooded (the relay passes on nothing but garbage), Ctrl-C is pressed, or the
-device's emergency stop. Measured is the time from there to the last block whose output was not 0 V. What is promised: a ramp
+device's emergency stop. Measured is the time from there to the last block whose output was not 0 V, and by the device's clock
+the blocks from there to that one; this clock stands still while the device's process is not scheduled. What is promised: a ramp
 (the bench's ``ramp_down_s``) where the loop lives, the device's watchdog and its ramp where it does not.
 
 Looked at besides: what the recording says, whether any process of the campaign is left, and whether the same device takes
@@ -103,13 +104,13 @@ def is_there(process: int) -> bool:
         return False
 
 
-def volts(text: str) -> list[tuple[float, float]]:
-    """Times (s) and largest outputs (V) of the blocks in a piece of the log."""
+def volts(text: str) -> list[tuple[float, int, float]]:
+    """Times (s), first samples and largest outputs (V) of the blocks in a piece of the log."""
     lines = [line.split() for line in text.splitlines()]
-    return [(float(line[0]), float(line[2])) for line in lines if len(line) == 3]
+    return [(float(line[0]), int(line[1]), float(line[2])) for line in lines if len(line) == 3]
 
 
-def last_volts(log: Path) -> list[tuple[float, float]]:
+def last_volts(log: Path) -> list[tuple[float, int, float]]:
     """The same of the last blocks."""
     with log.open("rb") as file:
         file.seek(max(0, log.stat().st_size - TAIL_BYTES))
@@ -123,7 +124,7 @@ def wait_until_driven(log: Path, campaign: "subprocess.Popen[str]") -> None:
     while time.monotonic() < end:
         if campaign.poll() is not None:
             raise EndedEarlyError
-        driven = log.exists() and max((v for _, v in last_volts(log)), default=0.0) > DRIVEN_V
+        driven = log.exists() and max((v for _, _, v in last_volts(log)), default=0.0) > DRIVEN_V
         since = min(since, time.monotonic()) if driven else float("inf")
         if time.monotonic() - since > 0.5:
             return
@@ -200,9 +201,10 @@ def accident(case: str, bench: Bench, options: dict[str, float], firmware: str |
         time.sleep(max(0.0, began + 1.0 + bench.limits.ramp_down_s - time.monotonic()))
         if cable is not None:
             cable.kill()
-        driven = [at - began for at, v in volts(log.read_text()) if at > began and v > 0.0]
+        driven = [(at, first) for at, first, v in volts(log.read_text()) if at > began and v > 0.0] or [(began, 0)]
         return {
-            "ms": 1e3 * max(driven, default=0.0),
+            "ms": 1e3 * (driven[-1][0] - began),
+            "by_its_clock_ms": 1e3 * (driven[-1][1] - driven[0][1] + bench.block) / bench.sample_rate_hz,
             "recorded": recorded(output),
             "said": complained[-300:],
             "next_run": started_again(emulator.bench),
@@ -255,9 +257,9 @@ def main() -> None:
         f"its ramp {wanted.ramp_ms:g} ms"
     )
     for case, runs in found.items():
-        times = ", ".join(f"{run['ms']:.1f}" for run in runs)
-        print(f"{case:26} {times} ms")
-        for name, value in list(runs[-1].items())[1:]:
+        for name in ("ms", "by_its_clock_ms"):
+            print(f"{case:26} {name:20} " + ", ".join(f"{run[name]:.1f}" for run in runs))
+        for name, value in list(runs[-1].items())[2:]:
             print(f"    {name:20} {value}")
 
 

@@ -255,13 +255,16 @@ def test_told_to_end_it_says_what_it_has_counted() -> None:
     assert counts["watchdog_trips"] == "0"
 
 
-def test_without_its_structure_it_ends_with_status_3_at_0_v(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lockstep", [False, True])
+@pytest.mark.parametrize("samples", [False, True])
+def test_without_its_structure_it_ends_with_status_3_at_0_v(samples: bool, lockstep: bool, tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with board(None, "--log-output", str(log)) as one:
+    with board(None, "--log-output", str(log), lockstep=lockstep) as one:
         one.began()
+        if samples:
+            asked(one, Request(1, Command.START))
         os.close(one.answers)
         one.answers = os.dup(one.requests)
-        asked(one, Request(1, Command.START))
         status, _, complained = one.ended()
     assert (status, complained) == (3, "the virtual structure is gone\n")
     assert float(log.read_text().splitlines()[-1].split()[2]) == 0.0

@@ -17,6 +17,8 @@ bool sampling_open(void);
 void sampling_close(void);
 /* Bring the structure to rest if sampling has ended, and in lockstep measure a block if one is due. Whether one was. */
 bool sampling_serve(void);
+/* Without the structure there are no converters: 0 V, and the process ends. */
+void sampling_end_without_structure(void);
 extern uint64_t sampling_stalls;     /* times that this process was not scheduled for more than half the queue */
 extern uint64_t sampling_stalled_ns; /* how long the device's clock stood still for it */
 
@@ -33,7 +35,7 @@ void output_log_zero(void);
 bool line_open(int descriptor);
 size_t line_read(uint8_t *bytes, size_t room);
 size_t line_write(const uint8_t *bytes, size_t n);
-/* Wait for something to do on the line, at most a millisecond. */
+/* Wait for something to do on the line, at most a millisecond, or for the end of the structure. */
 void line_wait(void);
 
 /* -- slcan.c: a CAN adapter on the line, and the bus behind it ------------------------------------------------------------------ */

@@ -79,8 +79,7 @@ void board_feed_watchdog(void)
 {
 }
 
-/* Without the structure there are no converters: 0 V, and the process ends. */
-static void end_without_structure(void)
+void sampling_end_without_structure(void)
 {
     output_log_zero();
     plant_complain("the virtual structure is gone", "");
@@ -91,7 +90,7 @@ static void measure(uint32_t n)
 {
     output_log_block();
     if (!plant_measure(&host_structure, n))
-        end_without_structure();
+        sampling_end_without_structure();
 }
 
 static void take_instant(void)
@@ -166,7 +165,7 @@ void sampling_close(void)
 static void rest_if_due(void)
 {
     if (rest_is_due && !plant_rest(&host_structure))
-        end_without_structure();
+        sampling_end_without_structure();
     rest_is_due = false;
 }
 

@@ -42,9 +42,16 @@ size_t line_write(const uint8_t *bytes, size_t n)
 
 void line_wait(void)
 {
-    struct pollfd waited = {.fd = line, .events = (short)(is_full ? POLLIN | POLLOUT : POLLIN)};
+    struct pollfd waited[] = {
+        {.fd = line, .events = (short)(is_full ? POLLIN | POLLOUT : POLLIN)},
+        {.fd = host_structure.from}, /* that it is gone is told unasked */
+    };
     const struct timespec moment = {.tv_nsec = 1000000 * WAIT_MS};
-    if (poll(&waited, 1, WAIT_MS) > 0 && (waited.revents & (POLLIN | POLLOUT)) == 0)
+    if (poll(waited, 2, WAIT_MS) <= 0)
+        return;
+    if (waited[1].revents != 0)
+        sampling_end_without_structure();
+    if ((waited[0].revents & (POLLIN | POLLOUT)) == 0)
         nanosleep(&moment, NULL); /* nobody at the other end: poll does not wait */
 }
 
