@@ -7,6 +7,7 @@ import os
 import platform
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import llvmlite.binding
@@ -71,6 +72,21 @@ def c_function(signature: str) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
+def _named(dispatcher: Any) -> Any:
+    """Return a copy of a kernel's function that holds the kernel's digest.
+
+    On the function itself it would pass to every dispatcher that is made of it later: a kernel's dispatcher for calls from
+    other kernels, which has no entry for Python, would be stored as the one that has.
+    """
+    function = dispatcher.py_func
+    copy: Any = FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+    )
+    copy.__qualname__, copy.__module__ = function.__qualname__, function.__module__
+    copy._content_digest = content_digest(dispatcher)
+    return copy
+
+
 class _ContentLocator:
     """Tells numba where a kernel's machine code is: in one folder, under the kernel's name and digest."""
 
@@ -112,9 +128,7 @@ class _ContentCache(FunctionCache):
         if self._opened:
             return
         self._opened = True
-        function = self._dispatcher.py_func
-        function._content_digest = content_digest(self._dispatcher)
-        super().__init__(function)  # type: ignore[no-untyped-call]
+        super().__init__(_named(self._dispatcher))  # type: ignore[no-untyped-call]
         note_use(Path(self._cache_file._index_path))
 
     @property

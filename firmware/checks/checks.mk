@@ -4,7 +4,8 @@ RUNS ?= 10000000
 FUZZER = clang
 FUZZ = $(filter-out core/can_layout.c,$(CORE)) boards/script/bench.c checks/fuzz.c # a checksum of constants takes most of the time
 FUZZ_LIMITS = -DVL_LARGEST_BLOCK=100 -DVL_MOST_BLOCKS=8
-FUZZ_FLAGS = -max_len=256 -print_final_stats=1
+SEED ?= 0
+FUZZ_FLAGS = -max_len=256 -print_final_stats=1 -seed=$(SEED)
 
 .PHONY: fuzz fuzz-serial fuzz-can fuzz-can-fd
 fuzz: fuzz-serial fuzz-can fuzz-can-fd ## RUNS=n inputs by libFuzzer under sanitizers, in all (ten million)

@@ -213,3 +213,12 @@ print(power(2.0, 3), ",".join(told))
     cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     assert run(code, **cold) == ["14.0", "cubes,power", "8.0", "power"]  # the second for Python
     assert run(code, **cold) == ["14.0", "8.0"]
+
+
+def test_what_is_compiled_for_kernels_after_a_call_from_python_is_not_taken_for_what_python_calls(tmp_path):
+    cold = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    assert run("print(half(2), quarter(2.0))", **cold) == [
+        "1.0",
+        "0.5",
+    ]  # half: integers for Python, floats for quarter
+    assert run("print(half(2.0))", **cold) == ["1.0"]
