@@ -113,6 +113,11 @@ uint32_t vl_block(void)
     return vl_in_force.block;
 }
 
+uint32_t vl_queue(void)
+{
+    return vl_in_force.queue;
+}
+
 static int32_t clipped(int32_t count)
 {
     if (count >= lowest_count && count <= highest_count)
@@ -242,5 +247,5 @@ bool vl_block_is_due(void)
         return false;
     if (next < first_expected || vl_has_next_block())
         return true;
-    return next >= vl_in_force.block && vl_is_coming_down(next - vl_in_force.block);
+    return vl_is_coming_down(next - vl_in_force.block);
 }

@@ -77,8 +77,9 @@ void vl_miss(void);
 /* Trip the watchdog if its time is over. vl_output and vl_serve do this; a timer of its own may do it besides. */
 void vl_watch(void);
 
-/* Samples a block since the last START. */
+/* Samples a block, and blocks of the queue, since the last START. */
 uint32_t vl_block(void);
+uint32_t vl_queue(void);
 
 /* For devices in software that wait for their host instead of a clock (lockstep): whether the next block can be measured, for
  * its outputs have come or none are needed. */

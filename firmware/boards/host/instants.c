@@ -5,12 +5,12 @@
  * that the host has the other half to answer. Instants that are less late than that run at once. */
 
 #include <errno.h>
+#include <stdatomic.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "board.h"
-#include "device.h" /* for the length of the queue, which no board of hardware needs */
 #include "host.h"
 
 #define SECOND_NS UINT64_C(1000000000)
@@ -176,7 +176,7 @@ void board_start_sampling(uint32_t rate)
     rate_mhz = rate;
     period_ns = MHZ_NS / rate;
     period_rest = MHZ_NS % rate;
-    patience_ns = (uint64_t)vl_settings.queue * vl_block() * period_ns / 2;
+    patience_ns = (uint64_t)vl_queue() * vl_block() * period_ns / 2;
     collected = 0;
     due_rest = 0;
     due_ns = monotonic_ns();
