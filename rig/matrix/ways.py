@@ -61,9 +61,9 @@ def way_benches(firmware: Sequence[Path] = ()) -> list[Way]:
     for path in firmware:
         settings = {"firmware": path}
         if is_arm(path):  # time in QEMU is not real, and its serial line is slow
-            out.append(Way(f"serial, {path.name} in QEMU, in lockstep", "serial", settings=settings))
+            out.append(Way(f"serial, firmware {path.stem} in QEMU, in lockstep", "serial", settings=settings))
             continue
-        out += [way for lockstep in (False, True) for way in _wires(path.name, lockstep, **settings)]
+        out += [way for lockstep in (False, True) for way in _wires(f"firmware {path.name}", lockstep, **settings)]
     return out
 
 
