@@ -62,6 +62,7 @@ def test_a_test_goes_on_along_its_branch_after_a_change_of_plan(tmp_path):
     assert last["amplitude_m"] == pytest.approx(truth.amplitude_m[0], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_force_that_is_mostly_another_mode_is_no_point():
     plan = load_plan("friction-beam/stepped-phase").model_copy(update={"levels_rms_n": (1.41421,)})
     with rig.run(plan, seed=0) as run:

@@ -92,7 +92,10 @@ def followed(tmp_path_factory):
 
 SLOW = (
     "README.md",
-    *(f"docs/how-to/{name}.md" for name in ("tune-a-rig", "rehearse-a-plan", "protect-a-fragile-specimen")),
+    *(
+        f"docs/how-to/{name}.md"
+        for name in ("tune-a-rig", "rehearse-a-plan", "protect-a-fragile-specimen", "predict-with-a-pnlss-model")
+    ),
 )
 
 

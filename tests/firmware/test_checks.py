@@ -43,6 +43,7 @@ def _python() -> str:
     return f"env PYTHONPATH={FOLDER.parent} {sys.executable}"
 
 
+@pytest.mark.slow
 def test_the_fuzzer_finds_nothing(tmp_path: Path) -> None:
     _needs("make", "clang")
     said = _make("fuzz", tmp_path, RUNS=RUNS, SEED=1)

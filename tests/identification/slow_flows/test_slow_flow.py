@@ -135,6 +135,7 @@ def test_standard_errors_are_the_scatter_over_noise_or_more(noise: tuple[float, 
         assert 0.8 < claimed / np.std(values) < at_most
 
 
+@pytest.mark.slow
 def test_a_rig_driven_open_loop_from_rest_tells_its_properties_before_it_has_settled() -> None:
     rig = VirtualRig.shipped("magnet-beam", noise_scale=1.0)
     hz, periods = 24.5, 40
