@@ -1,7 +1,8 @@
 /* A device of the vibrolock wire protocol, version 1: what a board describes, and what it calls.
  *
  * The core needs no heap, no operating system and no vendor library; of the C library memcpy, memmove, memset, memcmp and strlen, and
- * of the compiler's library divisions of 64 bits. There is one device in a program. A board provides the functions of board.h and calls, in this order,
+ * of the compiler's own library divisions of 64 bits and, in vl_begin alone, arithmetic in double. There is one device in a program.
+ * A board provides the functions of board.h and calls, in this order,
  *
  *   vl_begin      once after a reset;
  *   vl_serve      again and again from its main loop, at least every millisecond;
