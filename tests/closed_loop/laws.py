@@ -3,6 +3,7 @@
 import math
 from functools import partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -63,11 +64,11 @@ def carried_out(
 def knock(monkeypatch: Any, mode: int, at_s: float, change: float, length_s: float = 0.02) -> None:
     """From now on every run gets a knock: the modal velocity of a mode (kg^1/2 m/s) is changed over a short time."""
     exchange = VirtualDAQ._exchange
-    samples = dict[int, int]()
+    samples = WeakKeyDictionary[Any, int]()
 
     def knocked(self: Any, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        now = samples.get(id(self), 0) / self.sample_rate_hz
-        samples[id(self)] = samples.get(id(self), 0) + len(inputs)
+        now = samples.get(self, 0) / self.sample_rate_hz
+        samples[self] = samples.get(self, 0) + len(inputs)
         if at_s <= now < at_s + length_s:
             self._state.inputs[self.rig.plant.n_mode + mode] += change * len(inputs) / self.sample_rate_hz / length_s
         exchange(self, voltages, inputs)

@@ -1,6 +1,7 @@
 """Sensors that fail in a way that trips nothing: what they read is told from data by what else is known."""
 
 from functools import partial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
@@ -44,12 +45,12 @@ def second_begins():
 
 def spoil(monkeypatch, after, change):
     """From sample ``after`` on, ``change(volts, channel noise)`` has its way with what every rig reads."""
-    exchange, noise, samples = VirtualDAQ._exchange, np.random.default_rng(1), dict[int, int]()
+    exchange, noise, samples = VirtualDAQ._exchange, np.random.default_rng(1), WeakKeyDictionary()
 
     def spoiled(self, voltages, inputs):
         exchange(self, voltages, inputs)
-        samples[id(self)] = samples.get(id(self), 0) + len(inputs)
-        if samples[id(self)] > after:
+        samples[self] = samples.get(self, 0) + len(inputs)
+        if samples[self] > after:
             change(inputs, NOISE_V * noise.normal(size=len(inputs)))
 
     monkeypatch.setattr("rig.loop.session.Loop", partial(Loop, fused=False))
