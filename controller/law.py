@@ -1,5 +1,6 @@
 """A complete control law: its parameters, its state, and the open-loop law for a frequency given by the plan."""
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -7,15 +8,24 @@ import numpy as np
 from controller.amplitude import AMPLITUDE, AMPLITUDE_STATE, AmplitudeLaw, AmplitudeSettings, amplitude_state
 from controller.detector import DETECTOR, DETECTOR_STATE, VIBRATION, DetectorSettings, phase_error
 from controller.frequency import FREQUENCY, FREQUENCY_STATE
+from controller.harmonics import HARMONICS, HARMONICS_STATE, HarmonicsSettings
 from controller.lock import LOCK, THRESHOLDS, LockRule
 from controller.period import PERIOD
 from controller.rest import REST, REST_STATE, see_rest, take_as_measured
+from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel
 
 __all__ = ["CONTROL", "LAW", "Law", "OpenLoop", "control_state"]
 
 LAW = np.dtype(
-    [("detector", DETECTOR), ("rest", REST), ("frequency", FREQUENCY), ("amplitude", AMPLITUDE), ("lock", THRESHOLDS)]
+    [
+        ("detector", DETECTOR),
+        ("rest", REST),
+        ("frequency", FREQUENCY),
+        ("amplitude", AMPLITUDE),
+        ("harmonics", HARMONICS),
+        ("lock", THRESHOLDS),
+    ]
 )
 """Frozen parameters of a law (one record), built by `Law.build`: one record for each part of the law."""
 
@@ -26,6 +36,7 @@ CONTROL = np.dtype(
         ("rest", REST_STATE),
         ("frequency", FREQUENCY_STATE),
         ("amplitude", AMPLITUDE_STATE),
+        ("harmonics", HARMONICS_STATE),
         ("lock", LOCK),
         ("period", PERIOD),
     ]
@@ -39,6 +50,14 @@ class Law(Protocol):
     @property
     def lock(self) -> LockRule:
         """When a lock counts as gained and as lost."""
+
+    @property
+    def harmonics(self) -> HarmonicsSettings | None:
+        """The harmonics loop, if there is one."""
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """Highest frequency that the law itself can choose, Hz; 0 if the plan gives the frequency."""
 
     def build(
         self,
@@ -60,16 +79,36 @@ def control_state(law: np.ndarray) -> np.ndarray:
     out = np.zeros(1, CONTROL)
     out["frequency"]["omega"] = law["frequency"]["centre_rad_s"]
     out["amplitude"] = amplitude_state(law["amplitude"])
+    out["harmonics"]["miss"] = math.inf
     return out
 
 
-class OpenLoop(DetectorSettings, AmplitudeSettings):
+class HarmonicsTable(Settings):
+    """The table of the harmonics loop, in any law."""
+
+    harmonics: HarmonicsSettings | None = None
+    """The harmonics loop: harmonics of the output that make those of the force zero, or what is prescribed. Without this table
+    the output is a sine."""
+
+    def build_loop(self, sample_rate_hz: float, largest_v: float) -> np.ndarray:
+        """Return one record of `HARMONICS`, all zero without the table; see `HarmonicsSettings.build_harmonics`."""
+        if self.harmonics is None:
+            return np.zeros(1, HARMONICS)
+        return self.harmonics.build_harmonics(sample_rate_hz, largest_v)
+
+
+class OpenLoop(HarmonicsTable, DetectorSettings, AmplitudeSettings):
     """Law without phase feedback: the plan gives the frequency. The level is a voltage or is held by an amplitude loop."""
 
     @property
     def lock(self) -> LockRule:
         """Rules of the lock. An open loop never seeks a lock, but needs the smallest amplitudes that they carry."""
         return LockRule()
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The plan gives the frequency: 0."""
+        return 0.0
 
     def build(
         self,
@@ -83,6 +122,7 @@ class OpenLoop(DetectorSettings, AmplitudeSettings):
         out["detector"] = self.build_detector(sample_rate_hz)
         gain = float(out["detector"]["gain"][0])
         out["amplitude"] = self.build_amplitude(amplitude_law, largest_v, 1.0 / sample_rate_hz, gain, False)
+        out["harmonics"] = self.build_loop(sample_rate_hz, largest_v)
         out["lock"] = self.lock.build()
         return out
 

@@ -9,14 +9,14 @@ from pydantic import model_validator
 from controller.amplitude import AmplitudeLaw, AmplitudeSettings
 from controller.detector import DetectorSettings
 from controller.frequency import GAINS, FrequencySettings
-from controller.law import LAW
+from controller.law import LAW, HarmonicsTable
 from controller.lock import LockRule
 from controller.rest import RestSettings
 
 __all__ = ["PhaseLockedLoop"]
 
 
-class PhaseLockedLoop(FrequencySettings, RestSettings, DetectorSettings, AmplitudeSettings):
+class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorSettings, AmplitudeSettings):
     """Gains and bounds of the loop; `build` turns them into the record that the kernels read."""
 
     lock: LockRule = LockRule()
@@ -33,6 +33,11 @@ class PhaseLockedLoop(FrequencySettings, RestSettings, DetectorSettings, Amplitu
                 'detector = "sign": the frequency-error law needs amplitudes, allowed is two-phase or adaptive'
             )
         return self
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """Highest frequency of the window, Hz."""
+        return self.frequency_window_hz[1]
 
     def proportional_and_integral(self) -> tuple[float, float]:
         """Return ``(kp, ki)`` of the PI law.
@@ -64,5 +69,6 @@ class PhaseLockedLoop(FrequencySettings, RestSettings, DetectorSettings, Amplitu
         out["detector"] = self.build_detector(sample_rate_hz)
         gain, sees_rest = float(out["detector"]["gain"][0]), bool(out["rest"]["gain"][0] != 0.0)
         out["amplitude"] = self.build_amplitude(amplitude_law, largest_v, 1.0 / sample_rate_hz, gain, sees_rest)
+        out["harmonics"] = self.build_loop(sample_rate_hz, largest_v)
         out["lock"] = self.lock.build()
         return out

@@ -11,7 +11,9 @@ import numpy as np
 from controller.amplitude import FORCE_RMS, VOLTAGE, demand, held_size, see_output, take_over
 from controller.detector import ADAPTIVE, detect, force_rms
 from controller.frequency import follow
+from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics
 from controller.law import measure_phase
+from controller.lock import LOCKED
 from controller.period import add_sample
 from controller.primitives import TWO_PI, advance_phase, size
 from rig.daq import LOST
@@ -151,8 +153,22 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
 
 
 @inner_kernel
+def follow_harmonics(t: TickArrays, permitted: float, running: bool) -> None:
+    """Evaluate the harmonics loop, if there is one, for the permitted amplitude (V) of the output's fundamental.
+
+    It acts while the vibration is locked, or present at a frequency that the plan gives.
+    """
+    law, control, loop = t.law[0], t.control[0], t.loop[0]
+    if law.harmonics.highest == 0:
+        return
+    locked = control.lock.state == LOCKED if loop.drive == LOOP_DRIVE else loop.drive == TONE
+    acts = running and locked and control.vibration.present == 1
+    drive_harmonics(law.harmonics, control.harmonics, permitted, control.frequency.omega, acts)
+
+
+@inner_kernel
 def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
-    """Return the output (V) of this sample, ``Re(U exp(i theta))``, and advance the oscillator by one sample.
+    """Return the output (V) of this sample, ``Re(U exp(i theta))`` and harmonics, and advance the oscillator by one sample.
 
     A waveform is read from its table, one entry a sample.
     """
@@ -164,6 +180,8 @@ def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
         theta = TWO_PI * loop.play / period
     else:
         output = amplitude * math.cos(loop.theta + turn)
+        if t.law[0].harmonics.highest > 0:
+            output += amplitude * harmonics_at(t.law[0].harmonics, t.control[0].harmonics, loop.theta)
         theta = advance_phase(loop.theta, omega, loop.dt_s)
     if not math.isfinite(output):
         shut_down(t.guard[0], NON_FINITE_OUTPUT, -1, output, loop.sample, True)
@@ -211,6 +229,8 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         phasor = complex(cos_theta, sin_theta)
         detect(law.detector, control.detector, vibration, loop.force, loop.drive_motion, phasor, frequency.omega)
         measure_rms(t, amplitude.law)
+        if law.harmonics.highest > 0 and not lost:
+            measure_harmonics(law.harmonics, control.harmonics, loop.force, loop.drive_motion, phasor, frequency.omega)
         if t.expected[0].known == 1:
             judge_by_exciter(t, seen)
     lag_of_skew = frequency.omega * loop.skew_samples * loop.dt_s
@@ -230,6 +250,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         demanded = demand(law.amplitude, amplitude, vibration, progress.level, progress.lag, frequency.omega, by_loop)
         allowed = demanded if amplitude.law == VOLTAGE else permitted_level(t.following[0], demanded)
     permitted = permit_output(t, demanded, allowed, running)
+    follow_harmonics(t, permitted, running)
     output = oscillate(t, permitted, amplitude.output.turn)
 
     flags |= HELD if loop.held == 1 else 0

@@ -3,6 +3,7 @@
 import math
 
 from controller.amplitude import RESPONSE, VOLTAGE
+from controller.harmonics import end_harmonics_period
 from controller.lock import LOCKED, next_lock_state
 from controller.period import end_period
 from rig.tick.layout import TickArrays
@@ -59,5 +60,12 @@ def close_period(t: TickArrays) -> None:
     period.output_v = t.guard[0].amplitude_v
     period.saturated, period.clamped = amplitude.saturated, control.frequency.clamped
     wanted = t.progress[0].level if amplitude.law != VOLTAGE else 0.0
-    judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE)
+    harmonics = control.harmonics
+    if t.law[0].harmonics.highest > 0:
+        steady, held = t.settling[0].steady == 1, loop.held == 1
+        end_harmonics_period(
+            t.law[0].harmonics, harmonics, amplitude.output.amplitude_v, control.frequency.omega, steady, held
+        )
+    miss = harmonics.miss if t.law[0].harmonics.highest > 0 else 0.0
+    judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE, miss)
     judge_following(t)

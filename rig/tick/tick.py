@@ -21,6 +21,7 @@ from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 __all__ = ["Tick", "TickSettings"]
 
+NEGLIGIBLE_BITS = 0.1  # amplitude of a harmonic, in bits of the converter, that counts as none
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
 
 
@@ -52,6 +53,7 @@ class Tick:
     ) -> None:
         shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
         try:
+            _check_harmonics(law, bench, segments)
             law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, shape)
         except ValueError as error:
             raise ConfigurationError(f"controller.{error}") from None
@@ -64,6 +66,13 @@ class Tick:
         force, drive = bench.index_of("force"), bench.index_of("drive")
         smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
         law_record["lock"] = law.lock.build(smallest[force], smallest[drive])
+        limits = limits_record(bench)
+        if law.harmonics is not None:
+            controlled = bench.channels[force if law.harmonics.channel == "force" else drive]
+            law_record["harmonics"]["smallest"] = (
+                NEGLIGIBLE_BITS * controlled.resolution_v / abs(controlled.sensitivity_v_per_unit)
+            )
+            law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"]
         loop = np.zeros(1, LOOP)
         loop["lead_whole"] = math.floor(lead_samples)
         loop["lead_fraction"] = lead_samples - math.floor(lead_samples)
@@ -89,7 +98,7 @@ class Tick:
         self.arrays = TickArrays(
             law=law_record,
             rule=settle.build(),
-            limits=limits_record(bench),
+            limits=limits,
             inputs=input_records(bench),
             expected=expected,
             segments=table,
@@ -189,3 +198,11 @@ def _history(size: int, omega: float, dt: float) -> np.ndarray:
     out["theta"] = np.mod(-ago * omega * dt, 2.0 * math.pi)
     out["omega"] = omega
     return out
+
+
+def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment]) -> None:
+    """Raise ValueError if the harmonics loop cannot follow the highest frequency of the run."""
+    if law.harmonics is None:
+        return
+    tones = (segment.excitation.frequency_hz for segment in segments if segment.excitation is not None)
+    law.harmonics.check_frequency(bench.sample_rate_hz, max((law.highest_frequency_hz, *tones)))

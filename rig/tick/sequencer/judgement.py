@@ -38,6 +38,7 @@ SETTLING = np.dtype(
         ("forces", "f8", (2 * LONGEST_AVERAGE,)),
         ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
         ("count", "i8"),
+        ("steady", "i8"),
         ("good_periods", "i8"),
         ("bad_periods", "i8"),
         ("saturated_periods", "i8"),
@@ -62,7 +63,7 @@ def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
 
 @kernel
 def judge_period(
-    settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool
+    settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool, miss: float
 ) -> None:
     """Store the means of a ``period`` (of `controller.period.PERIOD`) and apply the settle rule.
 
@@ -70,7 +71,8 @@ def judge_period(
     averaged over ``average_periods`` is within ``phase_rad``. The averaged response amplitude is within ``amplitude``
     (relative) of its average ``average_periods`` before. If a loop holds the level, the average of the held quantity is within
     ``amplitude`` of ``wanted`` (0: no loop). With ``watch_force`` (open loop, held response) the averaged force must not change
-    by more than ``amplitude`` either.
+    by more than ``amplitude`` either. ``miss`` is the largest error of the controlled harmonics over its tolerance, 0 without
+    any; it must not exceed 1. Apart from it the vibration is ``steady``.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)
@@ -97,6 +99,8 @@ def judge_period(
     off = math.inf  # also if no phase could be read
     if math.isfinite(settling.mean_error_rad):
         off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
+    settling.steady = 1 if locked and off <= 1.0 else 0
+    off = max(off, miss)
     settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
     settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
     unreached = period.saturated == 1 and abs(drift) > 2.0 * rule.amplitude
@@ -108,6 +112,7 @@ def judge_period(
 def forget_periods(settling: Record) -> None:
     """Reset the settle rule: periods before the level was reached do not count."""
     settling.count = 0
+    settling.steady = 0
     settling.good_periods = 0
     settling.bad_periods = 0
     settling.saturated_periods = 0

@@ -1,0 +1,335 @@
+"""The harmonics loop: drives harmonics of the output so that those of the measured force take their wanted values.
+
+The output is ``u = U Re[exp(i (theta + turn)) + sum_h W_h exp(i h theta)]`` with a complex ratio W_h for each harmonic 2 to H.
+An adaptive filter estimates the force's harmonics F_h in the oscillator's phase. Near a steady vibration
+``F_h = D_h + P_h U W_h``: D_h comes from structure and exciter, P_h is the plant from output to force at that harmonic. One
+complex integral law for each harmonic acts through it, with the wanted G_h:
+
+    ``dW_h/dt = -k (F_h - G_h)/(P_h U)``
+
+k and the filter's corner are fractions of the oscillator's frequency, so that they suit any structure. P_h is measured once the
+vibration is locked and steady, by a small step of all harmonics at once, and again where an error does not decay. A harmonic
+whose plant cannot be told from noise is left alone. Not modelled: a change of one harmonic changes the others through the
+structure's nonlinearity; the integral laws take that for a disturbance.
+
+Source of the idea: arXiv 2410.17830, which controls the force's harmonics with adaptive filters in an iteration.
+"""
+
+import cmath
+import math
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from controller.adaptive_filter import MOST_HARMONICS, adapt, turn_phasors
+from controller.primitives import size
+from controller.settings import Settings
+from vibrolock.compiled import Record, inner_kernel, kernel
+
+__all__ = ["HARMONICS", "HARMONICS_STATE", "HarmonicStage", "HarmonicsSettings"]
+
+
+class HarmonicStage(IntEnum):
+    """What the harmonics loop does."""
+
+    WAITING = 0
+    """It waits for a locked, steady vibration; the output has no harmonics."""
+    LISTENING = 1
+    """It averages the force's harmonics before the step that measures the plant."""
+    PROBING = 2
+    """It averages them under the step."""
+    CONTROLLING = 3
+    """It drives them to their wanted values."""
+
+
+WAITING, LISTENING, PROBING, CONTROLLING = (int(stage) for stage in HarmonicStage)
+
+WAIT_PERIODS = 6  # for filter and exciter after the step
+MEAN_PERIODS = 4  # of the averages before and under the step
+CLEAR = 5.0  # times its standard error: the least change under the step from which a plant is learned
+PATIENCE = 40  # periods at a held level after which an error must have decayed
+DECAYED = 0.7  # to this part
+MOST_PROBES = 4
+JUDGED = 0.1  # corner of the judged error, as a part of the filter's
+SIGMAS = 4.0  # standard errors of the judged error that noise may cause
+LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
+
+HIGHEST_TURN = 0.8 * math.pi  # of the highest harmonic from sample to sample
+ORDERS = (MOST_HARMONICS + 1,)
+
+HARMONICS = np.dtype(
+    [
+        ("highest", "i8"),
+        ("of_drive", "i8"),
+        ("corner", "f8"),
+        ("integral", "f8"),
+        ("largest", "f8"),
+        ("probe", "f8"),
+        ("tolerance", "f8"),
+        ("smallest", "f8"),
+        ("largest_v", "f8"),
+        ("step_v", "f8"),
+        ("dt_s", "f8"),
+        ("prescribed", "i8"),
+        ("wanted", "c16", ORDERS),
+    ]
+)
+"""Parameters of the harmonics loop (one record). ``highest``: H, or 0 without the loop. ``of_drive``: the controlled channel is
+the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of every |W_h|. ``probe``:
+|W_h| of the step. ``tolerance``: of the fundamental. ``smallest``: error (N) that always counts as none. ``largest_v``: bound of
+the whole output. ``step_v``: bound of a harmonic's change from one sample to the next. ``wanted``: ratios to the
+fundamental where some are ``prescribed``."""
+
+HARMONICS_STATE = np.dtype(
+    [
+        ("stage", "i8"),
+        ("periods", "i8"),
+        ("probes", "i8"),
+        ("miss", "f8"),
+        ("miss_before", "f8"),
+        ("bounded", "i8"),
+        ("residual_square", "f8"),
+        ("off", "i8", ORDERS),
+        ("phasors", "c16", ORDERS),
+        ("filter", "c16", ORDERS),
+        ("ratio", "c16", ORDERS),
+        ("error", "c16", ORDERS),
+        ("judged", "c16", ORDERS),
+        ("sum", "c16", ORDERS),
+        ("before", "c16", ORDERS),
+        ("plant", "c16", ORDERS),
+    ]
+)
+"""State of the harmonics loop (one record). ``periods``: of the present stage. ``miss``: largest judged error over its
+tolerance; infinite before the loop controls. ``bounded``: the bound of the voltage holds harmonics back.
+``residual_square``: mean square of what the filter does not follow. ``off``: harmonics that are left alone. ``ratio``: W_h.
+``error``: F_h - G_h. ``judged``: its slow mean. ``sum``, ``before``: averages while probing. ``plant``: P_h."""
+
+
+class HarmonicsSettings(Settings):
+    """Harmonics of the output that make those of the force zero, or what is prescribed."""
+
+    highest: int = Field(7, ge=2, le=MOST_HARMONICS)
+    """H: highest harmonic that is controlled; the lowest is the second."""
+    channel: Literal["force", "drive"] = "force"
+    """Channel whose harmonics are controlled: the force, or the drive point's acceleration, for a base that is to move in a
+    sine."""
+    wanted: dict[int, tuple[float, float]] = {}
+    """Prescribed harmonics of that channel by their number: amplitude relative to the fundamental, and phase in deg. At phase 0
+    a peak of the harmonic coincides with a peak of the fundamental. All others are wanted to be zero."""
+    corner: float = Field(0.2, gt=0, le=0.5)
+    """Corner of the adaptive filter, as a fraction of the oscillator's frequency."""
+    integral: float = Field(0.04, gt=0, le=0.2)
+    """Integral gain, as a fraction of the oscillator's angular frequency: an error decays to 1/e within 1/(2 pi integral)
+    periods."""
+    probe: float = Field(0.02, gt=0, le=0.2)
+    """Amplitude of each harmonic in the step that measures the plant, relative to the output's fundamental."""
+    largest: float = Field(1.0, gt=0, le=10)
+    """Largest amplitude of a harmonic of the output, relative to its fundamental."""
+    tolerance: float = Field(0.002, gt=0, le=0.5)
+    """Largest error of a harmonic with which a point counts as settled, relative to the fundamental. What noise can cause and a
+    tenth of a bit of the converter are allowed in any case."""
+
+    @field_validator("wanted")
+    @classmethod
+    def _possible(cls, wanted: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
+        for order, (ratio, phase_deg) in wanted.items():
+            if not 2 <= order <= MOST_HARMONICS:
+                raise ValueError(f"has harmonic {order}, allowed is 2 to highest")
+            if not (0.0 <= ratio <= 10.0 and math.isfinite(phase_deg)):
+                raise ValueError(
+                    f"harmonic {order} = [{ratio:g}, {phase_deg:g}]: allowed is a ratio from 0 to 10 and a phase"
+                )
+        return wanted
+
+    def build_harmonics(self, sample_rate_hz: float, largest_v: float) -> np.ndarray:
+        """Return one record of `HARMONICS`; the bench gives ``smallest`` and ``step_v``, which the caller fills in.
+
+        Raises ValueError if a harmonic is prescribed above the highest.
+        """
+        for order in self.wanted:
+            if order > self.highest:
+                raise ValueError(f"harmonics.wanted: has harmonic {order}, allowed is 2 to highest = {self.highest}")
+        out = np.zeros(1, HARMONICS)
+        out["highest"], out["of_drive"] = self.highest, self.channel == "drive"
+        out["corner"], out["integral"] = self.corner, self.integral
+        out["largest"], out["probe"], out["tolerance"] = self.largest, self.probe, self.tolerance
+        out["largest_v"], out["dt_s"], out["step_v"] = largest_v, 1.0 / sample_rate_hz, largest_v
+        out["prescribed"] = bool(self.wanted)
+        for order, (ratio, phase_deg) in self.wanted.items():
+            out["wanted"][0, order] = cmath.rect(ratio, math.radians(phase_deg))
+        return out
+
+    def check_frequency(self, sample_rate_hz: float, highest_hz: float) -> None:
+        """Raise ValueError if an oscillator at ``highest_hz`` is too quick for the filter, or a harmonic for the sample rate."""
+        turn = 2.0 * math.pi * highest_hz / sample_rate_hz
+        at = f"at {highest_hz:g} Hz and {sample_rate_hz:g} samples/s"
+        if self.highest * turn > HIGHEST_TURN:
+            raise ValueError(f"harmonics.highest = {self.highest}: allowed {at} is up to {int(HIGHEST_TURN / turn)}")
+        if self.corner * turn * (2 * self.highest + 1) > 1.0:
+            most = 1.0 / (turn * (2 * self.highest + 1))
+            raise ValueError(
+                f"harmonics.corner = {self.corner:g}: allowed {at} is up to {most:.2g} with {self.highest} harmonics"
+            )
+
+
+@inner_kernel
+def measure_harmonics(
+    parameters: Record, state: Record, force: float, drive: float, phasor: complex, omega: float
+) -> None:
+    """Update the controlled channel's harmonics and their errors with one sample of force (N) and drive (m/s^2).
+
+    ``phasor`` is ``exp(i theta)`` at the input, ``omega`` the oscillator's frequency (rad/s). Both are without mean.
+    """
+    highest = parameters.highest
+    gain = parameters.corner * omega * parameters.dt_s
+    turn_phasors(state.phasors, highest, phasor.real, phasor.imag)
+    value = drive if parameters.of_drive == 1 else force
+    residual = adapt(state.filter, state.phasors, highest, value, gain)
+    state.residual_square += gain * (residual * residual - state.residual_square)
+    fundamental = state.filter[1]
+    amplitude = size(fundamental)
+    turn = fundamental / amplitude if amplitude > 0.0 else complex(1.0, 0.0)
+    turned = turn * amplitude
+    for order in range(2, highest + 1):
+        error = state.filter[order]
+        if parameters.prescribed == 1:
+            turned *= turn
+            error -= parameters.wanted[order] * turned
+        state.error[order] = error
+        state.judged[order] += JUDGED * gain * (error - state.judged[order])
+
+
+@inner_kernel
+def drive_harmonics(parameters: Record, state: Record, amplitude_v: float, omega: float, acts: bool) -> None:
+    """Evaluate the integral laws for one sample: update the ratios for an output whose fundamental is ``amplitude_v``.
+
+    Without ``acts`` the ratios are kept. The whole output stays within the largest voltage: harmonics give way to the
+    fundamental.
+    """
+    highest, total = parameters.highest, 0.0
+    gain = parameters.integral * omega * parameters.dt_s
+    for order in range(2, highest + 1):
+        if acts and amplitude_v > 0.0 and state.off[order] == 0 and state.stage == CONTROLLING:
+            error = state.error[order]
+            if size(error) > LEFT_ALONE * parameters.smallest:
+                step = -gain * error / (state.plant[order] * amplitude_v)
+                state.ratio[order] += step * min(
+                    1.0, parameters.step_v / max(size(step) * amplitude_v, parameters.step_v)
+                )
+                state.ratio[order] *= min(1.0, parameters.largest / max(size(state.ratio[order]), parameters.largest))
+        total += size(state.ratio[order])
+    state.bounded = 0
+    if amplitude_v * (1.0 + total) > parameters.largest_v and total > 0.0:
+        state.bounded = 1
+        left = max(parameters.largest_v / amplitude_v - 1.0, 0.0) / total
+        for order in range(2, highest + 1):
+            state.ratio[order] *= left
+
+
+@inner_kernel
+def harmonics_at(parameters: Record, state: Record, theta: float) -> float:
+    """Return ``Re sum_h W_h exp(i h theta)``, the harmonics of the output for a fundamental of one volt."""
+    turn = complex(math.cos(theta), math.sin(theta))
+    phasor, out = turn, 0.0
+    for order in range(2, parameters.highest + 1):
+        phasor *= turn
+        ratio = state.ratio[order]
+        out += ratio.real * phasor.real - ratio.imag * phasor.imag
+    return float(out)
+
+
+@kernel
+def probe_of(parameters: Record, order: int) -> complex:
+    """Return a harmonic's ratio in the step; the phases keep the sum of all harmonics low (Schroeder)."""
+    angle = -math.pi * order * (order - 1) / parameters.highest
+    return complex(parameters.probe * math.cos(angle), parameters.probe * math.sin(angle))
+
+
+@kernel
+def end_harmonics_period(
+    parameters: Record, state: Record, amplitude_v: float, omega: float, steady: bool, held: bool
+) -> None:
+    """Advance the loop's stage by one oscillator period, and judge the errors.
+
+    ``steady``: apart from harmonics the vibration is locked and settled at its level. ``held``: the level is not being ramped.
+    """
+    if state.stage == CONTROLLING:
+        judge_harmonics(parameters, state, omega, held)
+        return
+    state.miss = math.inf
+    state.periods += 1
+    if not steady:
+        if state.stage == PROBING:
+            for order in range(2, parameters.highest + 1):
+                state.ratio[order] -= probe_of(parameters, order)
+        state.stage = WAITING
+        return
+    if state.stage == WAITING:
+        state.stage, state.periods = LISTENING, WAIT_PERIODS  # a steady vibration has been waited for
+        state.sum[:] = 0.0
+        return
+    if state.periods <= WAIT_PERIODS:
+        return
+    for order in range(2, parameters.highest + 1):
+        state.sum[order] += state.filter[order] / MEAN_PERIODS
+    if state.periods < WAIT_PERIODS + MEAN_PERIODS:
+        return
+    if state.stage == LISTENING:
+        state.stage, state.periods = PROBING, 0
+        for order in range(2, parameters.highest + 1):
+            state.before[order] = state.sum[order]
+            state.ratio[order] += probe_of(parameters, order)
+            state.sum[order] = 0.0
+    else:
+        learn_plant(parameters, state, amplitude_v, omega)
+
+
+@kernel
+def learn_plant(parameters: Record, state: Record, amplitude_v: float, omega: float) -> None:
+    """Take every harmonic's plant from its change under the step, and begin to control; leave alone what is not clear."""
+    clear = CLEAR * standard_error(parameters, state, omega, 1.0)
+    for order in range(2, parameters.highest + 1):
+        change = state.sum[order] - state.before[order]
+        state.off[order] = 0 if size(change) > clear else 1
+        if state.off[order] == 0:
+            state.plant[order] = change / (probe_of(parameters, order) * amplitude_v)
+        else:
+            state.ratio[order] -= probe_of(parameters, order)
+        state.judged[order] = state.error[order]
+    state.probes += 1
+    state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
+
+
+@kernel
+def standard_error(parameters: Record, state: Record, omega: float, slower: float) -> float:
+    """Return the standard error of a harmonic behind the filter, or behind a low-pass whose corner is ``slower`` times its."""
+    gain = slower * parameters.corner * omega * parameters.dt_s
+    return math.sqrt(2.0 * gain * state.residual_square)
+
+
+@kernel
+def judge_harmonics(parameters: Record, state: Record, omega: float, held: bool) -> None:
+    """Compare the errors with their tolerances; measure the plant again if they do not decay at a held level."""
+    allowed = max(
+        parameters.tolerance * size(state.filter[1]),
+        parameters.smallest,
+        SIGMAS * standard_error(parameters, state, omega, JUDGED),
+    )
+    state.miss = 0.0
+    for order in range(2, parameters.highest + 1):
+        if state.off[order] == 0:
+            state.miss = max(state.miss, size(state.judged[order]) / allowed)
+    if not held or state.miss <= 1.0:
+        state.periods, state.miss_before = 0, math.inf
+        return
+    state.periods += 1
+    if state.periods == 1:
+        state.miss_before = state.miss
+    if state.periods > PATIENCE:
+        stays = state.miss > DECAYED * state.miss_before and state.bounded == 0
+        state.periods = 0
+        if stays and state.probes < MOST_PROBES:
+            state.stage = WAITING
