@@ -24,8 +24,8 @@ def turn_phasors(phasors: np.ndarray, harmonics: int, cos_theta: float, sin_thet
 
 
 @kernel
-def adapt(coefficients: np.ndarray, phasors: np.ndarray, harmonics: int, value: float, gain: float) -> float:
-    """Update the estimates of the mean and all harmonics with one sample of the signal; return what they had left over.
+def adapt(coefficients: np.ndarray, phasors: np.ndarray, harmonics: int, value: float, gain: float) -> None:
+    """Update the estimates of the mean and all harmonics with one sample of the signal.
 
     ``y_hat = Re sum C_h exp(i h theta)``, ``C_h <- C_h + 2 gain exp(-i h theta) (y - y_hat)``; the mean takes half the step.
     On average every C_h follows the signal's Y_h through a first-order low-pass with ``gain = 1 - exp(-w_LP dt)``. Only
@@ -40,7 +40,6 @@ def adapt(coefficients: np.ndarray, phasors: np.ndarray, harmonics: int, value: 
     for order in range(1, harmonics + 1):
         p = phasors[order]
         coefficients[order] += complex(step * p.real, -step * p.imag)
-    return error
 
 
 @kernel

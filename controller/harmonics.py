@@ -17,6 +17,7 @@ Source of the idea: arXiv 2410.17830, which controls the force's harmonics with 
 
 import cmath
 import math
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import Literal
 
@@ -48,12 +49,15 @@ WAITING, LISTENING, PROBING, CONTROLLING = (int(stage) for stage in HarmonicStag
 
 WAIT_PERIODS = 6  # for filter and exciter after the step
 MEAN_PERIODS = 4  # of the averages before and under the step
-CLEAR = 5.0  # times its standard error: the least change under the step from which a plant is learned
+CLEAR = 4.0  # times its scatter from period to period: the least change under the step from which a plant is learned
+NOISY = 1.0  # times its scatter: judged error that noise may cause; about four of its standard errors
+SCATTER = 0.1  # weight of the last period in the scatter
 PATIENCE = 40  # periods at a held level after which an error must have decayed
-DECAYED = 0.7  # to this part
+DECAYED = 0.7  # to this part, while all else is steady
+GROWN = 4.0  # factor by which no error may grow at a held level
 MOST_PROBES = 4
+LOUDER = 1.5  # times the output at which a harmonic was found too quiet: where it is tried again
 JUDGED = 0.1  # corner of the judged error, as a part of the filter's
-SIGMAS = 4.0  # standard errors of the judged error that noise may cause
 LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
 
 HIGHEST_TURN = 0.8 * math.pi  # of the highest harmonic from sample to sample
@@ -72,7 +76,6 @@ HARMONICS = np.dtype(
         ("largest_v", "f8"),
         ("step_v", "f8"),
         ("dt_s", "f8"),
-        ("prescribed", "i8"),
         ("wanted", "c16", ORDERS),
     ]
 )
@@ -80,7 +83,7 @@ HARMONICS = np.dtype(
 the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of every |W_h|. ``probe``:
 |W_h| of the step. ``tolerance``: of the fundamental. ``smallest``: error (N) that always counts as none. ``largest_v``: bound of
 the whole output. ``step_v``: bound of a harmonic's change from one sample to the next. ``wanted``: ratios to the
-fundamental where some are ``prescribed``."""
+fundamental, where the plan names none."""
 
 HARMONICS_STATE = np.dtype(
     [
@@ -89,23 +92,29 @@ HARMONICS_STATE = np.dtype(
         ("probes", "i8"),
         ("miss", "f8"),
         ("miss_before", "f8"),
+        ("amplitude_v", "f8"),
+        ("share", "f8"),
+        ("probe_v", "f8"),
         ("bounded", "i8"),
-        ("residual_square", "f8"),
         ("off", "i8", ORDERS),
+        ("prescribed", "i8"),
+        ("wanted", "c16", ORDERS),
         ("phasors", "c16", ORDERS),
         ("filter", "c16", ORDERS),
-        ("ratio", "c16", ORDERS),
+        ("volts", "c16", ORDERS),
         ("error", "c16", ORDERS),
         ("judged", "c16", ORDERS),
         ("sum", "c16", ORDERS),
         ("before", "c16", ORDERS),
         ("plant", "c16", ORDERS),
+        ("last", "c16", ORDERS),
+        ("scatter_square", "f8", ORDERS),
     ]
 )
 """State of the harmonics loop (one record). ``periods``: of the present stage. ``miss``: largest judged error over its
-tolerance; infinite before the loop controls. ``bounded``: the bound of the voltage holds harmonics back.
-``residual_square``: mean square of what the filter does not follow. ``off``: harmonics that are left alone. ``ratio``: W_h.
-``error``: F_h - G_h. ``judged``: its slow mean. ``sum``, ``before``: averages while probing. ``plant``: P_h."""
+tolerance; infinite before the loop controls. ``bounded``: the bound of the voltage holds harmonics back. ``off``: harmonics that are left alone. ``ratio``: W_h.
+``error``: F_h - G_h. ``judged``: its slow mean. ``sum``, ``before``: averages while probing. ``plant``: P_h. ``last``, ``scatter_square``: F_h at
+the end of the last period, and mean square of its change from period to period."""
 
 
 class HarmonicsSettings(Settings):
@@ -124,13 +133,16 @@ class HarmonicsSettings(Settings):
     integral: float = Field(0.04, gt=0, le=0.2)
     """Integral gain, as a fraction of the oscillator's angular frequency: an error decays to 1/e within 1/(2 pi integral)
     periods."""
-    probe: float = Field(0.02, gt=0, le=0.2)
+    probe: float = Field(0.004, gt=0, le=0.2)
     """Amplitude of each harmonic in the step that measures the plant, relative to the output's fundamental."""
     largest: float = Field(1.0, gt=0, le=10)
     """Largest amplitude of a harmonic of the output, relative to its fundamental."""
     tolerance: float = Field(0.002, gt=0, le=0.5)
     """Largest error of a harmonic with which a point counts as settled, relative to the fundamental. What noise can cause and a
     tenth of a bit of the converter are allowed in any case."""
+    accepted: float = Field(0.005, gt=0, le=0.5)
+    """Largest error of a recorded harmonic with which a point is accepted, relative to the fundamental; three of its standard
+    errors and a tenth of a bit are allowed in any case."""
 
     @field_validator("wanted")
     @classmethod
@@ -157,9 +169,7 @@ class HarmonicsSettings(Settings):
         out["corner"], out["integral"] = self.corner, self.integral
         out["largest"], out["probe"], out["tolerance"] = self.largest, self.probe, self.tolerance
         out["largest_v"], out["dt_s"], out["step_v"] = largest_v, 1.0 / sample_rate_hz, largest_v
-        out["prescribed"] = bool(self.wanted)
-        for order, (ratio, phase_deg) in self.wanted.items():
-            out["wanted"][0, order] = cmath.rect(ratio, math.radians(phase_deg))
+        out["wanted"] = harmonic_ratios(self.wanted)
         return out
 
     def check_frequency(self, sample_rate_hz: float, highest_hz: float) -> None:
@@ -175,6 +185,34 @@ class HarmonicsSettings(Settings):
             )
 
 
+def harmonic_ratios(wanted: Mapping[int, tuple[float, float]]) -> np.ndarray:
+    """Return complex ratios to the fundamental, complex128[13], from amplitude ratios and phases (deg) by harmonic."""
+    out = np.zeros(ORDERS, np.complex128)
+    for order, (ratio, phase_deg) in wanted.items():
+        out[order] = cmath.rect(ratio, math.radians(phase_deg))
+    return out
+
+
+@kernel
+def want_harmonics(state: Record, wanted: np.ndarray) -> None:
+    """Prescribe the channel's harmonics, as complex ratios to the fundamental: complex128[13], entry h is harmonic h."""
+    state.prescribed = 0
+    for order in range(2, wanted.size):
+        state.wanted[order] = wanted[order]
+        if wanted[order] != 0.0:
+            state.prescribed = 1
+
+
+@kernel
+def left_alone(parameters: Record, state: Record) -> int:
+    """Return the harmonics that the loop leaves alone, as bits: bit h for harmonic h."""
+    bits = 0
+    for order in range(2, parameters.highest + 1):
+        if state.off[order] == 1:
+            bits |= 1 << order
+    return bits
+
+
 @inner_kernel
 def measure_harmonics(
     parameters: Record, state: Record, force: float, drive: float, phasor: complex, omega: float
@@ -187,84 +225,93 @@ def measure_harmonics(
     gain = parameters.corner * omega * parameters.dt_s
     turn_phasors(state.phasors, highest, phasor.real, phasor.imag)
     value = drive if parameters.of_drive == 1 else force
-    residual = adapt(state.filter, state.phasors, highest, value, gain)
-    state.residual_square += gain * (residual * residual - state.residual_square)
+    adapt(state.filter, state.phasors, highest, value, gain)
     fundamental = state.filter[1]
     amplitude = size(fundamental)
     turn = fundamental / amplitude if amplitude > 0.0 else complex(1.0, 0.0)
     turned = turn * amplitude
     for order in range(2, highest + 1):
         error = state.filter[order]
-        if parameters.prescribed == 1:
+        if state.prescribed == 1:
             turned *= turn
-            error -= parameters.wanted[order] * turned
+            error -= state.wanted[order] * turned
         state.error[order] = error
         state.judged[order] += JUDGED * gain * (error - state.judged[order])
 
 
 @inner_kernel
-def drive_harmonics(parameters: Record, state: Record, amplitude_v: float, omega: float, acts: bool) -> None:
-    """Evaluate the integral laws for one sample: update the ratios for an output whose fundamental is ``amplitude_v``.
+def drive_harmonics(
+    parameters: Record, state: Record, amplitude_v: float, omega: float, running: bool, acts: bool
+) -> None:
+    """Evaluate the integral laws for one sample: update the harmonics of an output whose fundamental is ``amplitude_v``.
 
-    Without ``acts`` the ratios are kept. The whole output stays within the largest voltage: harmonics give way to the
-    fundamental.
+    Without ``acts`` they are kept. Once the run is not ``running`` any more, they come down with the fundamental. The whole
+    output stays within the largest voltage: harmonics give way to the fundamental.
     """
+    if running:
+        state.amplitude_v = amplitude_v
+        state.share = 1.0
+    else:
+        state.share = amplitude_v / state.amplitude_v if state.amplitude_v > 0.0 else 0.0
+        return
     highest, total = parameters.highest, 0.0
     gain = parameters.integral * omega * parameters.dt_s
+    most = parameters.largest * amplitude_v
     for order in range(2, highest + 1):
-        if acts and amplitude_v > 0.0 and state.off[order] == 0 and state.stage == CONTROLLING:
+        volts = state.volts[order]
+        if acts and state.off[order] == 0 and state.stage == CONTROLLING:
             error = state.error[order]
             if size(error) > LEFT_ALONE * parameters.smallest:
-                step = -gain * error / (state.plant[order] * amplitude_v)
-                state.ratio[order] += step * min(
-                    1.0, parameters.step_v / max(size(step) * amplitude_v, parameters.step_v)
-                )
-                state.ratio[order] *= min(1.0, parameters.largest / max(size(state.ratio[order]), parameters.largest))
-        total += size(state.ratio[order])
+                step = -gain * error / state.plant[order]
+                volts += step * min(1.0, parameters.step_v / max(size(step), parameters.step_v))
+        volts *= most / max(size(volts), most) if most > 0.0 else 0.0
+        state.volts[order] = volts
+        total += size(volts)
     state.bounded = 0
-    if amplitude_v * (1.0 + total) > parameters.largest_v and total > 0.0:
+    if amplitude_v + total > parameters.largest_v and total > 0.0:
         state.bounded = 1
-        left = max(parameters.largest_v / amplitude_v - 1.0, 0.0) / total
+        left = max(parameters.largest_v - amplitude_v, 0.0) / total
         for order in range(2, highest + 1):
-            state.ratio[order] *= left
+            state.volts[order] *= left
 
 
 @inner_kernel
 def harmonics_at(parameters: Record, state: Record, theta: float) -> float:
-    """Return ``Re sum_h W_h exp(i h theta)``, the harmonics of the output for a fundamental of one volt."""
+    """Return ``Re sum_h V_h exp(i h theta)`` (V), the harmonics of the output."""
     turn = complex(math.cos(theta), math.sin(theta))
     phasor, out = turn, 0.0
     for order in range(2, parameters.highest + 1):
         phasor *= turn
-        ratio = state.ratio[order]
-        out += ratio.real * phasor.real - ratio.imag * phasor.imag
-    return float(out)
+        volts = state.volts[order]
+        out += volts.real * phasor.real - volts.imag * phasor.imag
+    return float(state.share * out)
 
 
 @kernel
 def probe_of(parameters: Record, order: int) -> complex:
-    """Return a harmonic's ratio in the step; the phases keep the sum of all harmonics low (Schroeder)."""
+    """Return a harmonic of the step, relative to the fundamental; the phases keep the sum of all low (Schroeder)."""
     angle = -math.pi * order * (order - 1) / parameters.highest
     return complex(parameters.probe * math.cos(angle), parameters.probe * math.sin(angle))
 
 
 @kernel
-def end_harmonics_period(
-    parameters: Record, state: Record, amplitude_v: float, omega: float, steady: bool, held: bool
-) -> None:
+def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, steady: bool, free: bool) -> None:
     """Advance the loop's stage by one oscillator period, and judge the errors.
 
-    ``steady``: apart from harmonics the vibration is locked and settled at its level. ``held``: the level is not being ramped.
+    ``steady``: apart from harmonics the vibration is locked and settled at its level. ``free``: the level is held and nothing
+    is recorded, so that the plant may be measured.
     """
+    if state.stage != PROBING:
+        see_scatter(parameters, state)
     if state.stage == CONTROLLING:
-        judge_harmonics(parameters, state, omega, held)
+        judge_harmonics(parameters, state, amplitude_v, steady, free)
         return
     state.miss = math.inf
     state.periods += 1
     if not steady:
         if state.stage == PROBING:
             for order in range(2, parameters.highest + 1):
-                state.ratio[order] -= probe_of(parameters, order)
+                state.volts[order] -= probe_of(parameters, order) * state.probe_v
         state.stage = WAITING
         return
     if state.stage == WAITING:
@@ -278,58 +325,63 @@ def end_harmonics_period(
     if state.periods < WAIT_PERIODS + MEAN_PERIODS:
         return
     if state.stage == LISTENING:
-        state.stage, state.periods = PROBING, 0
+        state.stage, state.periods, state.probe_v = PROBING, 0, amplitude_v
         for order in range(2, parameters.highest + 1):
             state.before[order] = state.sum[order]
-            state.ratio[order] += probe_of(parameters, order)
+            state.volts[order] += probe_of(parameters, order) * state.probe_v
             state.sum[order] = 0.0
     else:
-        learn_plant(parameters, state, amplitude_v, omega)
+        learn_plant(parameters, state)
 
 
 @kernel
-def learn_plant(parameters: Record, state: Record, amplitude_v: float, omega: float) -> None:
+def learn_plant(parameters: Record, state: Record) -> None:
     """Take every harmonic's plant from its change under the step, and begin to control; leave alone what is not clear."""
-    clear = CLEAR * standard_error(parameters, state, omega, 1.0)
     for order in range(2, parameters.highest + 1):
         change = state.sum[order] - state.before[order]
-        state.off[order] = 0 if size(change) > clear else 1
+        state.off[order] = 0 if size(change) > CLEAR * math.sqrt(state.scatter_square[order]) else 1
         if state.off[order] == 0:
-            state.plant[order] = change / (probe_of(parameters, order) * amplitude_v)
+            state.plant[order] = change / (probe_of(parameters, order) * state.probe_v)
         else:
-            state.ratio[order] -= probe_of(parameters, order)
+            state.volts[order] -= probe_of(parameters, order) * state.probe_v
         state.judged[order] = state.error[order]
-    state.probes += 1
     state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
 
 
 @kernel
-def standard_error(parameters: Record, state: Record, omega: float, slower: float) -> float:
-    """Return the standard error of a harmonic behind the filter, or behind a low-pass whose corner is ``slower`` times its."""
-    gain = slower * parameters.corner * omega * parameters.dt_s
-    return math.sqrt(2.0 * gain * state.residual_square)
+def see_scatter(parameters: Record, state: Record) -> None:
+    """Update the mean square of each harmonic's change from one period to the next, by which noise is told."""
+    for order in range(2, parameters.highest + 1):
+        change = size(state.filter[order] - state.last[order])
+        state.last[order] = state.filter[order]
+        state.scatter_square[order] += SCATTER * (change * change - state.scatter_square[order])
 
 
 @kernel
-def judge_harmonics(parameters: Record, state: Record, omega: float, held: bool) -> None:
-    """Compare the errors with their tolerances; measure the plant again if they do not decay at a held level."""
-    allowed = max(
-        parameters.tolerance * size(state.filter[1]),
-        parameters.smallest,
-        SIGMAS * standard_error(parameters, state, omega, JUDGED),
-    )
+def judge_harmonics(parameters: Record, state: Record, amplitude_v: float, steady: bool, free: bool) -> None:
+    """Compare the errors with their tolerances.
+
+    Measure the plant again if at a held level they grow or do not decay, or if a harmonic was left alone at a lower level.
+    """
+    allowed = max(parameters.tolerance * size(state.filter[1]), parameters.smallest)
     state.miss = 0.0
     for order in range(2, parameters.highest + 1):
         if state.off[order] == 0:
-            state.miss = max(state.miss, size(state.judged[order]) / allowed)
-    if not held or state.miss <= 1.0:
+            noise = NOISY * math.sqrt(state.scatter_square[order])
+            state.miss = max(state.miss, size(state.judged[order]) / max(allowed, noise))
+    if steady and free and amplitude_v > LOUDER * state.probe_v and left_alone(parameters, state) != 0:
+        state.stage = WAITING
+        return
+    if not free or state.miss <= 1.0:
         state.periods, state.miss_before = 0, math.inf
         return
-    state.periods += 1
-    if state.periods == 1:
+    if state.periods == 0:
         state.miss_before = state.miss
-    if state.periods > PATIENCE:
-        stays = state.miss > DECAYED * state.miss_before and state.bounded == 0
+    state.periods += 1
+    grows = state.miss > GROWN * state.miss_before
+    if state.periods > PATIENCE or grows:
+        stays = grows or (steady and state.miss > DECAYED * state.miss_before)
         state.periods = 0
-        if stays and state.probes < MOST_PROBES:
+        if stays and state.bounded == 0 and state.probes < MOST_PROBES:
             state.stage = WAITING
+            state.probes += 1

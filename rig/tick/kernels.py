@@ -11,7 +11,7 @@ import numpy as np
 from controller.amplitude import FORCE_RMS, VOLTAGE, demand, held_size, see_output, take_over
 from controller.detector import ADAPTIVE, detect, force_rms
 from controller.frequency import follow
-from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics
+from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
 from controller.law import measure_phase
 from controller.lock import LOCKED
 from controller.period import add_sample
@@ -95,6 +95,8 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
     if segment.drive == TONE and loop.drive == LOOP_DRIVE:
         progress.omega = control.frequency.omega  # from where the tone's ramp goes to its own frequency
     loop.drive = segment.drive
+    if t.law[0].harmonics.highest > 0:
+        want_harmonics(control.harmonics, segment.harmonics)
     if segment.amplitude_law != amplitude.law:
         begin_to_follow(t.expected[0], t.following[0], amplitude.output.amplitude_v, 0.0, 0.0)
         measure_rms(t, segment.amplitude_law)
@@ -163,7 +165,7 @@ def follow_harmonics(t: TickArrays, permitted: float, running: bool) -> None:
         return
     locked = control.lock.state == LOCKED if loop.drive == LOOP_DRIVE else loop.drive == TONE
     acts = running and locked and control.vibration.present == 1
-    drive_harmonics(law.harmonics, control.harmonics, permitted, control.frequency.omega, acts)
+    drive_harmonics(law.harmonics, control.harmonics, permitted, control.frequency.omega, running, acts)
 
 
 @inner_kernel
@@ -181,7 +183,7 @@ def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
     else:
         output = amplitude * math.cos(loop.theta + turn)
         if t.law[0].harmonics.highest > 0:
-            output += amplitude * harmonics_at(t.law[0].harmonics, t.control[0].harmonics, loop.theta)
+            output += harmonics_at(t.law[0].harmonics, t.control[0].harmonics, loop.theta)
         theta = advance_phase(loop.theta, omega, loop.dt_s)
     if not math.isfinite(output):
         shut_down(t.guard[0], NON_FINITE_OUTPUT, -1, output, loop.sample, True)

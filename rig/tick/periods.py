@@ -3,7 +3,7 @@
 import math
 
 from controller.amplitude import RESPONSE, VOLTAGE
-from controller.harmonics import end_harmonics_period
+from controller.harmonics import end_harmonics_period, left_alone
 from controller.lock import LOCKED, next_lock_state
 from controller.period import end_period
 from rig.tick.layout import TickArrays
@@ -11,7 +11,7 @@ from rig.tick.safety.following import follow_level, see_frequency, silent_side
 from rig.tick.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.judgement import judge_period
-from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
+from rig.tick.sequencer.layout import LOOP_DRIVE, RECORD, TONE, WAVEFORM
 from vibrolock.compiled import kernel
 
 
@@ -39,6 +39,20 @@ def judge_following(t: TickArrays) -> None:
 
 
 @kernel
+def end_harmonics(t: TickArrays) -> float:
+    """Process the end of a period in the harmonics loop; return its largest error over its tolerance, 0 without the loop."""
+    loop, control, progress, settling = t.loop[0], t.control[0], t.progress[0], t.settling[0]
+    law, state = t.law[0].harmonics, control.harmonics
+    if law.highest == 0:
+        return 0.0
+    recording = progress.entered == 1 and t.segments[progress.segment].kind == RECORD
+    free, amplitude_v = loop.held == 1 and not recording, control.amplitude.output.amplitude_v
+    end_harmonics_period(law, state, amplitude_v, settling.steady == 1, free)
+    settling.left_alone = left_alone(law, state)
+    return float(state.miss)
+
+
+@kernel
 def close_period(t: TickArrays) -> None:
     """Process the end of an oscillator period at the inputs."""
     loop, control = t.loop[0], t.control[0]
@@ -60,12 +74,6 @@ def close_period(t: TickArrays) -> None:
     period.output_v = t.guard[0].amplitude_v
     period.saturated, period.clamped = amplitude.saturated, control.frequency.clamped
     wanted = t.progress[0].level if amplitude.law != VOLTAGE else 0.0
-    harmonics = control.harmonics
-    if t.law[0].harmonics.highest > 0:
-        steady, held = t.settling[0].steady == 1, loop.held == 1
-        end_harmonics_period(
-            t.law[0].harmonics, harmonics, amplitude.output.amplitude_v, control.frequency.omega, steady, held
-        )
-    miss = harmonics.miss if t.law[0].harmonics.highest > 0 else 0.0
-    judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE, miss)
+    distortion = end_harmonics(t)
+    judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE, distortion)
     judge_following(t)

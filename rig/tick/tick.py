@@ -62,7 +62,9 @@ class Tick:
                 f"lead_samples = {lead_samples:g}: an output shows at the next sample at the earliest"
             )
         lag_rad = float(law_record["frequency"]["target_lag_rad"][0])
-        table, outcomes = segment_table(segments, bench.sample_rate_hz, amplitude_law, lag_rad)
+        table, outcomes = segment_table(
+            segments, bench.sample_rate_hz, amplitude_law, lag_rad, law_record["harmonics"]["wanted"][0]
+        )
         force, drive = bench.index_of("force"), bench.index_of("drive")
         smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
         law_record["lock"] = law.lock.build(smallest[force], smallest[drive])

@@ -39,6 +39,8 @@ SETTLING = np.dtype(
         ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
         ("count", "i8"),
         ("steady", "i8"),
+        ("distortion", "f8"),
+        ("left_alone", "i8"),
         ("good_periods", "i8"),
         ("bad_periods", "i8"),
         ("saturated_periods", "i8"),
@@ -63,7 +65,7 @@ def mean_of(ring: np.ndarray, last: int, periods: int) -> float:
 
 @kernel
 def judge_period(
-    settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool, miss: float
+    settling: Record, rule: Record, period: Record, wanted: float, locked: bool, watch_force: bool, distortion: float
 ) -> None:
     """Store the means of a ``period`` (of `controller.period.PERIOD`) and apply the settle rule.
 
@@ -71,7 +73,7 @@ def judge_period(
     averaged over ``average_periods`` is within ``phase_rad``. The averaged response amplitude is within ``amplitude``
     (relative) of its average ``average_periods`` before. If a loop holds the level, the average of the held quantity is within
     ``amplitude`` of ``wanted`` (0: no loop). With ``watch_force`` (open loop, held response) the averaged force must not change
-    by more than ``amplitude`` either. ``miss`` is the largest error of the controlled harmonics over its tolerance, 0 without
+    by more than ``amplitude`` either. ``distortion`` is the largest error of the controlled harmonics over its tolerance, 0 without
     any; it must not exceed 1. Apart from it the vibration is ``steady``.
     """
     n = rule.average_periods
@@ -100,7 +102,8 @@ def judge_period(
     if math.isfinite(settling.mean_error_rad):
         off = max(abs(settling.mean_error_rad) / rule.phase_rad, abs(drift) / rule.amplitude)
     settling.steady = 1 if locked and off <= 1.0 else 0
-    off = max(off, miss)
+    settling.distortion = distortion
+    off = max(off, distortion)
     settling.good_periods = settling.good_periods + 1 if locked and off <= 1.0 else 0
     settling.bad_periods = settling.bad_periods + 1 if off > LOST_FACTOR else 0
     unreached = period.saturated == 1 and abs(drift) > 2.0 * rule.amplitude

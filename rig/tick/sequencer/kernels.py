@@ -62,6 +62,7 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
     entry.periods = progress.cycle - progress.start_cycle
     entry.mean_error_rad = settling.mean_error_rad
     entry.drift = settling.drift
+    entry.distortion, entry.left_alone = settling.distortion, settling.left_alone
     entry.held = progress.held
     entry.lost = progress.lost
     progress.segment += 1

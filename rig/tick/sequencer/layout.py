@@ -7,6 +7,8 @@ from enum import IntEnum
 
 import numpy as np
 
+from controller.harmonics import ORDERS
+
 __all__ = ["OUTCOME", "PROGRESS", "REFUSED", "RING", "SEGMENT", "Drive", "OnFailure", "Outcome", "SegmentKind"]
 
 
@@ -93,6 +95,7 @@ SEGMENT = np.dtype(
         ("logarithmic", "i8"),
         ("waveform", "i8"),
         ("again", "i8"),
+        ("harmonics", "c16", ORDERS),
     ]
 )
 """One segment of a plan, ``periods`` long, or ``samples`` where these are not 0.
@@ -100,7 +103,7 @@ SEGMENT = np.dtype(
 ``level``: in the unit of the amplitude law (V, N, m); ``geometric``: ramped by the logarithm. ``lag_rad``: wanted phase lag.
 ``omega``: final frequency of a tone (rad/s). ``rate``: of a sweep, in rad/s per sample, or in 1 per sample if ``logarithmic``.
 ``waveform``: number of the waveform that is played. ``again``: of a record, the number of the segment with which its
-repetition begins; else -1."""
+repetition begins; else -1. ``harmonics``: those that the harmonics loop makes, as ratios to the fundamental."""
 
 OUTCOME = np.dtype(
     [
@@ -112,10 +115,13 @@ OUTCOME = np.dtype(
         ("drift", "f8"),
         ("held", "i8"),
         ("lost", "i8"),
+        ("distortion", "f8"),
+        ("left_alone", "i8"),
     ]
 )
 """Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, number
-of samples with a held output and of lost ones."""
+of samples with a held output and of lost ones. ``distortion``: last error of the controlled harmonics over its tolerance;
+``left_alone``: bit h for each harmonic h that the harmonics loop leaves alone."""
 
 REFUSED = np.dtype(
     [

@@ -1,7 +1,7 @@
 """Settings of the settle rule, and conversion of a plan's steps to the table of segments of the compiled sequencer."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from controller import AmplitudeLaw
+from controller.harmonics import harmonic_ratios
 from rig.bench.configuration import Configured
 from rig.tick.sequencer.judgement import LONGEST_AVERAGE, SETTLE_RULE
 from rig.tick.sequencer.layout import OUTCOME, SEGMENT, Drive, OnFailure, SegmentKind
@@ -76,7 +77,8 @@ class Segment:
     Without an ``excitation`` the phase-locked loop chooses the frequency for the lag ``lag_deg`` (by default the law's).
     ``amplitude_law`` says what the level prescribes (by default as in the plan). If the amplitude law changes, the level starts
     at the measured value, without a bump. A ``geometric`` ramp interpolates the logarithm of the level. A held segment with
-    ``duration_s`` ignores its ``periods``; a sweep also ignores them and ends at its last frequency.
+    ``duration_s`` ignores its ``periods``; a sweep also ignores them and ends at its last frequency. ``harmonics`` are those that
+    the harmonics loop makes, as amplitude relative to the fundamental and phase in deg (by default the law's).
     """
 
     kind: SegmentKind
@@ -90,6 +92,7 @@ class Segment:
     lag_deg: float | None = None
     geometric: bool = False
     duration_s: float | None = None
+    harmonics: Mapping[int, tuple[float, float]] | None = None
 
 
 def segment_table(
@@ -97,10 +100,11 @@ def segment_table(
     sample_rate_hz: float,
     amplitude_law: AmplitudeLaw = AmplitudeLaw.VOLTAGE,
     lag_rad: float = -0.5 * math.pi,
+    harmonics: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the table of segments and the matching table of outcomes, all pending.
 
-    ``amplitude_law`` and ``lag_rad`` apply to segments that do not give their own.
+    ``amplitude_law``, ``lag_rad`` and ``harmonics`` (complex ratios by number) apply to segments that do not give their own.
     """
     table = np.zeros(len(segments), SEGMENT)
     for index, (row, segment) in enumerate(zip(table, segments, strict=True)):
@@ -112,6 +116,7 @@ def segment_table(
         row["geometric"] = segment.geometric
         row["again"] = _again(segments, index) if segment.kind is SegmentKind.RECORD else -1
         row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
+        row["harmonics"] = harmonics if segment.harmonics is None else harmonic_ratios(segment.harmonics)
         if segment.excitation is not None:
             _fill_in(row, segment.excitation, sample_rate_hz)
     outcomes = np.zeros(len(segments), OUTCOME)
