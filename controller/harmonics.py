@@ -49,6 +49,7 @@ WAITING, LISTENING, PROBING, CONTROLLING = (int(stage) for stage in HarmonicStag
 
 WAIT_PERIODS = 6  # for filter and exciter after the step
 MEAN_PERIODS = 4  # of the averages before and under the step
+LARGER, LARGEST_PROBE = 3.0, 0.04  # factor of the next step, and the largest, relative to the fundamental
 CLEAR = 4.0  # times its scatter from period to period: the least change under the step from which a plant is learned
 NOISY = 1.0  # times its scatter: judged error that noise may cause; about four of its standard errors
 SCATTER = 0.1  # weight of the last period in the scatter
@@ -95,6 +96,7 @@ HARMONICS_STATE = np.dtype(
         ("amplitude_v", "f8"),
         ("share", "f8"),
         ("probe_v", "f8"),
+        ("probe", "f8", ORDERS),
         ("bounded", "i8"),
         ("off", "i8", ORDERS),
         ("prescribed", "i8"),
@@ -288,10 +290,19 @@ def harmonics_at(parameters: Record, state: Record, theta: float) -> float:
 
 
 @kernel
-def probe_of(parameters: Record, order: int) -> complex:
-    """Return a harmonic of the step, relative to the fundamental; the phases keep the sum of all low (Schroeder)."""
+def probe_of(parameters: Record, state: Record, order: int) -> complex:
+    """Return a harmonic of the step (V); the phases keep the sum of all low (Schroeder)."""
     angle = -math.pi * order * (order - 1) / parameters.highest
-    return complex(parameters.probe * math.cos(angle), parameters.probe * math.sin(angle))
+    volts = state.probe[order] * state.probe_v
+    return complex(volts * math.cos(angle), volts * math.sin(angle))
+
+
+@kernel
+def listen(parameters: Record, state: Record, periods: int) -> None:
+    """Begin to average the harmonics, after ``periods`` of the time that is waited have passed."""
+    state.stage, state.periods = LISTENING, periods
+    for order in range(2, parameters.highest + 1):
+        state.sum[order] = 0.0
 
 
 @kernel
@@ -311,12 +322,13 @@ def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, 
     if not steady:
         if state.stage == PROBING:
             for order in range(2, parameters.highest + 1):
-                state.volts[order] -= probe_of(parameters, order) * state.probe_v
+                state.volts[order] -= probe_of(parameters, state, order)
         state.stage = WAITING
         return
     if state.stage == WAITING:
-        state.stage, state.periods = LISTENING, WAIT_PERIODS  # a steady vibration has been waited for
-        state.sum[:] = 0.0
+        for order in range(2, parameters.highest + 1):
+            state.probe[order] = parameters.probe
+        listen(parameters, state, WAIT_PERIODS)  # a steady vibration has been waited for
         return
     if state.periods <= WAIT_PERIODS:
         return
@@ -328,7 +340,7 @@ def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, 
         state.stage, state.periods, state.probe_v = PROBING, 0, amplitude_v
         for order in range(2, parameters.highest + 1):
             state.before[order] = state.sum[order]
-            state.volts[order] += probe_of(parameters, order) * state.probe_v
+            state.volts[order] += probe_of(parameters, state, order)
             state.sum[order] = 0.0
     else:
         learn_plant(parameters, state)
@@ -336,16 +348,26 @@ def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, 
 
 @kernel
 def learn_plant(parameters: Record, state: Record) -> None:
-    """Take every harmonic's plant from its change under the step, and begin to control; leave alone what is not clear."""
+    """Take every harmonic's plant from its change under the step, and begin to control.
+
+    Where a change is not clear, repeat with a larger step of that harmonic; leave it alone if the largest one shows nothing.
+    """
+    again = False
     for order in range(2, parameters.highest + 1):
-        change = state.sum[order] - state.before[order]
-        state.off[order] = 0 if size(change) > CLEAR * math.sqrt(state.scatter_square[order]) else 1
-        if state.off[order] == 0:
-            state.plant[order] = change / (probe_of(parameters, order) * state.probe_v)
-        else:
-            state.volts[order] -= probe_of(parameters, order) * state.probe_v
+        change, step = state.sum[order] - state.before[order], probe_of(parameters, state, order)
+        state.volts[order] -= step
+        clear = size(change) > CLEAR * math.sqrt(state.scatter_square[order])
+        state.off[order] = 0 if clear else 1
+        if clear:
+            state.plant[order] = change / step
+        elif state.probe[order] * LARGER <= LARGEST_PROBE:
+            state.probe[order] *= LARGER
+            again = True
         state.judged[order] = state.error[order]
-    state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
+    if again:
+        listen(parameters, state, 0)
+    else:
+        state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
 
 
 @kernel

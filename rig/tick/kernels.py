@@ -13,7 +13,7 @@ from controller.detector import ADAPTIVE, detect, force_rms
 from controller.frequency import follow
 from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
 from controller.law import measure_phase
-from controller.lock import LOCKED
+from controller.lock import LOST as LOST_LOCK
 from controller.period import add_sample
 from controller.primitives import TWO_PI, advance_phase, size
 from rig.daq import LOST
@@ -158,13 +158,13 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
 def follow_harmonics(t: TickArrays, permitted: float, running: bool) -> None:
     """Evaluate the harmonics loop, if there is one, for the permitted amplitude (V) of the output's fundamental.
 
-    It acts while the vibration is locked, or present at a frequency that the plan gives.
+    It acts unless the lock is lost, or while the vibration is present at a frequency that the plan gives.
     """
     law, control, loop = t.law[0], t.control[0], t.loop[0]
     if law.harmonics.highest == 0:
         return
-    locked = control.lock.state == LOCKED if loop.drive == LOOP_DRIVE else loop.drive == TONE
-    acts = running and locked and control.vibration.present == 1
+    followed = control.lock.state != LOST_LOCK if loop.drive == LOOP_DRIVE else loop.drive == TONE
+    acts = running and followed and control.vibration.present == 1
     drive_harmonics(law.harmonics, control.harmonics, permitted, control.frequency.omega, running, acts)
 
 

@@ -24,6 +24,7 @@ from rig.tick.sequencer.judgement import (
     was_always_far,
 )
 from rig.tick.sequencer.layout import (
+    HOLD,
     LEVEL_SWEEP,
     LOOP_DRIVE,
     RAMP,
@@ -49,6 +50,9 @@ INTERRUPTED = int(Outcome.INTERRUPTED)
 STOP = int(OnFailure.STOP)
 
 LONGEST_WAIT = 200.0  # periods of a ramp that waits for the phase; a loop that hunts at a level hunts more at the next
+LONGEST_WAIT_FOR_HARMONICS = (
+    300.0  # periods beyond its own that the start goes on until the harmonics loop has done its work
+)
 RETURN_PERIODS = 20.0  # of the way back to the last level with a lock
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
@@ -215,6 +219,12 @@ def has_returned(progress: Record, cycle: float) -> bool:
 
 
 @kernel
+def wants_harmonics(segment: Record, settling: Record, elapsed: float) -> bool:
+    """Return whether a start or hold of so many ``elapsed`` periods goes on because the harmonics are not yet controlled."""
+    return bool(settling.distortion > 1.0 and elapsed < segment.periods + LONGEST_WAIT_FOR_HARMONICS)
+
+
+@kernel
 def advance(
     progress: Record,
     segments: np.ndarray,
@@ -295,6 +305,8 @@ def advance(
             return
     if segment.kind == START and elapsed >= segment.periods:
         verdict = start_verdict(settling, lock, elapsed)
+        if verdict == DONE and lock.state == LOCKED and wants_harmonics(segment, settling, elapsed):
+            return
         if verdict == DONE:
             close_segment(progress, outcomes, settling, DONE)
         elif verdict != RUNNING:
@@ -305,6 +317,8 @@ def advance(
         fault = passing_fault(progress, samples, over)
         if fault != DONE and measure_again(progress, segments, outcomes, settling, fault):
             return
+    if segment.kind == HOLD and wants_harmonics(segment, settling, elapsed):
+        return
     if segment.kind != SETTLE and over and not (segment.kind == RECORD and is_slipping(lock)):
         spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
         if spoilt and measure_again(progress, segments, outcomes, settling, DISTURBED):
