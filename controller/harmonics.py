@@ -1,28 +1,28 @@
 """The harmonics loop: drives harmonics of the output so that those of the measured force take their wanted values.
 
-The output is ``u = U Re[exp(i (theta + turn)) + sum_h W_h exp(i h theta)]`` with a complex ratio W_h for each harmonic 2 to H.
+The output is ``u = U Re[exp(i (theta + turn))] + Re[sum_h V_h exp(i h theta)]`` with a complex V_h for each harmonic 2 to H.
 An adaptive filter estimates the force's harmonics F_h in the oscillator's phase. Near a steady vibration
-``F_h = D_h + P_h U W_h``: D_h comes from structure and exciter, P_h is the plant from output to force at that harmonic. One
+``F_h = D_h + P_h V_h``: D_h comes from structure and exciter, P_h is the plant from output to force at that harmonic. One
 complex integral law for each harmonic acts through it, with the wanted G_h:
 
-    ``dW_h/dt = -k (F_h - G_h)/(P_h U)``
+    ``dV_h/dt = -k (F_h - G_h)/P_h``
 
 k and the filter's corner are fractions of the oscillator's frequency, so that they suit any structure. P_h is measured once the
 vibration is locked and steady, by a small step of all harmonics at once, and again where an error does not decay. A harmonic
 whose plant cannot be told from noise is left alone. Not modelled: a change of one harmonic changes the others through the
 structure's nonlinearity; the integral laws take that for a disturbance.
 
-Source of the idea: arXiv 2410.17830, which controls the force's harmonics with adaptive filters in an iteration.
+The idea to make an exciter's force a sine by feedback through adaptive filters is that of arXiv 2410.17830.
 """
 
 import cmath
 import math
 from collections.abc import Mapping
 from enum import IntEnum
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field, model_validator
 
 from controller.adaptive_filter import MOST_HARMONICS, adapt, turn_phasors
 from controller.primitives import size
@@ -59,6 +59,7 @@ GROWN = 4.0  # factor by which no error may grow at a held level
 MOST_PROBES = 4
 LOUDER = 1.5  # times the output at which a harmonic was found too quiet: where it is tried again
 JUDGED = 0.1  # corner of the judged error, as a part of the filter's
+LARGEST_WANTED = 10.0
 LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
 
 HIGHEST_TURN = 0.8 * math.pi  # of the highest harmonic from sample to sample
@@ -80,11 +81,11 @@ HARMONICS = np.dtype(
         ("wanted", "c16", ORDERS),
     ]
 )
-"""Parameters of the harmonics loop (one record). ``highest``: H, or 0 without the loop. ``of_drive``: the controlled channel is
-the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of every |W_h|. ``probe``:
-|W_h| of the step. ``tolerance``: of the fundamental. ``smallest``: error (N) that always counts as none. ``largest_v``: bound of
-the whole output. ``step_v``: bound of a harmonic's change from one sample to the next. ``wanted``: ratios to the
-fundamental, where the plan names none."""
+"""Parameters of the harmonics loop (one record). ``highest``: H, or 0 without the loop. ``of_drive``: the controlled channel
+is the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of |V_h| over the
+fundamental. ``probe``: |V_h| of the step over it. ``tolerance``: of the channel's fundamental. ``smallest``: error (N) that
+always counts as none. ``largest_v``: bound of the whole output. ``step_v``: bound of a harmonic's change from one sample to the
+next. ``wanted``: ratios to the fundamental, where the plan names none."""
 
 HARMONICS_STATE = np.dtype(
     [
@@ -113,10 +114,13 @@ HARMONICS_STATE = np.dtype(
         ("scatter_square", "f8", ORDERS),
     ]
 )
-"""State of the harmonics loop (one record). ``periods``: of the present stage. ``miss``: largest judged error over its
-tolerance; infinite before the loop controls. ``bounded``: the bound of the voltage holds harmonics back. ``off``: harmonics that are left alone. ``ratio``: W_h.
-``error``: F_h - G_h. ``judged``: its slow mean. ``sum``, ``before``: averages while probing. ``plant``: P_h. ``last``, ``scatter_square``: F_h at
-the end of the last period, and mean square of its change from period to period."""
+"""State of the harmonics loop (one record). ``periods``: of the present stage. ``probes``: how often the plant was measured
+again. ``miss``: largest judged error over its tolerance; infinite before the loop controls. ``bounded``: the bound of the
+voltage holds harmonics back. ``amplitude_v``: the output's fundamental. ``share``: what is left of the harmonics while a run
+comes down. ``probe``: sizes of the step, relative to ``probe_v``. ``off``: harmonics that are left alone. ``wanted``: ratios to
+the fundamental where some are ``prescribed``. ``filter``: F_h. ``volts``: V_h. ``error``: F_h - G_h. ``judged``: its slow mean.
+``sum``, ``before``: averages while probing. ``plant``: P_h. ``last``, ``scatter_square``: F_h at the end of the last period,
+and mean square of its change from period to period."""
 
 
 class HarmonicsSettings(Settings):
@@ -127,7 +131,7 @@ class HarmonicsSettings(Settings):
     channel: Literal["force", "drive"] = "force"
     """Channel whose harmonics are controlled: the force, or the drive point's acceleration, for a base that is to move in a
     sine."""
-    wanted: dict[int, tuple[float, float]] = {}
+    wanted: dict[int, tuple[float, float]] = Field(default_factory=dict)
     """Prescribed harmonics of that channel by their number: amplitude relative to the fundamental, and phase in deg. At phase 0
     a peak of the harmonic coincides with a peak of the fundamental. All others are wanted to be zero."""
     corner: float = Field(0.2, gt=0, le=0.5)
@@ -146,26 +150,13 @@ class HarmonicsSettings(Settings):
     """Largest error of a recorded harmonic with which a point is accepted, relative to the fundamental; three of its standard
     errors and a tenth of a bit are allowed in any case."""
 
-    @field_validator("wanted")
-    @classmethod
-    def _possible(cls, wanted: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]]:
-        for order, (ratio, phase_deg) in wanted.items():
-            if not 2 <= order <= MOST_HARMONICS:
-                raise ValueError(f"has harmonic {order}, allowed is 2 to highest")
-            if not (0.0 <= ratio <= 10.0 and math.isfinite(phase_deg)):
-                raise ValueError(
-                    f"harmonic {order} = [{ratio:g}, {phase_deg:g}]: allowed is a ratio from 0 to 10 and a phase"
-                )
-        return wanted
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        check_wanted("wanted", self.wanted, self.highest)
+        return self
 
     def build_harmonics(self, sample_rate_hz: float, largest_v: float) -> np.ndarray:
-        """Return one record of `HARMONICS`; the bench gives ``smallest`` and ``step_v``, which the caller fills in.
-
-        Raises ValueError if a harmonic is prescribed above the highest.
-        """
-        for order in self.wanted:
-            if order > self.highest:
-                raise ValueError(f"harmonics.wanted: has harmonic {order}, allowed is 2 to highest = {self.highest}")
+        """Return one record of `HARMONICS`; the bench gives ``smallest`` and ``step_v``, which the caller fills in."""
         out = np.zeros(1, HARMONICS)
         out["highest"], out["of_drive"] = self.highest, self.channel == "drive"
         out["corner"], out["integral"] = self.corner, self.integral
@@ -175,7 +166,7 @@ class HarmonicsSettings(Settings):
         return out
 
     def check_frequency(self, sample_rate_hz: float, highest_hz: float) -> None:
-        """Raise ValueError if an oscillator at ``highest_hz`` is too quick for the filter, or a harmonic for the sample rate."""
+        """Raise ValueError if ``highest_hz`` is too high for the filter, or a harmonic of it for the sample rate."""
         turn = 2.0 * math.pi * highest_hz / sample_rate_hz
         at = f"at {highest_hz:g} Hz and {sample_rate_hz:g} samples/s"
         if self.highest * turn > HIGHEST_TURN:
@@ -184,6 +175,18 @@ class HarmonicsSettings(Settings):
             most = 1.0 / (turn * (2 * self.highest + 1))
             raise ValueError(
                 f"harmonics.corner = {self.corner:g}: allowed {at} is up to {most:.2g} with {self.highest} harmonics"
+            )
+
+
+def check_wanted(name: str, wanted: Mapping[int, tuple[float, float]], highest: int) -> None:
+    """Raise ValueError, naming ``name``, unless prescribed harmonics are from 2 to ``highest`` and their numbers possible."""
+    for order, (ratio, phase_deg) in wanted.items():
+        if not 2 <= order <= highest:
+            raise ValueError(f"{name}: has harmonic {order}, allowed is 2 to {highest}, the loop's highest")
+        if not (0.0 <= ratio <= LARGEST_WANTED and math.isfinite(phase_deg)):
+            raise ValueError(
+                f"{name}: harmonic {order} = [{ratio:g}, {phase_deg:g}], allowed is a ratio from 0 to {LARGEST_WANTED:g} "
+                "and a phase"
             )
 
 
@@ -216,17 +219,15 @@ def left_alone(parameters: Record, state: Record) -> int:
 
 
 @inner_kernel
-def measure_harmonics(
-    parameters: Record, state: Record, force: float, drive: float, phasor: complex, omega: float
-) -> None:
-    """Update the controlled channel's harmonics and their errors with one sample of force (N) and drive (m/s^2).
+def measure_harmonics(parameters: Record, state: Record, value: float, phasor: complex, omega: float) -> None:
+    """Update the controlled channel's harmonics and their errors with one sample (N or m/s^2).
 
-    ``phasor`` is ``exp(i theta)`` at the input, ``omega`` the oscillator's frequency (rad/s). Both are without mean.
+    ``value`` is as measured, with its mean: a filter that removes the mean would turn the harmonics against each other.
+    ``phasor`` is ``exp(i theta)`` at the input, ``omega`` the oscillator's frequency (rad/s).
     """
     highest = parameters.highest
     gain = parameters.corner * omega * parameters.dt_s
     turn_phasors(state.phasors, highest, phasor.real, phasor.imag)
-    value = drive if parameters.of_drive == 1 else force
     adapt(state.filter, state.phasors, highest, value, gain)
     fundamental = state.filter[1]
     amplitude = size(fundamental)

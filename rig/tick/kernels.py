@@ -232,7 +232,8 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         detect(law.detector, control.detector, vibration, loop.force, loop.drive_motion, phasor, frequency.omega)
         measure_rms(t, amplitude.law)
         if law.harmonics.highest > 0 and not lost:
-            measure_harmonics(law.harmonics, control.harmonics, loop.force, loop.drive_motion, phasor, frequency.omega)
+            channel = loop.drive_channel if law.harmonics.of_drive == 1 else loop.force_channel
+            measure_harmonics(law.harmonics, control.harmonics, readings[channel], phasor, frequency.omega)
         if t.expected[0].known == 1:
             judge_by_exciter(t, seen)
     lag_of_skew = frequency.omega * loop.skew_samples * loop.dt_s

@@ -1,10 +1,12 @@
 """The backbone campaign: step through levels at phase resonance; settle and record whole periods at each level."""
 
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from controller.adaptive_filter import MOST_HARMONICS
+from controller.harmonics import check_wanted
 from rig.bench import Bench
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target, with_first_repeated
@@ -33,6 +35,9 @@ class BackbonePlan(SettledPlan):
     """Length of the half-cosine ramp between two levels, periods."""
     record_periods: int = Field(50, ge=4, le=1_000_000)
     """Periods that are evaluated at each level; one more is recorded."""
+    force_harmonics: tuple[dict[int, tuple[float, float]], ...] = Field((), max_length=1000)
+    """Harmonics of the force that are prescribed one after the other at every level, each set for a point of its own; as
+    `wanted` of the harmonics loop, in place of which they are used. For data in which the exciter's harmonics vary."""
     evaluation: Literal["settled", "slow-flow"] = "settled"
     """How a point is evaluated. ``settled``: wait until the vibration has settled, then record. ``slow-flow``: evaluate the
     ramp to the point and the time at the point by the slow flow, without waiting for a steady state."""
@@ -41,10 +46,20 @@ class BackbonePlan(SettledPlan):
     accepted_damping_std: float = Field(0.1, gt=0, le=1)
     """Largest relative standard error of the damping with which a slow-flow point is accepted."""
 
+    @model_validator(mode="after")
+    def _harmonics_possible(self) -> Self:
+        loop = self.controller.harmonics
+        if self.force_harmonics and loop is None:
+            raise ValueError("force_harmonics: need the table controller.harmonics, the loop that makes them")
+        for index, wanted in enumerate(self.force_harmonics):
+            check_wanted(f"force_harmonics[{index}]", wanted, MOST_HARMONICS if loop is None else loop.highest)
+        return self
+
     @property
     def counts(self) -> dict[str, int]:
         """Numbers of levels, directions and repeats."""
-        return {**super().counts, "direction": 2 if self.direction == "up-down" else 1}
+        directions = 2 if self.direction == "up-down" else 1
+        return {**super().counts, "direction": directions, "force_harmonics": max(1, len(self.force_harmonics))}
 
     @property
     def evaluates_approach(self) -> bool:
@@ -61,11 +76,12 @@ class BackbonePlan(SettledPlan):
             "up-down": [(level, "up") for level in rising] + [(level, "down") for level in falling[1:]],
         }
         targets = tuple(
-            Target(number=number, level=level, direction=direction, repeat=repeat)
-            for number, (repeat, level, direction) in enumerate(
-                (repeat, level, direction)
+            Target(number=number, level=level, direction=direction, repeat=repeat, harmonics=harmonics)
+            for number, (repeat, level, direction, harmonics) in enumerate(
+                (repeat, level, direction, harmonics)
                 for repeat in range(1, self.repeats + 1)
                 for level, direction in passes[self.direction]
+                for harmonics in self.force_harmonics or (None,)
             )
         )
         return with_first_repeated(targets) if self.repeat_first else targets
@@ -92,9 +108,12 @@ class BackbonePlan(SettledPlan):
             if self.evaluation == "slow-flow":
                 out += self._short_point(target, failure, lost, first)
                 continue
-            out.append(Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, lost))
-            out.append(Segment(SegmentKind.SETTLE, number, level, self.settle.longest_periods, failure, lost))
-            out.append(Segment(SegmentKind.RECORD, number, level, self.record_periods + 1.0, failure, lost))
+            ramp = Segment(
+                SegmentKind.RAMP, number, level, self.ramp_periods, failure, lost, harmonics=target.harmonics
+            )
+            out.append(ramp)
+            out.append(replace(ramp, kind=SegmentKind.SETTLE, periods=self.settle.longest_periods))
+            out.append(replace(ramp, kind=SegmentKind.RECORD, periods=self.record_periods + 1.0))
         return tuple(out)
 
     def check(self, bench: Bench) -> None:
@@ -110,7 +129,16 @@ class BackbonePlan(SettledPlan):
         """
         number, level = target.number, target.level
         geometric = self.levels_key != "levels_v"
-        ramp = Segment(SegmentKind.RAMP, number, level, self.ramp_periods, failure, lost, geometric=geometric)
+        ramp = Segment(
+            SegmentKind.RAMP,
+            number,
+            level,
+            self.ramp_periods,
+            failure,
+            lost,
+            geometric=geometric,
+            harmonics=target.harmonics,
+        )
         waits = SegmentKind.START if self.levels_key == "levels_v" else SegmentKind.HOLD  # the others started before
         out = [replace(ramp, point=-1), replace(ramp, kind=waits, point=-1, periods=self._hold_periods)]
         # A ramp from a level to the same level: the point is judged by its slow flow, not by the settle rule.
@@ -128,4 +156,6 @@ class BackbonePlan(SettledPlan):
             return None
         before = targets[target.number - 1]
         rises = target.level > before.level
+        if target.level == before.level:  # with other harmonics of the force
+            return before.level
         return before.level if rises == (target.direction == "up") else None

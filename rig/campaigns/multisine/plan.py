@@ -131,6 +131,7 @@ class MultisinePlan(OpenLoopPlan):
 
     def check(self, bench: Bench) -> None:
         """Refuse bands, periods and peaks that the bench does not allow."""
+        self.check_no_harmonics("whose lines are its force")
         self.check_frequencies(bench, lowest_hz=self.lowest_hz, highest_hz=self.highest_hz)
         design = self.design(bench.sample_rate_hz)
         most = LARGEST_WAVEFORMS // design.period_samples

@@ -40,6 +40,9 @@ class Target(Configured):
     """Wanted lag of the drive-point acceleration behind the force, if the plan gives one, deg."""
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
+    harmonics: dict[int, tuple[float, float]] | None = None
+    """Harmonics that the harmonics loop makes, if the plan prescribes them for this point: amplitude relative to the
+    fundamental, and phase in deg."""
     repeats_first: bool = False
     """Whether this is the repetition of the first point at the end, which reveals a drift. It enters no result."""
 
@@ -189,6 +192,11 @@ class OpenLoopPlan(Plan):
                 raise ConfigurationError(
                     f"{name} = {frequency_hz:g} Hz: the bench {bench.name} allows {lowest:g} to {highest:g} Hz"
                 )
+
+    def check_no_harmonics(self, why: str) -> None:
+        """Refuse the harmonics loop, because ``why``."""
+        if self.controller.harmonics is not None:
+            raise ConfigurationError(f"controller.harmonics: not allowed with kind = {self.kind!r}, {why}")
 
 
 class TonePlan(Levels, OpenLoopPlan):

@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from controller import LockState
 from rig.arming.run_options import Progress
 from rig.bench import Bench
+from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
 from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
@@ -263,6 +264,9 @@ class Execution:
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
+        if not self.in_one_go:
+            left_alone = int(told[0]["left_alone"])
+            points = [with_force_harmonics(self.bench, self.plan, target, point, left_alone) for point in points]
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
         for point in points:

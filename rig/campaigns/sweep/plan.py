@@ -120,5 +120,6 @@ class SweepPlan(TonePlan):
 
     def check(self, bench: Bench) -> None:
         """Refuse levels and frequencies beyond the bench's limits."""
+        self.check_no_harmonics("whose frequency moves away from where the loop has measured its plant")
         self.check_levels(bench, (min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)))
         self.check_frequencies(bench, start_hz=self.start_hz, stop_hz=self.stop_hz)

@@ -73,8 +73,8 @@ def judge_period(
     averaged over ``average_periods`` is within ``phase_rad``. The averaged response amplitude is within ``amplitude``
     (relative) of its average ``average_periods`` before. If a loop holds the level, the average of the held quantity is within
     ``amplitude`` of ``wanted`` (0: no loop). With ``watch_force`` (open loop, held response) the averaged force must not change
-    by more than ``amplitude`` either. ``distortion`` is the largest error of the controlled harmonics over its tolerance, 0 without
-    any; it must not exceed 1. Apart from it the vibration is ``steady``.
+    by more than ``amplitude`` either. ``distortion`` is the largest error of the controlled harmonics over its tolerance, 0
+    without any; it must not exceed 1. Apart from it the vibration is ``steady``.
     """
     n = rule.average_periods
     slot = settling.count % (2 * LONGEST_AVERAGE)

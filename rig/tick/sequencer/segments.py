@@ -77,8 +77,8 @@ class Segment:
     Without an ``excitation`` the phase-locked loop chooses the frequency for the lag ``lag_deg`` (by default the law's).
     ``amplitude_law`` says what the level prescribes (by default as in the plan). If the amplitude law changes, the level starts
     at the measured value, without a bump. A ``geometric`` ramp interpolates the logarithm of the level. A held segment with
-    ``duration_s`` ignores its ``periods``; a sweep also ignores them and ends at its last frequency. ``harmonics`` are those that
-    the harmonics loop makes, as amplitude relative to the fundamental and phase in deg (by default the law's).
+    ``duration_s`` ignores its ``periods``; a sweep also ignores them and ends at its last frequency. ``harmonics`` are those
+    that the harmonics loop makes, as amplitude relative to the fundamental and phase in deg (by default the law's).
     """
 
     kind: SegmentKind
