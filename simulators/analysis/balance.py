@@ -127,7 +127,7 @@ class Balance:
         inputs[:n] = self.series.to_complex(waves.forces @ self.series.projection.T)
         inputs[n, 1] = unknowns[-1]
         fundamental = transfer[1, n] @ inputs[:, 1]
-        inputs[n, self.control.orders] = self.control.forces(fundamental, np.zeros(0))[0]
+        inputs[n, self.control.orders] = self.control.forces(fundamental, np.zeros(0, np.complex128))[0]
         inputs[n, self.control.orders] = self.control.voltages(transfer, inputs)
         return inputs
 
