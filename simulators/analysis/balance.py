@@ -101,12 +101,9 @@ class Balance:
         Also return their Jacobian [n_site + 2, H + 1, len(y)], and the magnitude of the terms of each sum [n_site + 2].
         """
         series, n = self.series, self.n_site
-        omega, voltage = unknowns[-2], unknowns[-1]
-        transfer, by_omega = self.control.driven(*self.linear.transfer(omega, series.orders))
+        transfer, by_omega = self.control.driven(*self.linear.transfer(unknowns[-2], series.orders))
         waves = self.sites(series, self.coefficients(unknowns))
-        inputs = np.zeros((n + 1, series.orders.size), np.complex128)
-        inputs[:n] = series.to_complex(waves.forces @ series.projection.T)
-        inputs[n, 1] = voltage
+        inputs = self._uncontrolled(unknowns, waves)
         slopes = np.zeros((n + 1, series.orders.size, unknowns.size), np.complex128)
         slopes[:n, :, :-2] = series.to_complex(waves.jacobian.reshape(n, series.size, n * series.size))
         slopes[n, 1, -1] = 1.0
@@ -121,14 +118,18 @@ class Balance:
 
     def inputs(self, unknowns: Real, waves: SiteWaves) -> Complex:
         """Return the harmonics of site forces and voltage (of the force, with ``pure_sine``) [n_site + 1, H + 1]."""
-        orders, n = self.series.orders, self.n_site
-        transfer = self.linear.transfer(unknowns[-2], orders)[0]
-        inputs = np.zeros((n + 1, orders.size), np.complex128)
-        inputs[:n] = self.series.to_complex(waves.forces @ self.series.projection.T)
-        inputs[n, 1] = unknowns[-1]
-        fundamental = transfer[1, n] @ inputs[:, 1]
-        inputs[n, self.control.orders] = self.control.forces(fundamental, np.zeros(0, np.complex128))[0]
-        inputs[n, self.control.orders] = self.control.voltages(transfer, inputs)
+        inputs, at = self._uncontrolled(unknowns, waves), self.control.orders
+        transfer = self.linear.transfer(unknowns[-2], self.series.orders)[0]
+        fundamental = transfer[1, self.n_site] @ inputs[:, 1]
+        inputs[-1, at] = self.control.forces(fundamental, np.zeros(0, np.complex128))[0]
+        inputs[-1, at] = self.control.voltages(transfer, inputs)
+        return inputs
+
+    def _uncontrolled(self, unknowns: Real, waves: SiteWaves) -> Complex:
+        """Return the inputs [n_site + 1, H + 1] with the fundamental of the voltage alone."""
+        inputs = np.zeros((self.n_site + 1, self.series.orders.size), np.complex128)
+        inputs[:-1] = self.series.to_complex(waves.forces @ self.series.projection.T)
+        inputs[-1, 1] = unknowns[-1]
         return inputs
 
     def residual(self, unknowns: Real, conditions: Conditions) -> tuple[Real, Real, Real]:

@@ -1,6 +1,7 @@
 """Harmonic balance of the coupled rig including coil, armature and stinger: an independent reference for tests.
 
-The rig is driven by the sinusoidal voltage ``u = U cos(theta)`` in continuous time. The linear part is solved exactly per
+The rig is driven by the sinusoidal voltage ``u = U cos(theta)`` in continuous time; the voltage has more harmonics where those
+of the stinger force are controlled (`simulators.analysis.force_control`). The linear part is solved exactly per
 harmonic. The nonlinear sites are evaluated by alternating frequency-time (Cameron & Griffin 1989) with ``samples`` per period.
 Friction is integrated over two periods from the virgin state, and the second period is used. If a site leaves the range in
 which its law holds, the point is flagged. For a rig with scatter the nominal specimen is analysed; ``rig.realised(seed)`` is

@@ -64,7 +64,9 @@ class PeriodicResponses(Result):
 
     None where the force itself was imposed."""
     stable: NDArray[np.bool_] | None = None
-    """Stable at constant frequency and constant held level, judged by the folds of the curve [n]."""
+    """Stable at constant frequency and constant held level, judged by the folds of the curve [n].
+
+    Controlled harmonics of the force are taken as held, here and in the two that follow."""
     stable_under_voltage: NDArray[np.bool_] | None = None
     """Stable at constant frequency and voltage [n]; None where the force itself was imposed."""
     level_slope: Real | None = None
