@@ -50,6 +50,7 @@ class ForceControl:
         value[at] = whole - share[:, :, None] * whole[:, force, None]
         change[at] = slope - share_slope[:, :, None] * whole[:, force, None] - share[:, :, None] * slope[:, force, None]
         value[at, :, -1], change[at, :, -1] = share, share_slope
+        value[at, force], change[at, force] = np.eye(whole.shape[2])[-1], 0.0  # without rounding errors
         return value, change
 
     def forces(self, fundamental: complex, slope: Complex) -> tuple[Complex, Complex]:

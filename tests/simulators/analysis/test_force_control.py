@@ -16,6 +16,7 @@ from simulators.analysis import (
     phase_resonance_backbone,
 )
 from simulators.analysis.balance import Balance
+from simulators.analysis.condensed import CondensedRig
 from simulators.analysis.conditions import Conditions
 from simulators.analysis.force_control import ForceControl
 from simulators.layout import Flag
@@ -205,6 +206,15 @@ def test_jacobian_agrees_with_finite_differences(conditions: Conditions) -> None
         ahead, back = (balance.residual(y + sign * step, conditions)[0] for sign in (1, -1))
         difference = (ahead - back) / (2 * step[column])
         np.testing.assert_allclose(jacobian[:, column], difference, atol=2e-5 * max(np.max(np.abs(difference)), 1e-12))
+
+
+def test_the_derivative_of_the_driven_transfer_by_the_frequency_agrees_with_differences() -> None:
+    linear, control, orders = CondensedRig(every_site()), ForceControl.of(5, 6), np.arange(7)
+    omega, step = 150.0, 1e-3
+    value, slope = control.driven(*linear.transfer(omega, orders))
+    ahead, back = (control.driven(*linear.transfer(omega + sign * step, orders))[0] for sign in (1, -1))
+    scale = np.maximum(np.abs(slope), 1e-3 * np.abs(value) / omega)
+    assert np.max(np.abs((ahead - back) / (2 * step) - slope) / np.where(scale > 0.0, scale, 1.0)) < 1e-4
 
 
 def test_every_analysis_finds_the_same_vibration() -> None:
