@@ -4,6 +4,8 @@ The unknowns are the harmonics Z of the site coordinates, the angular frequency 
 With the transfer T of the linear part and the site forces F(Z) (alternating frequency-time), each harmonic obeys
 ``Z = T_zf F(Z) + T_zu U``. Two closing equations (`Conditions`) prescribe the level, and the lag or the frequency. The phase
 lag can serve as path parameter; along it, folds of the frequency are passed without arc-length continuation.
+
+Where harmonics of the force are controlled, the voltage has those harmonics as well (`simulators.analysis.force_control`).
 """
 
 from dataclasses import dataclass
@@ -13,8 +15,9 @@ from numpy.typing import NDArray
 
 from simulators.analysis.condensed import CondensedRig, CondensedStructure
 from simulators.analysis.conditions import Conditions
+from simulators.analysis.force_control import ForceControl
 from simulators.analysis.responses import NotConvergedError
-from simulators.analysis.site_forces import Series, SiteForces
+from simulators.analysis.site_forces import Series, SiteForces, SiteWaves
 from simulators.virtual_rig import VirtualRig
 
 __all__ = ["Balance", "Solution"]
@@ -69,11 +72,21 @@ class Solution:
 class Balance:
     """Residual and Jacobian over ``y = [coefficients of every site coordinate, W, U]``.
 
-    With ``pure_sine``, U is instead the amplitude of a sinusoidal force on the structure without exciter.
+    With ``pure_sine``, U is instead the amplitude of a sinusoidal force on the structure without exciter. ``control``
+    prescribes harmonics of the force.
     """
 
-    def __init__(self, rig: VirtualRig, harmonics: int, samples: int, *, pure_sine: bool = False) -> None:
+    def __init__(
+        self,
+        rig: VirtualRig,
+        harmonics: int,
+        samples: int,
+        *,
+        pure_sine: bool = False,
+        control: ForceControl | None = None,
+    ) -> None:
         self.linear = CondensedStructure(rig) if pure_sine else CondensedRig(rig)
+        self.control = ForceControl.of(None, harmonics) if control is None else control
         self.sites = SiteForces(rig)
         self.series = Series(harmonics, samples)
         self.n_site = self.linear.n_site
@@ -88,20 +101,36 @@ class Balance:
         Also return their Jacobian [n_site + 2, H + 1, len(y)], and the magnitude of the terms of each sum [n_site + 2].
         """
         series, n = self.series, self.n_site
-        omega, voltage = unknowns[-2], unknowns[-1]
-        transfer, by_omega = self.linear.transfer(omega, series.orders)
+        transfer, by_omega = self.control.driven(*self.linear.transfer(unknowns[-2], series.orders))
         waves = self.sites(series, self.coefficients(unknowns))
-        inputs = np.zeros((n + 1, series.orders.size), np.complex128)
-        inputs[:n] = series.to_complex(waves.forces @ series.projection.T)
-        inputs[n, 1] = voltage
+        inputs = self._uncontrolled(unknowns, waves)
         slopes = np.zeros((n + 1, series.orders.size, unknowns.size), np.complex128)
         slopes[:n, :, :-2] = series.to_complex(waves.jacobian.reshape(n, series.size, n * series.size))
         slopes[n, 1, -1] = 1.0
+        fundamental, change = transfer[1, n] @ inputs[:, 1], transfer[1, n] @ slopes[:, 1]
+        change[-2] += by_omega[1, n] @ inputs[:, 1]
+        inputs[n, self.control.orders], slopes[n, self.control.orders] = self.control.forces(fundamental, change)
         jacobian = np.transpose(transfer @ np.transpose(slopes, (1, 0, 2)), (1, 0, 2))
         jacobian[:, :, -2] += np.einsum("hoi,ih->oh", by_omega, inputs)
         response = np.einsum("hoi,ih->oh", transfer, inputs)
         sizes = np.max(np.einsum("hoi,ih->oh", np.abs(transfer), np.abs(inputs)), axis=1, initial=0.0)
         return response, jacobian, sizes
+
+    def inputs(self, unknowns: Real, waves: SiteWaves) -> Complex:
+        """Return the harmonics of site forces and voltage (of the force, with ``pure_sine``) [n_site + 1, H + 1]."""
+        inputs, at = self._uncontrolled(unknowns, waves), self.control.orders
+        transfer = self.linear.transfer(unknowns[-2], self.series.orders)[0]
+        fundamental = transfer[1, self.n_site] @ inputs[:, 1]
+        inputs[-1, at] = self.control.forces(fundamental, np.zeros(0, np.complex128))[0]
+        inputs[-1, at] = self.control.voltages(transfer, inputs)
+        return inputs
+
+    def _uncontrolled(self, unknowns: Real, waves: SiteWaves) -> Complex:
+        """Return the inputs [n_site + 1, H + 1] with the fundamental of the voltage alone."""
+        inputs = np.zeros((self.n_site + 1, self.series.orders.size), np.complex128)
+        inputs[:-1] = self.series.to_complex(waves.forces @ self.series.projection.T)
+        inputs[-1, 1] = unknowns[-1]
+        return inputs
 
     def residual(self, unknowns: Real, conditions: Conditions) -> tuple[Real, Real, Real]:
         """Return the residual [len(y)], its Jacobian, and the magnitude of each equation's terms."""

@@ -37,12 +37,13 @@ class Evaluation:
         """Return one point per solution (at least one), in the order of the solutions."""
         omega, voltage = np.array([solution.unknowns[-2:] for solution in solutions]).T
         imposed = isinstance(self.balance.linear, CondensedStructure)
+        coordinates, inputs, outputs, neglected, beyond = zip(*(self._point(one) for one in solutions), strict=True)
+        voltages = None if imposed else np.array(inputs)[:, -1]
         if imposed:
             voltage = np.full(voltage.size, np.nan)
-        coordinates, forces, outputs, neglected, beyond = zip(*(self._point(one) for one in solutions), strict=True)
         harmonics = np.transpose(np.array(outputs), (1, 0, 2))
         sensors, points = harmonics[2 : 2 + len(self.rig.sensors)], harmonics[2 + len(self.rig.sensors) :]
-        flags = self._flags(np.array(beyond), voltage, sensors)
+        flags = self._flags(np.array(beyond), voltages, sensors)
         return PeriodicResponses(
             frequency_hz=omega / (2.0 * np.pi),
             voltage_v=voltage,
@@ -52,30 +53,29 @@ class Evaluation:
             sensor_harmonics=dict(zip(self.rig.channel_names, sensors, strict=True)),
             point_harmonics_m=dict(zip(self.points, points, strict=True)),
             site_harmonics=np.array(coordinates),
-            site_force_harmonics=np.array(forces),
+            site_force_harmonics=np.array(inputs)[:, :-1],
             neglected_share=np.array(neglected),
             flags=flags,
+            voltage_harmonics_v=voltages,
             stable=np.array([one.stable() for one in solutions]),
             stable_under_voltage=None if imposed else np.array([one.stable(under_voltage=True) for one in solutions]),
             level_slope=None if imposed else np.array([one.held_by_voltage() for one in solutions]),
         )
 
     def _point(self, solution: Solution) -> tuple[Complex, Complex, Complex, float, bool]:
-        """Return site coordinates, site forces and outputs of one point, the neglected share, and whether a site is beyond.
+        """Return site coordinates, inputs and outputs of one point, the neglected share, and whether a site is beyond.
 
-        A site is beyond if it leaves the range in which its law holds.
+        The inputs are those of `Balance.inputs`. A site is beyond if it leaves the range in which its law holds.
         """
         balance, series = self.balance, self.balance.series
-        omega, voltage = solution.unknowns[-2:]
+        omega = solution.unknowns[-2]
         coefficients = balance.coefficients(solution.unknowns)
         waves = balance.sites(series, coefficients)
-        inputs = np.zeros((balance.n_site + 1, series.orders.size), np.complex128)
-        inputs[:-1] = series.to_complex(waves.forces @ series.projection.T)
-        inputs[-1, 1] = voltage
+        inputs = balance.inputs(solution.unknowns, waves)
         states = balance.linear.states(omega, inputs)
         outputs = self.rows @ np.vstack([states.T, inputs[-1:], inputs[:-1]])
         neglected = self._neglected(omega, waves.forces) / abs(outputs[0, 1])
-        return series.to_complex(coefficients), inputs[:-1], outputs, neglected, waves.beyond
+        return series.to_complex(coefficients), inputs, outputs, neglected, waves.beyond
 
     def _neglected(self, omega: float, forces: Real) -> float:
         """Return the RMS over harmonics H + 1 to 2 H + 1 of the stinger force (N) that the sites' forces cause."""
@@ -108,13 +108,15 @@ class Evaluation:
             "damping_ratio_total_power": np.where(real, total, np.nan),
         }
 
-    def _flags(self, beyond: NDArray[np.bool_], voltage: Real, sensors: Complex) -> NDArray[np.int64]:
+    def _flags(self, beyond: NDArray[np.bool_], voltages: Complex | None, sensors: Complex) -> NDArray[np.int64]:
         """Return the flags that a run of the rig would raise."""
         rig, series = self.rig, Series(self.balance.series.harmonics, 128)
         converter = rig.converter
         flags = np.where(beyond, int(Flag.LAW_RANGE), 0)
-        flags |= np.where(voltage > converter.dac_range_v, int(Flag.DAC_CLIPPED), 0)
-        flags |= np.where(voltage > rig.exciter.input_limit_v, int(Flag.AMPLIFIER_CLIPPED), 0)
+        if voltages is not None:
+            voltage = np.max(np.abs(series.waveforms(voltages)), axis=1)
+            flags |= np.where(voltage > converter.dac_range_v, int(Flag.DAC_CLIPPED), 0)
+            flags |= np.where(voltage > rig.exciter.input_limit_v, int(Flag.AMPLIFIER_CLIPPED), 0)
         for sensor, harmonics in zip(rig.sensors, sensors, strict=True):
             peak_v = np.max(np.abs(series.waveforms(harmonics)), axis=1) * sensor.sensitivity_v_per_unit
             clipped = peak_v > min(sensor.range_v, converter.adc_range_v)

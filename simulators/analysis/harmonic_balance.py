@@ -1,6 +1,7 @@
 """Harmonic balance of the coupled rig including coil, armature and stinger: an independent reference for tests.
 
-The rig is driven by the sinusoidal voltage ``u = U cos(theta)`` in continuous time. The linear part is solved exactly per
+The rig is driven by the sinusoidal voltage ``u = U cos(theta)`` in continuous time; the voltage has more harmonics where those
+of the stinger force are controlled (`simulators.analysis.force_control`). The linear part is solved exactly per
 harmonic. The nonlinear sites are evaluated by alternating frequency-time (Cameron & Griffin 1989) with ``samples`` per period.
 Friction is integrated over two periods from the virgin state, and the second period is used. If a site leaves the range in
 which its law holds, the point is flagged. For a rig with scatter the nominal specimen is analysed; ``rig.realised(seed)`` is
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simulators.analysis.conditions import Conditions, Quantity, held_force, lags_rad, levels, positive
+from simulators.analysis.force_control import ForceHarmonics
 from simulators.analysis.paths import HARMONICS, SAMPLES, ModePaths
 from simulators.analysis.responses import PeriodicResponses
 from simulators.virtual_rig import VirtualRig
@@ -40,6 +42,7 @@ def phase_resonance_backbone(
     quantity: Quantity = "fundamental",
     phase_lag_deg: float = RESONANCE_DEG,
     excitation: Literal["exciter", "pure-sine"] = "exciter",
+    force_harmonics: ForceHarmonics | None = None,
     near_hz: float | None = None,
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
@@ -60,6 +63,12 @@ def phase_resonance_backbone(
     excitation
         ``exciter``: the coupled rig under a pure voltage, whose force has harmonics. ``pure-sine``: the structure alone
         under a sinusoidal force at the drive point, given by ``forces_n``; the result does not depend on an exciter.
+    force_harmonics
+        Harmonics of the stinger force that are controlled. A number, such as 7: harmonics 2 to 7 are zero. A table, such as
+        ``{2: 0.1j, 3: 0.0}``: each harmonic h has its value ``c_h = F_h / (|F_1| exp(i h arg F_1))``, the amplitude relative to
+        the fundamental and the phase where the fundamental is at its maximum. The voltage has the same harmonics (the
+        result's ``voltage_harmonics_v``). The static force of the suspension and all other harmonics of the force are
+        those of the coupled rig. Default: the voltage is a sine.
     near_hz
         The linear mode of the structure nearest to this frequency is followed. Default: the lowest that moves a
         nonlinear site.
@@ -80,8 +89,10 @@ def phase_resonance_backbone(
     held_as = held_force(quantity)
     if excitation == "pure-sine" and held == "voltage":
         raise ValueError("voltages_v: allowed with excitation = 'exciter', a pure sine has forces_n")
+    if excitation == "pure-sine" and force_harmonics is not None:
+        raise ValueError("force_harmonics: allowed with excitation = 'exciter', a pure sine has none")
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
-    paths = ModePaths.of(rig, near_hz, harmonics, samples, pure_sine=excitation == "pure-sine")
+    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics, pure_sine=excitation == "pure-sine")
     goals = [Conditions(held_as if held == "force" else held, float(level), "lag", lag) for level in values]
     return paths.evaluation(paths.path(goals))
 
@@ -92,6 +103,7 @@ def constant_force_response(
     phase_lags_deg: ArrayLike | None = None,
     *,
     quantity: Quantity = "fundamental",
+    force_harmonics: ForceHarmonics | None = None,
     near_hz: float | None = None,
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
@@ -114,7 +126,7 @@ def constant_force_response(
     quantity
         Meaning of ``force_n``: the peak of the ``fundamental``, or the ``rms`` of all harmonics from the first on, without the
         mean, which piezoelectric sensors do not measure.
-    near_hz, harmonics, samples
+    force_harmonics, near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
 
     Raises
@@ -126,7 +138,7 @@ def constant_force_response(
     """
     force, held = float(positive("force_n", [force_n])[0]), held_force(quantity)
     lags = _lags(phase_lags_deg)
-    paths = ModePaths.of(rig, near_hz, harmonics, samples)
+    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
     return paths.over_lags([Conditions(held, force, "lag", float(lag)) for lag in lags])
 
 
@@ -136,6 +148,7 @@ def constant_displacement_response(
     phase_lags_deg: ArrayLike | None = None,
     *,
     frequencies_hz: ArrayLike | None = None,
+    force_harmonics: ForceHarmonics | None = None,
     near_hz: float | None = None,
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
@@ -152,7 +165,7 @@ def constant_displacement_response(
         Lags, -179 to -1, rising. Default, without frequencies: 86 from -175 to -5.
     frequencies_hz
         Frequencies [n] instead of lags, in any order; the first point is approached from rest at its frequency.
-    near_hz, harmonics, samples
+    force_harmonics, near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
 
     Raises
@@ -165,7 +178,7 @@ def constant_displacement_response(
     amplitude = float(positive("amplitude_m", [amplitude_m])[0])
     if phase_lags_deg is not None and frequencies_hz is not None:
         raise ValueError("phase_lags_deg, frequencies_hz: both given, allowed is one of them")
-    paths = ModePaths.of(rig, near_hz, harmonics, samples)
+    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
     if frequencies_hz is not None:
         omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
         goals = [Conditions("response", amplitude, "frequency", float(w)) for w in omega]
@@ -178,6 +191,7 @@ def forced_response(
     voltage_v: float,
     frequencies_hz: ArrayLike,
     *,
+    force_harmonics: ForceHarmonics | None = None,
     near_hz: float | None = None,
     harmonics: int = HARMONICS,
     samples: int = SAMPLES,
@@ -197,7 +211,7 @@ def forced_response(
         Frequencies [n], in the order of the sweep.
     near_hz
         The linear mode that modal amplitude and damping refer to, as for `phase_resonance_backbone`.
-    harmonics, samples
+    force_harmonics, harmonics, samples
         As for `phase_resonance_backbone`.
 
     Raises
@@ -209,7 +223,7 @@ def forced_response(
     """
     voltage = float(positive("voltage_v", [voltage_v])[0])
     omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
-    paths = ModePaths.of(rig, near_hz, harmonics, samples)
+    paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
     return paths.evaluation(paths.path([Conditions("voltage", voltage, "frequency", float(w)) for w in omega]))
 
 

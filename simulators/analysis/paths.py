@@ -9,6 +9,7 @@ import numpy as np
 from simulators.analysis.balance import Balance, Solution
 from simulators.analysis.conditions import Conditions, checked_harmonics, followed_mode
 from simulators.analysis.evaluation import Evaluation
+from simulators.analysis.force_control import ForceControl, ForceHarmonics
 from simulators.analysis.responses import NotConvergedError, PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 
@@ -76,10 +77,19 @@ class ModePaths:
 
     @classmethod
     def of(
-        cls, rig: VirtualRig, near_hz: float | None, harmonics: int, samples: int, *, pure_sine: bool = False
+        cls,
+        rig: VirtualRig,
+        near_hz: float | None,
+        harmonics: int,
+        samples: int,
+        force_harmonics: ForceHarmonics | None = None,
+        *,
+        pure_sine: bool = False,
     ) -> "ModePaths":
         """Return the paths of the mode nearest to ``near_hz``, after a check of the arguments."""
-        balance = Balance(rig, *checked_harmonics(harmonics, samples), pure_sine=pure_sine)
+        checked = checked_harmonics(harmonics, samples)
+        control = ForceControl.of(force_harmonics, harmonics)
+        balance = Balance(rig, *checked, pure_sine=pure_sine, control=control)
         mode = followed_mode(rig, near_hz)
         resonance = 2.0 * np.pi * float(rig.linear_modes.frequency_hz[mode])
         return cls(balance, Evaluation(rig, balance, mode), resonance)

@@ -15,7 +15,9 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicResponses(Result):
-    """Periodic vibrations under ``u = U cos(theta)``; harmonics Y_h are defined by ``y = Re sum_h Y_h exp(i h theta)``.
+    """Periodic vibrations under the voltage ``U cos(theta)``, which has more harmonics where those of the force are controlled.
+
+    Harmonics Y_h are defined by ``y = Re sum_h Y_h exp(i h theta)``.
 
     All values are true values of the rig in continuous time, without the sensors' high-pass, noise, and the hold of the
     converter (which reduces the fundamental of the voltage by ``sin(x)/x, x = pi f / sample_rate``).
@@ -24,7 +26,7 @@ class PeriodicResponses(Result):
     frequency_hz: Real
     """Frequency of the vibration [n]."""
     voltage_v: Real
-    """Amplitude U [n] of the voltage; NaN where the force itself was imposed."""
+    """Amplitude U [n] of the fundamental of the voltage; NaN where the force itself was imposed."""
     force_n: Real
     """Peak of the fundamental of the stinger force [n]; see also `force_rms_n`."""
     amplitude_m: Real
@@ -57,8 +59,14 @@ class PeriodicResponses(Result):
     """`simulators.layout.Flag` bits [n] that a run would raise: site out of its range, sensor or output clipped.
 
     The harmonic balance itself does not clip."""
+    voltage_harmonics_v: Complex | None = None
+    """Voltage [n, H + 1]: the fundamental U and, where harmonics of the force are controlled, the harmonics that this takes.
+
+    None where the force itself was imposed."""
     stable: NDArray[np.bool_] | None = None
-    """Stable at constant frequency and constant held level, judged by the folds of the curve [n]."""
+    """Stable at constant frequency and constant held level, judged by the folds of the curve [n].
+
+    Controlled harmonics of the force are taken as held, here and in the two that follow."""
     stable_under_voltage: NDArray[np.bool_] | None = None
     """Stable at constant frequency and voltage [n]; None where the force itself was imposed."""
     level_slope: Real | None = None

@@ -3,8 +3,12 @@
 The linear part is condensed onto the two coordinates that carry nonlinear forces, z at the magnets and delta at the
 clamp; the unknowns are their harmonics, the frequency and the voltage. Forces go through the time domain (alternating
 frequency-time, Cameron and Griffin 1989), Jenkins memory over two periods.
+
+Harmonics of the stinger force may be prescribed, F_h = c_h F_1^h / |F_1|^(h-1). There the structure alone is driven by the
+force, and the voltage follows afterwards from armature and coil.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,8 +48,11 @@ class Balance:
     Coefficients are real: [Y_0, Re Y_1..H, Im Y_1..H], so that samples = basis @ coefficients.
     """
 
-    def __init__(self, rig: CoupledRig, harmonics: int, samples: int) -> None:
+    def __init__(
+        self, rig: CoupledRig, harmonics: int, samples: int, force_ratios: Mapping[int, complex] | None = None
+    ) -> None:
         self.rig, self.harmonics, self.size = rig, harmonics, 2 * harmonics + 1
+        self.force_ratios = dict(force_ratios or {})
         order = np.arange(1, harmonics + 1)
         angles = np.outer(2.0 * np.pi * np.arange(samples) / samples, order)
         self.basis = np.hstack([np.ones((samples, 1)), np.cos(angles), -np.sin(angles)])
@@ -69,7 +76,31 @@ class Balance:
         out_slope = np.zeros_like(out)
         out_slope[:, 2] = rig.stinger_c * stretch
         by_s = out_slope @ solved - out @ np.linalg.solve(first, slope @ solved)
-        return out @ solved, 1j * order[:, None, None] * by_s
+        value, by_omega = out @ solved, 1j * order[:, None, None] * by_s
+        for h in self.force_ratios:
+            value[h], by_omega[h] = self.driven_by_force(h, omega)
+        return value, by_omega
+
+    def driven_by_force(self, h: int, omega: float) -> tuple[Complex, Complex]:
+        """Return [z, delta, F, x_d] from [f_magnet, f_friction, F] and its derivative by Omega, of the structure alone."""
+        rig, s = self.rig, 1j * h * omega
+        shapes = np.array([rig.phi_magnet, rig.jenkins_c, rig.phi_drive])
+        modes = 1.0 / (s**2 + 2.0 * rig.zeta * rig.w_rad_s * s + rig.w_rad_s**2)
+        by_omega = -(modes**2) * (2.0 * s + 2.0 * rig.zeta * rig.w_rad_s) * 1j * h
+        values = [np.insert((shapes * m) @ shapes.T, 2, 0.0, axis=0) for m in (modes, by_omega)]
+        values[0][2, 2] = 1.0
+        return values[0], values[1]
+
+    def voltages(self, omega: float, force: Complex, drive: Complex) -> Complex:
+        """Return the voltages (H + 1,) of the prescribed harmonics of the force, 0 elsewhere, from armature and coil."""
+        rig, voltages = self.rig, np.zeros(self.harmonics + 1, complex)
+        for h in self.force_ratios:
+            s = 1j * h * omega
+            armature = drive[h] + force[h] / (rig.stinger_k + s * rig.stinger_c)
+            inertia = rig.armature_m * s**2 + rig.armature_c * s + rig.armature_k
+            current = (inertia * armature + force[h]) / rig.motor_g
+            voltages[h] = (rig.coil_r + s * rig.coil_l) * current + rig.motor_g * s * armature
+        return voltages
 
     def forces(self, y: Vector) -> tuple[Vector, Vector, Vector, Vector]:
         """Coefficients of magnet and friction force and their Jacobians by the coefficients of z and delta."""
@@ -107,6 +138,13 @@ class Balance:
         slopes = np.zeros((h + 1, 3, y.size), complex)
         slopes[:, 0, :p], slopes[:, 1, p : 2 * p] = self.to_complex(by_z), self.to_complex(by_delta)
         slopes[1, 2, -1] = 1.0
+        first = complex(transfer[1, 2] @ inputs[1])
+        by_first = transfer[1, 2] @ slopes[1]
+        by_first[-2] += by_omega[1, 2] @ inputs[1]
+        size, by_size = abs(first), np.real(np.conj(first) * by_first) / abs(first)
+        for h, ratio in self.force_ratios.items():
+            inputs[h, 2] = ratio * first**h / size ** (h - 1)
+            slopes[h, 2] = ratio * h * (first / size) ** (h - 1) * by_first - (h - 1) * inputs[h, 2] * by_size / size
         jacobian = transfer @ slopes
         jacobian[:, :, -2] += np.einsum("hoi,hi->ho", by_omega, inputs)
         return np.einsum("hoi,hi->ho", transfer, inputs), jacobian

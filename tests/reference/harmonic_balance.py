@@ -1,10 +1,12 @@
-"""Periodic states of the coupled rig, exciter included, driven by the pure voltage u = U cos(theta).
+"""Periodic states of the coupled rig, exciter included, driven by the voltage u = U cos(theta).
+
+Harmonics of the force may be prescribed instead (`Balance`); the voltage then has those harmonics too.
 
 Convention: y(t) = Re sum_h Y_h exp(i h theta); lag = arg F_1 - arg A_1 with the true drive-point acceleration, -90 deg
 at phase resonance.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,11 +23,15 @@ LOW_LEVEL = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Periodic:
-    """One periodic state; harmonics are complex with shape (H + 1,), index 0 the mean."""
+    """One periodic state; harmonics are complex with shape (H + 1,), index 0 the mean.
+
+    `voltages_v` holds the whole voltage: the fundamental, and what prescribed harmonics of the force take.
+    """
 
     rig: CoupledRig
     omega_rad_s: float
     voltage_v: float
+    voltages_v: Complex
     magnet_m: Complex
     delta: Complex
     force_n: Complex
@@ -104,7 +110,9 @@ def periodic(balance: Balance, y: Vector) -> Periodic:
     """Unknowns to a named state."""
     response = balance.responses(y)[0]
     magnet, delta, force, drive = response.T
-    return Periodic(balance.rig, float(y[-2]), float(y[-1]), magnet, delta, force, drive)
+    voltages = balance.voltages(y[-2], force, drive)
+    voltages[1] = y[-1]
+    return Periodic(balance.rig, float(y[-2]), float(y[-1]), voltages, magnet, delta, force, drive)
 
 
 def sequence(balance: Balance, points: Sequence[Conditions]) -> list[Periodic]:
@@ -139,10 +147,15 @@ def _continue(
     return _continue(balance, middle, goal, y, jacobian, depth + 1)
 
 
-def backbone(rig: CoupledRig, forces_n: Sequence[float], lag_deg: float = RESONANCE_DEG) -> list[Periodic]:
+def backbone(
+    rig: CoupledRig,
+    forces_n: Sequence[float],
+    lag_deg: float = RESONANCE_DEG,
+    force_ratios: Mapping[int, complex] | None = None,
+) -> list[Periodic]:
     """Phase-resonant states with the given peaks of the fundamental force, lowest first."""
     points = [Conditions(force_n=force, lag_deg=lag_deg) for force in forces_n]
-    return sequence(Balance(rig, HARMONICS, SAMPLES), points)
+    return sequence(Balance(rig, HARMONICS, SAMPLES, force_ratios), points)
 
 
 def backbone_at_voltages(

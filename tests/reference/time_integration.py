@@ -16,10 +16,17 @@ Derivative = Callable[[float, Vector], Vector]
 
 
 class TimeDomain:
-    """Right-hand sides and outputs of one rig under u = U cos(Omega t), U rising along a half cosine."""
+    """Right-hand sides and outputs of one rig under u = U cos(Omega t), U rising along a half cosine.
 
-    def __init__(self, rig: CoupledRig, voltage_v: float, omega_rad_s: float, ramp_periods: float = 20.0) -> None:
-        self.rig, self.voltage_v, self.omega = rig, voltage_v, omega_rad_s
+    A row of complex harmonics U_h, the mean first, gives u = Re sum U_h exp(i h Omega t).
+    """
+
+    def __init__(
+        self, rig: CoupledRig, voltage_v: float | Complex, omega_rad_s: float, ramp_periods: float = 20.0
+    ) -> None:
+        self.rig, self.omega = rig, omega_rad_s
+        self.voltages_v = np.array([0.0, voltage_v]) if np.ndim(voltage_v) == 0 else np.asarray(voltage_v)
+        self.orders = np.arange(self.voltages_v.size)
         self.period_s = 2.0 * np.pi / omega_rad_s
         self.ramp_s = ramp_periods * self.period_s
         mass, damping, stiffness = rig.second_order
@@ -41,7 +48,7 @@ class TimeDomain:
 
     def voltage(self, t: float) -> float:
         rise = 1.0 if t >= self.ramp_s else 0.5 - 0.5 * np.cos(np.pi * t / self.ramp_s)
-        return float(self.voltage_v * rise * np.cos(self.omega * t))
+        return float(rise * np.real(self.voltages_v @ np.exp(1j * self.omega * t * self.orders)))
 
     def derivative(self, t: float, x: Vector, jenkins: float = 0.0) -> Vector:
         """x' under the given sum of Jenkins forces."""
