@@ -62,6 +62,7 @@ JUDGED = 0.1  # corner of the judged error, as a part of the filter's
 LARGEST_WANTED = 10.0
 LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
 
+SMALLEST_MARGIN_DEG = 35.0
 HIGHEST_TURN = 0.8 * math.pi  # of the highest harmonic from sample to sample
 ORDERS = (MOST_HARMONICS + 1,)
 
@@ -79,13 +80,16 @@ HARMONICS = np.dtype(
         ("step_v", "f8"),
         ("dt_s", "f8"),
         ("wanted", "c16", ORDERS),
+        ("plant", "c16", ORDERS),
+        ("left_alone", "i8", ORDERS),
     ]
 )
 """Parameters of the harmonics loop (one record). ``highest``: H, or 0 without the loop. ``of_drive``: the controlled channel
 is the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of |V_h| over the
 fundamental. ``probe``: |V_h| of the step over it. ``tolerance``: of the channel's fundamental. ``smallest``: error (N) that
 always counts as none. ``largest_v``: bound of the whole output. ``step_v``: bound of a harmonic's change from one sample to the
-next. ``wanted``: ratios to the fundamental, where the plan names none."""
+next. ``wanted``: ratios to the fundamental, where the plan names none. ``plant``: P_h where it is known, else 0.
+``left_alone``: harmonics that are not controlled."""
 
 HARMONICS_STATE = np.dtype(
     [
@@ -134,6 +138,11 @@ class HarmonicsSettings(Settings):
     wanted: dict[int, tuple[float, float]] = Field(default_factory=dict)
     """Prescribed harmonics of that channel by their number: amplitude relative to the fundamental, and phase in deg. At phase 0
     a peak of the harmonic coincides with a peak of the fundamental. All others are wanted to be zero."""
+    left_alone: tuple[int, ...] = ()
+    """Harmonics up to the highest that are not controlled."""
+    force_per_v: dict[int, tuple[float, float]] = Field(default_factory=dict)
+    """P_h by harmonic: real and imaginary part of the channel over the output at this harmonic, N/V, without the device's
+    delay. A harmonic that has it is controlled as soon as the loop is locked; the others are measured by a step."""
     corner: float = Field(0.2, gt=0, le=0.5)
     """Corner of the adaptive filter, as a fraction of the oscillator's frequency."""
     integral: float = Field(0.04, gt=0, le=0.2)
@@ -153,6 +162,20 @@ class HarmonicsSettings(Settings):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         check_wanted("wanted", self.wanted, self.highest)
+        for name, orders in (("left_alone", self.left_alone), ("force_per_v", self.force_per_v)):
+            for order in orders:
+                if not 2 <= order <= self.highest:
+                    raise ValueError(
+                        f"{name}: has harmonic {order}, allowed is 2 to {self.highest}, the loop's highest"
+                    )
+        for order, value in self.force_per_v.items():
+            if not (math.isfinite(abs(complex(*value))) and value != (0.0, 0.0)):
+                raise ValueError(
+                    f"force_per_v: harmonic {order} = {list(value)}, allowed are finite numbers, not both 0"
+                )
+        for order in self.left_alone:
+            if order in self.wanted:
+                raise ValueError(f"left_alone: has harmonic {order}, which wanted prescribes; allowed is one of them")
         return self
 
     def build_harmonics(self, sample_rate_hz: float, largest_v: float) -> np.ndarray:
@@ -163,10 +186,16 @@ class HarmonicsSettings(Settings):
         out["largest"], out["probe"], out["tolerance"] = self.largest, self.probe, self.tolerance
         out["largest_v"], out["dt_s"], out["step_v"] = largest_v, 1.0 / sample_rate_hz, largest_v
         out["wanted"] = harmonic_ratios(self.wanted)
+        for order, value in self.force_per_v.items():
+            out["plant"][0, order] = complex(*value)
+        out["left_alone"][0, list(self.left_alone)] = 1
         return out
 
-    def check_frequency(self, sample_rate_hz: float, highest_hz: float) -> None:
-        """Raise ValueError if ``highest_hz`` is too high for the filter, or a harmonic of it for the sample rate."""
+    def check_frequency(self, sample_rate_hz: float, highest_hz: float, lead_samples: float) -> None:
+        """Raise ValueError if ``highest_hz`` is too high for the filter, for a harmonic or for the delay of the output.
+
+        ``lead_samples``: samples from an output to the input that shows it.
+        """
         turn = 2.0 * math.pi * highest_hz / sample_rate_hz
         at = f"at {highest_hz:g} Hz and {sample_rate_hz:g} samples/s"
         if self.highest * turn > HIGHEST_TURN:
@@ -174,8 +203,24 @@ class HarmonicsSettings(Settings):
         if self.corner * turn * (2 * self.highest + 1) > 1.0:
             most = 1.0 / (turn * (2 * self.highest + 1))
             raise ValueError(
-                f"harmonics.corner = {self.corner:g}: allowed {at} is up to {most:.2g} with {self.highest} harmonics"
+                f"harmonics.corner = {self.corner:g}: allowed {at} is up to {most:.2g} with H = {self.highest}"
             )
+        margin = self.phase_margin_deg(turn * lead_samples)
+        if margin < SMALLEST_MARGIN_DEG:
+            raise ValueError(
+                f"harmonics.integral = {self.integral:g}: its phase margin {at} is {margin:.0f} deg with {lead_samples:g} "
+                f"samples from output to input, allowed is at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks"
+            )
+
+    def phase_margin_deg(self, delay_rad: float) -> float:
+        """Return the phase margin of every loop on a plant that is constant near its harmonic, deg.
+
+        ``delay_rad``: turn of the oscillator during the delay of the output. With frequencies relative to the oscillator's the
+        open loop is ``k w exp(-i x d)/(i x (i x + w))``, with the gain k, the filter's corner w and the delay d.
+        """
+        k, w = self.integral, self.corner
+        crossover = w * math.sqrt(0.5 * (math.sqrt(1.0 + 4.0 * (k / w) ** 2) - 1.0))
+        return math.degrees(0.5 * math.pi - math.atan(crossover / w) - crossover * delay_rad)
 
 
 def check_wanted(name: str, wanted: Mapping[int, tuple[float, float]], highest: int) -> None:
@@ -210,10 +255,10 @@ def want_harmonics(state: Record, wanted: np.ndarray) -> None:
 
 @kernel
 def left_alone(parameters: Record, state: Record) -> int:
-    """Return the harmonics that the loop leaves alone, as bits: bit h for harmonic h."""
+    """Return the harmonics whose plant could not be told from noise, as bits: bit h for harmonic h."""
     bits = 0
     for order in range(2, parameters.highest + 1):
-        if state.off[order] == 1:
+        if state.off[order] == 1 and parameters.left_alone[order] == 0:
             bits |= 1 << order
     return bits
 
@@ -307,11 +352,13 @@ def listen(parameters: Record, state: Record, periods: int) -> None:
 
 
 @kernel
-def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, steady: bool, free: bool) -> None:
+def end_harmonics_period(
+    parameters: Record, state: Record, amplitude_v: float, locked: bool, steady: bool, free: bool
+) -> None:
     """Advance the loop's stage by one oscillator period, and judge the errors.
 
-    ``steady``: apart from harmonics the vibration is locked and settled at its level. ``free``: the level is held and nothing
-    is recorded, so that the plant may be measured.
+    ``locked``: the vibration is locked, or its frequency given. ``steady``: apart from harmonics it is also settled at its
+    level. ``free``: the level is held and nothing is recorded, so that the plant may be measured.
     """
     if state.stage != PROBING:
         see_scatter(parameters, state)
@@ -320,6 +367,9 @@ def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, 
         return
     state.miss = math.inf
     state.periods += 1
+    if state.probes == 0 and state.stage == WAITING and locked and knows_plant(parameters, state):
+        begin_to_control(parameters, state)
+        return
     if not steady:
         if state.stage == PROBING:
             for order in range(2, parameters.highest + 1):
@@ -348,6 +398,26 @@ def end_harmonics_period(parameters: Record, state: Record, amplitude_v: float, 
 
 
 @kernel
+def knows_plant(parameters: Record, state: Record) -> bool:
+    """Take the plants that are known beforehand; return whether those of all controlled harmonics are."""
+    all_known = True
+    for order in range(2, parameters.highest + 1):
+        state.plant[order] = parameters.plant[order]
+        state.off[order] = parameters.left_alone[order]
+        if parameters.plant[order] == 0.0 and parameters.left_alone[order] == 0:
+            all_known = False
+    return all_known
+
+
+@kernel
+def begin_to_control(parameters: Record, state: Record) -> None:
+    """Close the loops."""
+    state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
+    for order in range(2, parameters.highest + 1):
+        state.judged[order] = state.error[order]
+
+
+@kernel
 def learn_plant(parameters: Record, state: Record) -> None:
     """Take every harmonic's plant from its change under the step, and begin to control.
 
@@ -359,16 +429,17 @@ def learn_plant(parameters: Record, state: Record) -> None:
         state.volts[order] -= step
         clear = size(change) > CLEAR * math.sqrt(state.scatter_square[order])
         state.off[order] = 0 if clear else 1
-        if clear:
+        if parameters.left_alone[order] == 1:
+            state.off[order] = 1
+        elif clear:
             state.plant[order] = change / step
         elif state.probe[order] * LARGER <= LARGEST_PROBE:
             state.probe[order] *= LARGER
             again = True
-        state.judged[order] = state.error[order]
     if again:
         listen(parameters, state, 0)
     else:
-        state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
+        begin_to_control(parameters, state)
 
 
 @kernel

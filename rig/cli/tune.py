@@ -32,6 +32,10 @@ def tune_(
     from_m: Annotated[float | None, typer.Option(help="Lowest level, m; from the noise if left out.")] = None,
     to_m: Annotated[float | None, typer.Option(help="Highest level, m; from the limits if left out.")] = None,
     points: Annotated[int, typer.Option(help="Number of levels.", min=1, max=1000)] = 8,
+    harmonics: Annotated[
+        int | None,
+        typer.Option(metavar="H", help="Highest harmonic of the force that the plan controls; none if left out."),
+    ] = None,
     recording: Annotated[
         Path | None, typer.Option(help="Recording of the multisine; beside the plan if left out.")
     ] = None,
@@ -55,7 +59,9 @@ def tune_(
     from rig.tuning.tuning import TuningRequest, tune
 
     load_bench(bench)
-    request = TuningRequest(level_rms_v=level_rms_v, law=law, from_m=from_m, to_m=to_m, points=points)
+    request = TuningRequest(
+        level_rms_v=level_rms_v, law=law, from_m=from_m, to_m=to_m, points=points, harmonics=harmonics
+    )
     if output.suffix != ".toml":
         raise ConfigurationError(f"-o {output}: plans are written as .toml")
     keep_existing([], output, options.overwrite)

@@ -47,7 +47,8 @@ def end_harmonics(t: TickArrays) -> float:
         return 0.0
     recording = progress.entered == 1 and t.segments[progress.segment].kind == RECORD
     free, amplitude_v = loop.held == 1 and not recording, control.amplitude.output.amplitude_v
-    end_harmonics_period(law, state, amplitude_v, settling.steady == 1, free)
+    locked = loop.drive == TONE or control.lock.state == LOCKED
+    end_harmonics_period(law, state, amplitude_v, locked, settling.steady == 1, free)
     settling.left_alone = left_alone(law, state)
     return float(state.miss)
 

@@ -53,7 +53,7 @@ class Tick:
     ) -> None:
         shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
         try:
-            _check_harmonics(law, bench, segments)
+            _check_harmonics(law, bench, segments, lead_samples)
             law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, shape)
         except ValueError as error:
             raise ConfigurationError(f"controller.{error}") from None
@@ -202,9 +202,9 @@ def _history(size: int, omega: float, dt: float) -> np.ndarray:
     return out
 
 
-def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment]) -> None:
+def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment], lead_samples: float) -> None:
     """Raise ValueError if the harmonics loop cannot follow the highest frequency of the run."""
     if law.harmonics is None:
         return
     tones = (segment.excitation.frequency_hz for segment in segments if segment.excitation is not None)
-    law.harmonics.check_frequency(bench.sample_rate_hz, max((law.highest_frequency_hz, *tones)))
+    law.harmonics.check_frequency(bench.sample_rate_hz, max((law.highest_frequency_hz, *tones)), lead_samples)

@@ -61,16 +61,18 @@ def measure(
     bench_name: str,
     damping_of: Callable[[FrequencyResponseMatrix, float], float],
     level_rms_v: float | None = None,
+    highest_hz: float | None = None,
 ) -> LinearTest:
     """Raise the level until the coherence suffices, then measure with a line spacing that the damping requires.
 
     ``bench_name`` is the name of the bench in the recorded plan. ``damping_of`` returns the damping ratio from coarse responses
     and the number of samples between an output and the input that responds to it. With ``level_rms_v`` there is no search.
+    ``highest_hz``: highest frequency of the multisine, by default 2.5 times that of the mode.
 
     Raises `TuningError` if a run was stopped or no level within half of the bench's limits suffices, `ConfigurationError` for a
     level beyond the limits.
     """
-    bench, runs = series.bench, _Runs(series, bench_name)
+    bench, runs = series.bench, _Runs(series, bench_name, highest_hz)
     if level_rms_v is None:
         levels = SEARCH.search(bench, runs.listen)
         tried = levels.tried_v
@@ -115,13 +117,14 @@ class _Runs:
     coherence: tuple[float, float]
     """Coherence of force and drive at the last coarse level."""
 
-    def __init__(self, series: MultisineSeries, bench_name: str) -> None:
+    def __init__(self, series: MultisineSeries, bench_name: str, highest_hz: float | None) -> None:
         self.series, self.bench, self.name = series, series.bench, bench_name
+        lowest, highest = (part * self.bench.specimen.linear_frequency_hz for part in BAND)
+        self.band_hz = (lowest, max(highest, highest_hz or 0.0))
 
     def at(self, level_rms_v: float, resolution_hz: float, realisations: int) -> PeriodicSpectra:
         """Play a level and return its spectra."""
-        lowest, highest = (part * self.bench.specimen.linear_frequency_hz for part in BAND)
-        allowed = self.bench.limits.frequency_hz
+        (lowest, highest), allowed = self.band_hz, self.bench.limits.frequency_hz
         plan = MultisinePlan(
             bench=self.name,
             description="low-level multisine of a tuning",

@@ -10,6 +10,7 @@ from typing import Any
 from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.tuning.design import Chosen, gains_of
+from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.shifts import Window, ramp_periods, start_periods, start_voltage
 
@@ -30,6 +31,7 @@ def plan_text(
     chosen: Chosen,
     levels: LevelChoice,
     window: Window,
+    harmonics: HarmonicsChoice | None,
     recording: Path,
 ) -> str:
     """Return a backbone plan as TOML.
@@ -86,6 +88,7 @@ def plan_text(
         "# A lock counts as lost where twice the time in which the frequency follows has not brought it back.",
         f"lock = {{ lost_periods = {lost_periods}, waiting_deg = {WAITING_DEG:g} }}",
     ]
+    controller += [] if harmonics is None else _harmonics(harmonics)
     settle = [
         "",
         "[settle]",
@@ -107,6 +110,24 @@ def plan_text(
         "\n".join([*_summary(plant, chosen), *head, *controller, *(settle if math.isfinite(settling) else []), *facts])
         + "\n"
     )
+
+
+def _harmonics(choice: HarmonicsChoice) -> list[str]:
+    """Return the table of the harmonics loop, with its margins and what is not controlled."""
+    settings = choice.settings
+    peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in choice.sensitivity_peaks.items())
+    out = ["", "[controller.harmonics]", _line("highest", settings.highest)]
+    if peaks:
+        out += _comment(f"Stable on the measured force per volt with max |S| {peaks}.")
+    for reason in choice.reasons:
+        out += _comment(f"{reason[0].upper()}{reason[1:]}.")
+    out.append(_line("integral", settings.integral))
+    if settings.left_alone:
+        out.append(_line("left_alone", list(settings.left_alone)))
+    if settings.force_per_v:
+        listed = ", ".join(f"{order} = [{re:g}, {im:g}]" for order, (re, im) in settings.force_per_v.items())
+        out += ["# Force per volt at each harmonic, N/V, as measured.", f"force_per_v = {{ {listed} }}"]
+    return out
 
 
 def _summary(plant: PlantModel, chosen: Chosen) -> list[str]:

@@ -5,6 +5,7 @@ from typing import Any
 
 from controller.tuning import Design, Margins
 from rig.tuning.design import gains_of
+from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.plant import mass_ratios
 from rig.tuning.tuning import Tuning
 
@@ -65,6 +66,7 @@ def summary(tuning: Tuning) -> dict[str, Any]:
         "levels_m": list(tuning.levels.levels_m),
         "needed_v": list(tuning.levels.needed_v),
         "levels_why": tuning.levels.why,
+        "harmonics": _harmonics(tuning.harmonics),
         "notes": list(tuning.notes),
     }
 
@@ -82,6 +84,19 @@ def _design(design: Design) -> dict[str, Any]:
             "level_lag": settling.level_lag,
         },
         "reasons": list(design.reasons),
+    }
+
+
+def _harmonics(choice: HarmonicsChoice | None) -> dict[str, Any] | None:
+    if choice is None:
+        return None
+    return {
+        "highest": choice.settings.highest,
+        "integral": choice.settings.integral,
+        "left_alone": list(choice.settings.left_alone),
+        "force_per_v": {str(order): list(value) for order, value in choice.settings.force_per_v.items()},
+        "sensitivity_peaks": {str(order): peak for order, peak in choice.sensitivity_peaks.items()},
+        "reasons": list(choice.reasons),
     }
 
 
@@ -128,7 +143,15 @@ def lines(found: dict[str, Any]) -> list[str]:
         f"levels         {levels[0]:.3g} to {levels[-1]:.3g} m in {len(levels)} steps, {found['needed_v'][0]:.3g} to "
         f"{found['needed_v'][-1]:.3g} V on the linear plant; {found['levels_why']}"
     )
+    if found["harmonics"] is not None:
+        out += _harmonics_lines(found["harmonics"])
     return [*out, *(f"note: {note}" for note in found["notes"])]
+
+
+def _harmonics_lines(found: dict[str, Any]) -> list[str]:
+    peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in found["sensitivity_peaks"].items())
+    out = [f"harmonics      2 to {found['highest']}, integral = {found['integral']:g}, max |S| {peaks or 'unknown'}"]
+    return [*out, *(f"  {reason}" for reason in found["reasons"])]
 
 
 def _design_lines(design: dict[str, Any]) -> list[str]:

@@ -1,5 +1,6 @@
 """Tune a rig: from a bench alone to gains, margins, levels and a plan."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
@@ -12,6 +13,7 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.level_search import MultisineSeries
 from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
+from rig.tuning.harmonics import HarmonicsChoice, band_for, check_highest, choose_harmonics
 from rig.tuning.levels import (
     NARROW,
     PART,
@@ -53,6 +55,8 @@ class TuningRequest:
     """Highest level of the plan, m peak at the drive point; determined by the limits if None."""
     points: int = 8
     """Number of levels."""
+    harmonics: int | None = None
+    """Highest harmonic of the force that the plan controls; the multisine then reaches beyond it. None: none is controlled."""
 
     def __post_init__(self) -> None:
         if self.law not in get_args(LawName):
@@ -65,7 +69,9 @@ class TuningRequest:
             raise ConfigurationError(f"`from_m` = {self.from_m:g} m: allowed is below `to_m` = {self.to_m:g} m")
 
     def check(self, bench: Bench) -> None:
-        """Raise `ConfigurationError` for levels beyond the displacement that the bench allows."""
+        """Raise `ConfigurationError` for levels and harmonics beyond what the bench allows."""
+        if self.harmonics is not None:
+            check_highest(bench, self.harmonics)
         farthest = max(bench.response_ratios.values())
         allowed_m = bench.limits.displacement_m / farthest
         why = f": a channel's mode_shape moves {farthest:.3g} times as far" if farthest > 1.0 else ""
@@ -96,6 +102,8 @@ class Tuning(Result):
     """The chosen gains."""
     levels: LevelChoice
     """The chosen levels."""
+    harmonics: HarmonicsChoice | None
+    """The harmonics loop, if it was asked for."""
     notes: tuple[str, ...]
     """Notes for the user, one line each."""
     plan_toml: str
@@ -136,6 +144,7 @@ def tune(
         name,
         lambda responses, lead: plant_of(bench, responses, lead).damping_ratio,
         request.level_rms_v,
+        None if request.harmonics is None else band_for(bench, request.harmonics),
     )
     plant = plant_of(bench, test.responses, test.lead_samples)
     notes = compared_with_bench(bench, plant)
@@ -157,6 +166,12 @@ def tune(
     )
     window = frequency_window(bench, test.responses, plant)
     notes += _cautions(bench, test, levels)
+    harmonics = None
+    if request.harmonics is not None:
+        lock_hz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
+        harmonics = choose_harmonics(
+            test.responses, test.lead_samples, bench.sample_rate_hz, lock_hz, request.harmonics
+        )
     if request.from_m is None:
         notes += _narrow(bench, levels, lowest)
     return Tuning(
@@ -168,9 +183,10 @@ def tune(
         response_ratio_stds=ratio_stds,
         chosen=chosen,
         levels=levels,
+        harmonics=harmonics,
         notes=notes,
         plan_toml=plan_text(
-            named or name, bench, plant, (measured, ratio_stds), chosen, levels, window, Path(recording)
+            named or name, bench, plant, (measured, ratio_stds), chosen, levels, window, harmonics, Path(recording)
         ),
     )
 
