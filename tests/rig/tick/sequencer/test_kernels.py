@@ -20,14 +20,14 @@ from rig.tick.sequencer.segments import Excitation, Segment, SettleRule, segment
 RULE = SettleRule(phase_deg=1.0, amplitude=0.01, average_periods=5, settled_periods=8)
 
 
-def _judge(periods, locked=True, wanted_force=0.0, saturated=False, open_loop=False):
+def _judge(periods, locked=True, wanted_force=0.0, saturated=False, open_loop=False, distortion=0.0):
     settling = np.zeros(1, SETTLING)
     rule, period = RULE.build(), np.zeros(1, PERIOD)
     period["saturated"] = saturated
     for error_deg, response, force in periods:
         period["error_rad"], period["drive_m_s2"] = math.radians(error_deg), response
         period["force_n"] = period["held"] = force
-        judge_period(settling[0], rule[0], period[0], wanted_force, locked, open_loop)
+        judge_period(settling[0], rule[0], period[0], wanted_force, locked, open_loop, distortion)
     return settling[0]
 
 
@@ -55,6 +55,16 @@ def test_a_slow_enough_drift_does(rate):
 
 def test_nothing_settles_without_a_lock():
     assert _judge([(0.0, 1.0, 1.0)] * 100, locked=False)["good_periods"] == 0
+
+
+def test_harmonics_beyond_their_tolerance_keep_a_steady_vibration_from_settling():
+    quiet = [(0.5, 1.0, 1.0)] * 60
+    for distortion in (1.01, math.inf):
+        unsettled = _judge(quiet, distortion=distortion)
+        assert (unsettled["good_periods"], unsettled["steady"]) == (0, 1)
+    assert _judge(quiet, distortion=0.99)["good_periods"] > 8
+    assert _judge(quiet, locked=False)["steady"] == 0
+    assert _judge([(20.0, 1.0, 1.0)] * 60)["steady"] == 0
 
 
 def test_a_force_level_must_be_reached():
@@ -246,6 +256,26 @@ def test_a_plan_that_settles_is_recorded_and_ends_the_run():
     assert walk.codes() == ["DONE"] * 3
     assert EndReason(int(walk.guard["reason"][0])) is EndReason.COMPLETED
     assert walk.outcomes["periods"][2] == pytest.approx(20.0, abs=0.05)
+
+
+@pytest.mark.parametrize("kind", [SegmentKind.START, SegmentKind.HOLD])
+def test_a_start_and_a_hold_go_on_until_the_harmonics_are_controlled_but_not_forever(kind):
+    walk = Walk(Segment(kind, -1, 1.0, 10.0), *_point(0, 2.0))
+    walk.settling["good_periods"], walk.settling["distortion"] = 99, math.inf
+    assert walk.go(200).codes()[0] == "RUNNING"
+    walk.settling["distortion"] = 0.5
+    assert walk.go(0.1).codes()[0] == "DONE"
+    walk = Walk(Segment(kind, -1, 1.0, 10.0), *_point(0, 2.0))
+    walk.settling["good_periods"], walk.settling["distortion"] = 99, math.inf
+    assert walk.go(309).codes()[0] == "RUNNING"
+    assert walk.go(2).codes()[0] == "DONE"
+
+
+def test_the_outcome_of_a_segment_tells_the_error_of_the_harmonics_and_those_left_alone():
+    walk = Walk(Segment(SegmentKind.HOLD, -1, 1.0, 10.0), *_point(0, 2.0))
+    walk.settling["distortion"], walk.settling["left_alone"] = 0.25, 1 << 5
+    walk.go(11)
+    assert (walk.outcomes["distortion"][0], walk.outcomes["left_alone"][0]) == (0.25, 1 << 5)
 
 
 def test_a_point_that_does_not_settle_is_skipped_and_the_next_is_tried():
