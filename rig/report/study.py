@@ -97,7 +97,7 @@ def _made(study: Mapping[str, Any], table: Mapping[str, Any], levels: int | None
     for name, plain in (("scatter", 0.0), ("seed", 0), ("saturating", 0), ("input", "force")):
         words += [] if table[name] == plain else [f"--{name}", str(table[name])]
     words += ["--states", str(table["states"]), "--channel", str(table["output"])]
-    for name in table["beside"]:
+    for name in table.get("beside", ["backbone-fine"] if table.get("with_backbone") else []):
         words += ["--beside", name]
     words += [] if table["realisations"] is None else ["--realisations", str(table["realisations"])]
     words += [] if levels is None else ["--levels", str(levels)]
