@@ -178,6 +178,12 @@ class HarmonicsSettings(Settings):
                 raise ValueError(f"left_alone: has harmonic {order}, which wanted prescribes; allowed is one of them")
         return self
 
+    @property
+    def controlled(self) -> dict[int, complex]:
+        """Controlled harmonics with their wanted ratio to the fundamental, whose phase they follow."""
+        ratios = harmonic_ratios(self.wanted)
+        return {order: complex(ratios[order]) for order in range(2, self.highest + 1) if order not in self.left_alone}
+
     def build_harmonics(self, sample_rate_hz: float, largest_v: float) -> np.ndarray:
         """Return one record of `HARMONICS`; the bench gives ``smallest`` and ``step_v``, which the caller fills in."""
         out = np.zeros(1, HARMONICS)

@@ -26,9 +26,12 @@ def reproduce_(
         typer.Option(help="Scatter of modal frequencies from run to run, relative; each realisation then is a run."),
     ] = 0.0,
     input: Annotated[str, typer.Option("--input", help="What goes into the models: force or voltage.")] = "force",
-    with_backbone: Annotated[
-        bool, typer.Option("--with-backbone", help="Fit points of a recorded backbone beside the multisines.")
-    ] = False,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PLAN", help="Fit its points beside the multisines: backbone-fine, harmonics-varied. Repeatable."
+        ),
+    ] = None,
     saturating: Annotated[int, typer.Option(help="Saturating features in place of the monomials.", min=0, max=100)] = 0,
     states: Annotated[
         int | None, typer.Option(help="States of the models; default: the paper's.", min=1, max=20)
@@ -68,7 +71,7 @@ def reproduce_(
         models=int(models) if models.isdecimal() else models,
         scatter=scatter,
         input=input,
-        with_backbone=with_backbone,
+        beside=tuple(beside or ()),
         saturating=saturating,
         states=states,
         realisations=realisations,

@@ -84,7 +84,9 @@ class RehearsalRequest:
         """Draw a twin and run the plan on it."""
         twin = self.twin(number)
         trial = run_trial(self.plan, twin.bench, twin.number)
-        truth = true_backbone(twin.bench, trial, twin.number) if self.balanced else NOT_BALANCED
+        truth = (
+            true_backbone(twin.bench, trial, twin.number, self.plan.law.harmonics) if self.balanced else NOT_BALANCED
+        )
         return Draw(number=number, unknowns=twin.unknowns, trial=trial, truth=truth)
 
     @property

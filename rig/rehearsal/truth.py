@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.harmonics import HarmonicsSettings
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.rehearsal.trial import Trial
@@ -31,10 +32,11 @@ NOT_BALANCED = TrueBackbone(numbers=(), frequency_hz=(), damping_ratio=())
 """Of a trial without points that could be balanced."""
 
 
-def true_backbone(bench: Bench, trial: Trial, seed: int = 0) -> TrueBackbone:
+def true_backbone(bench: Bench, trial: Trial, seed: int = 0, loop: HarmonicsSettings | None = None) -> TrueBackbone:
     """Balance the rig at the amplitudes of up to four accepted points, the lowest and the highest included.
 
-    Empty if no point has modal properties or none converges.
+    ``loop``: the harmonics loop of the plan, by which the force's harmonics are what it wants. Empty if no point has modal
+    properties or none converges.
     """
     measured = [p for p in trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
     measured.sort(key=lambda point: point.amplitude_m)
@@ -46,7 +48,11 @@ def true_backbone(bench: Bench, trial: Trial, seed: int = 0) -> TrueBackbone:
     amplitudes = np.maximum.accumulate([p.amplitude_m for p in points]) * (1.0 + 1e-12 * np.arange(len(points)))
     try:
         found = phase_resonance_backbone(
-            rig, amplitudes_m=amplitudes, near_hz=points[0].modal_frequency_hz, harmonics=HARMONICS
+            rig,
+            amplitudes_m=amplitudes,
+            near_hz=points[0].modal_frequency_hz,
+            harmonics=HARMONICS if loop is None else max(HARMONICS, loop.highest),
+            force_harmonics=None if loop is None else loop.controlled,
         )
     except NotConvergedError as error:
         if error.found is None:

@@ -97,7 +97,8 @@ def _made(study: Mapping[str, Any], table: Mapping[str, Any], levels: int | None
     for name, plain in (("scatter", 0.0), ("seed", 0), ("saturating", 0), ("input", "force")):
         words += [] if table[name] == plain else [f"--{name}", str(table[name])]
     words += ["--states", str(table["states"]), "--channel", str(table["output"])]
-    words += ["--with-backbone"] if table["with_backbone"] else []
+    for name in table.get("beside", ["backbone-fine"] if table.get("with_backbone") else []):
+        words += ["--beside", name]
     words += [] if table["realisations"] is None else ["--realisations", str(table["realisations"])]
     words += [] if levels is None else ["--levels", str(levels)]
     for part in ("steady", "sweeps"):

@@ -37,8 +37,8 @@ class Options:
     """Relative standard deviation of modal frequencies from run to run; above 0 each realisation is a separate run."""
     input: str = "force"
     """Input of the models: ``force`` or ``voltage``."""
-    with_backbone: bool = False
-    """Whether points of a backbone are fitted together with the multisines."""
+    beside: tuple[str, ...] = ()
+    """Plans of the specimen whose points are fitted together with the multisines."""
     saturating: int = 0
     """Number of saturating features of each equation, which replace the monomials."""
     states: int | None = None
@@ -67,6 +67,9 @@ class Options:
             )
         if self.input not in INPUTS:
             raise ConfigurationError(f"`input` {self.input}: allowed is {', '.join(INPUTS)}")
+        for name in self.beside:
+            if name not in self.specimen.beside:
+                raise ConfigurationError(f"`beside` {name}: allowed is {', '.join(self.specimen.beside)}")
         wrong = self.without - set(PARTS)
         if wrong:
             raise ConfigurationError(f"`without` {min(wrong)}: allowed is {', '.join(PARTS)}")
@@ -116,11 +119,11 @@ class Options:
     @property
     def variant(self) -> str:
         """Name of the models' folder, which distinguishes them from other models of the same recordings."""
-        backbone = "-backbone" if self.with_backbone else ""
+        beside = "".join(f"-{name}" for name in self.beside)
         saturating = f"-tanh{self.saturating}" if self.saturating else ""
         states = f"-n{self.model_states}" if self.model_states != self.specimen.states else ""
         fitted = f"-r{self.realisations}" if self.realisations is not None else ""
-        return f"{self.input}{backbone}{saturating}{states}{fitted}"
+        return f"{self.input}{beside}{saturating}{states}{fitted}"
 
     @property
     def recordings(self) -> Path:

@@ -40,8 +40,8 @@ def multisines(options: Options, say: Callable[[str], None]) -> dict[str, tuple[
 
 
 def segments(options: Options, say: Callable[[str], None]) -> tuple[Experiment, ...]:
-    """Return the points of the backbone that are fitted together with multisines."""
-    return training_data(options, recorded(options, options.specimen.backbone, say))
+    """Return the points that are fitted together with multisines."""
+    return tuple(one for name in options.beside for one in training_data(options, recorded(options, name, say)))
 
 
 def recorded(options: Options, name: str, say: Callable[[str], None]) -> Path:
@@ -123,5 +123,6 @@ def _bench(options: Options) -> Bench:
 def _seed(options: Options, name: str) -> int:
     """Return the seed of a plan, derived from that of the study; the next thousand seeds are for single runs of the plan."""
     specimen = options.specimen
-    names = [*specimen.levels.values(), specimen.backbone, specimen.exciter, *specimen.sweeps]
+    first, *others = specimen.beside
+    names = [*specimen.levels.values(), first, specimen.exciter, *specimen.sweeps, *others]
     return options.seed * 1_000_000 + 1000 * names.index(name)

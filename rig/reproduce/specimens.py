@@ -38,8 +38,8 @@ class Specimen:
     """Largest number of iterations of a fit."""
     patience: int
     """Iterations without a smaller validation error after which a fit ends."""
-    backbone: str = "backbone-fine"
-    """Plan of the backbone whose points can be used for training together with the multisines."""
+    beside: tuple[str, ...] = ("backbone-fine",)
+    """Plans whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
     """Plan of the multisine for the exciter model. With this model, a constant force has the harmonics that an exciter makes.
     """
@@ -61,6 +61,7 @@ SPECIMENS = {
         iterations=60,
         patience=20,
         sweeps=("sweep-1", "sweep-2", "sweep-3"),
+        beside=("backbone-fine", "harmonics-varied"),
     ),
     "friction-beam": Specimen(
         name="friction-beam",

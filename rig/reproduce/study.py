@@ -53,7 +53,7 @@ class Study:
             "kind": "reproduction",
             "specimen": options.specimen.name,
             "input": options.input,
-            "with_backbone": options.with_backbone,
+            "beside": list(options.beside),
             "saturating": options.saturating,
             "scatter": options.scatter,
             "seed": options.seed,
@@ -79,7 +79,7 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     """
     prepare(options)
     levels = multisines(options, say)
-    beside = segments(options, say) if options.with_backbone else ()
+    beside = segments(options, say)
     models = identify_all(options, levels, beside, say)
     if not models.fits:
         name, reason = next(iter(models.failures.items()))

@@ -130,7 +130,7 @@ def test_a_study_stands_beside_the_papers_numbers(tmp_path, shelf, recordings):
     own = {"training_set": "2.6 N", "test": "same level", "model": None, "mean": 0.0127, "standard_deviation": 0.0003}
     own |= {"largest": 0.02, "models": 5, "runs": 50, "unbounded_runs": 1, "unbounded_models": 1, "range_use": 0.9}
     times = {"training_set": "2.6 N", "models": 5, "seconds_mean": 1.25, "seconds_most": 2.0, "iterations_mean": 8.0}
-    table = {"specimen": "magnet-beam", "input": "force", "with_backbone": False, "saturating": 0, "scatter": 0.001}
+    table = {"specimen": "magnet-beam", "input": "force", "beside": [], "saturating": 0, "scatter": 0.001}
     table |= {"seed": 3, "states": 2, "realisations": None, "iterations": 8, "output": "drive", "failures": {}}
     table |= {"times": [times | {"chosen_mean": 2.0}], "errors": {"chosen on validation data": [own]}}
     (folder / "force" / "table.json").write_text(json.dumps(table | {"steady": [], "sweeps": []}))

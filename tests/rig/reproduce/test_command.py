@@ -131,7 +131,7 @@ def test_models_of_a_study_are_drawn_with_spectrum_and_time(folder):
 
 @pytest.mark.parametrize(
     ("option", "kind"),
-    [("--input voltage", "voltage"), ("--with-backbone", "force-backbone"), ("--states 1", "force-n1")],
+    [("--input voltage", "voltage"), ("--beside backbone-fine", "force-backbone-fine"), ("--states 1", "force-n1")],
 )
 def test_other_kinds_of_models_have_a_folder_beside(folder, option, kind):
     done = typed(f"{SMALL.replace('8', '6')} --without steady {option} -o {folder} --json")
