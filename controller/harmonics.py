@@ -52,13 +52,15 @@ MEAN_PERIODS = 4  # of the averages before and under the step
 LARGER, LARGEST_PROBE = 3.0, 0.04  # factor of the next step, and the largest, relative to the fundamental
 CLEAR = 4.0  # times its scatter from period to period: the least change under the step from which a plant is learned
 NOISY = 1.0  # times its scatter: judged error that noise may cause; about four of its standard errors
-SCATTER = 0.1  # weight of the last period in the scatter
+QUIET = 10.0  # times the smallest mean square of late: more scatter is no noise
+LEAK = 1.01  # by which that smallest grows in a period
+SWING = 4.0  # times the bound of the mean error: bound of its root mean square
 PATIENCE = 40  # periods at a held level after which an error must have decayed
 DECAYED = 0.7  # to this part, while all else is steady
 GROWN = 4.0  # factor by which no error may grow at a held level
 MOST_PROBES = 4
 LOUDER = 1.5  # times the output at which a harmonic was found too quiet: where it is tried again
-JUDGED = 0.1  # corner of the judged error, as a part of the filter's
+JUDGED = 0.2  # weight of the last period in the slow means
 LARGEST_WANTED = 10.0
 LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
 
@@ -103,6 +105,7 @@ HARMONICS_STATE = np.dtype(
         ("probe_v", "f8"),
         ("probe", "f8", ORDERS),
         ("bounded", "i8"),
+        ("samples", "i8"),
         ("off", "i8", ORDERS),
         ("prescribed", "i8"),
         ("wanted", "c16", ORDERS),
@@ -114,17 +117,21 @@ HARMONICS_STATE = np.dtype(
         ("sum", "c16", ORDERS),
         ("before", "c16", ORDERS),
         ("plant", "c16", ORDERS),
-        ("last", "c16", ORDERS),
+        ("total", "c16", ORDERS),
+        ("mean", "c16", ORDERS),
         ("scatter_square", "f8", ORDERS),
+        ("quiet_square", "f8", ORDERS),
+        ("square", "f8", ORDERS),
     ]
 )
 """State of the harmonics loop (one record). ``periods``: of the present stage. ``probes``: how often the plant was measured
 again. ``miss``: largest judged error over its tolerance; infinite before the loop controls. ``bounded``: the bound of the
 voltage holds harmonics back. ``amplitude_v``: the output's fundamental. ``share``: what is left of the harmonics while a run
 comes down. ``probe``: sizes of the step, relative to ``probe_v``. ``off``: harmonics that are left alone. ``wanted``: ratios to
-the fundamental where some are ``prescribed``. ``filter``: F_h. ``volts``: V_h. ``error``: F_h - G_h. ``judged``: its slow mean.
-``sum``, ``before``: averages while probing. ``plant``: P_h. ``last``, ``scatter_square``: F_h at the end of the last period,
-and mean square of its change from period to period."""
+the fundamental where some are ``prescribed``. ``filter``: F_h. ``volts``: V_h. ``error``: F_h - G_h. ``total``, ``samples``,
+``mean``: its sum over the present period, and its mean over the last one. ``judged``, ``square``: slow means of the mean and of
+its square. ``sum``, ``before``: averages while the plant is measured. ``plant``: P_h. ``scatter_square``: mean square of the
+mean's change from period to period; ``quiet_square``: its smallest of late."""
 
 
 class HarmonicsSettings(Settings):
@@ -290,7 +297,8 @@ def measure_harmonics(parameters: Record, state: Record, value: float, phasor: c
             turned *= turn
             error -= state.wanted[order] * turned
         state.error[order] = error
-        state.judged[order] += JUDGED * gain * (error - state.judged[order])
+        state.total[order] += error
+    state.samples += 1
 
 
 @inner_kernel
@@ -366,8 +374,7 @@ def end_harmonics_period(
     ``locked``: the vibration is locked, or its frequency given. ``steady``: apart from harmonics it is also settled at its
     level. ``free``: the level is held and nothing is recorded, so that the plant may be measured.
     """
-    if state.stage != PROBING:
-        see_scatter(parameters, state)
+    end_means(parameters, state)
     if state.stage == CONTROLLING:
         judge_harmonics(parameters, state, amplitude_v, steady, free)
         return
@@ -390,7 +397,7 @@ def end_harmonics_period(
     if state.periods <= WAIT_PERIODS:
         return
     for order in range(2, parameters.highest + 1):
-        state.sum[order] += state.filter[order] / MEAN_PERIODS
+        state.sum[order] += state.mean[order] / MEAN_PERIODS
     if state.periods < WAIT_PERIODS + MEAN_PERIODS:
         return
     if state.stage == LISTENING:
@@ -420,7 +427,8 @@ def begin_to_control(parameters: Record, state: Record) -> None:
     """Close the loops."""
     state.stage, state.periods, state.miss_before = CONTROLLING, 0, math.inf
     for order in range(2, parameters.highest + 1):
-        state.judged[order] = state.error[order]
+        state.judged[order] = state.mean[order]
+        state.square[order] = size(state.mean[order]) ** 2
 
 
 @kernel
@@ -449,12 +457,26 @@ def learn_plant(parameters: Record, state: Record) -> None:
 
 
 @kernel
-def see_scatter(parameters: Record, state: Record) -> None:
-    """Update the mean square of each harmonic's change from one period to the next, by which noise is told."""
+def end_means(parameters: Record, state: Record) -> None:
+    """Take the means of the errors over the period that has ended; harmonics above the highest leave no ripple in them.
+
+    Update their slow mean and mean square, and, except under the step, the mean square of their change from period to period,
+    by which noise is told.
+    """
+    n = max(state.samples, 1)
     for order in range(2, parameters.highest + 1):
-        change = size(state.filter[order] - state.last[order])
-        state.last[order] = state.filter[order]
-        state.scatter_square[order] += SCATTER * (change * change - state.scatter_square[order])
+        mean = state.total[order] / n
+        change = size(mean - state.mean[order])
+        state.mean[order] = mean
+        state.total[order] = 0.0
+        state.judged[order] += JUDGED * (mean - state.judged[order])
+        state.square[order] += JUDGED * (size(mean) ** 2 - state.square[order])
+        if state.stage != PROBING:
+            scatter = state.scatter_square[order] + JUDGED * (change * change - state.scatter_square[order])
+            state.scatter_square[order] = scatter
+            quiet = state.quiet_square[order]
+            state.quiet_square[order] = min(LEAK * quiet, scatter) if quiet > 0.0 else scatter
+    state.samples = 0
 
 
 @kernel
@@ -467,8 +489,12 @@ def judge_harmonics(parameters: Record, state: Record, amplitude_v: float, stead
     state.miss = 0.0
     for order in range(2, parameters.highest + 1):
         if state.off[order] == 0:
-            noise = NOISY * math.sqrt(state.scatter_square[order])
-            state.miss = max(state.miss, size(state.judged[order]) / max(allowed, noise))
+            # A loop that swings scatters too: noise is not more than a few times what it was when all was quiet.
+            noise = math.sqrt(min(state.scatter_square[order], QUIET * state.quiet_square[order]))
+            bound = max(allowed, NOISY * noise)
+            state.miss = max(
+                state.miss, size(state.judged[order]) / bound, math.sqrt(state.square[order]) / (SWING * bound)
+            )
     if steady and free and amplitude_v > LOUDER * state.probe_v and left_alone(parameters, state) != 0:
         state.stage = WAITING
         return
