@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.linalg import expm
@@ -39,6 +39,7 @@ def waiting(*args, **keys):
 # The filter
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(st.lists(complex_numbers(2.0), min_size=8, max_size=8))
 def test_all_harmonics_and_the_mean_are_estimated_at_once(amplitudes):
     plant = waiting(0.0, dict(enumerate(amplitudes)))
@@ -66,6 +67,7 @@ def decayed(corner, integral, periods):
     return np.array([(expm(system * t) @ [1.0, 1.0])[0] for t in periods])
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(st.floats(0.02, 0.1), st.floats(0.05, 0.6), complex_numbers(1.0).filter(lambda p: abs(p) > 0.2))
 def test_every_error_decays_as_the_closed_form_says_whatever_the_plants_phase(corner, ratio, p):
     integral = ratio * corner
@@ -93,6 +95,7 @@ def test_a_slow_loop_decays_exactly_as_the_closed_form_says():
 # Prescribed harmonics
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(complex_numbers(3.0).filter(lambda f: abs(f) > 0.1), st.floats(0.0, 1.0), st.floats(-360.0, 360.0))
 def test_a_prescribed_harmonic_turns_with_the_fundamental(fundamental, ratio, phase_deg):
     plant = waiting(0.5j, {1: fundamental, 2: 0.1}, wanted={3: (ratio, phase_deg)}, largest=10.0)
@@ -126,6 +129,7 @@ def test_harmonics_that_are_prescribed_later_replace_those_before():
 # The step that measures the plant
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(st.lists(complex_numbers(2.0).filter(lambda p: abs(p) > 0.05), min_size=6, max_size=6))
 def test_without_noise_the_step_measures_every_plant_up_to_what_the_filter_has_not_settled(values):
     plants = dict(zip(ORDERS.tolist(), values, strict=True))
@@ -284,6 +288,7 @@ def test_a_harmonic_stays_within_its_bound_and_leaves_it_without_windup():
     assert left[-1] == pytest.approx(free[-1], abs=0.02)
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(
     st.lists(complex_numbers(1.0), min_size=6, max_size=6),
     complex_numbers(1.0),
@@ -311,6 +316,7 @@ def test_harmonics_give_way_to_the_fundamental_and_come_back_without_windup():
     assert np.abs(plant.force_n[-1, 2:8]).max() < 2e-3
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(st.floats(1e-6, 1e-3))
 def test_no_harmonic_changes_faster_than_the_bench_allows_the_output(step_v):
     plant = waiting(0.01, {1: 1.0, 2: 0.5, 3: 0.2j}, step_v=step_v, largest=10.0).controlling().run(30, free=False)
@@ -418,6 +424,7 @@ def test_what_the_highest_frequency_or_the_delay_does_not_allow_is_refused(chang
         HarmonicsSettings.model_validate(changes).check_frequency(rate, highest_hz, lead)
 
 
+@settings(max_examples=15, phases=[Phase.generate])
 @given(st.floats(0.05, 0.5), st.floats(0.01, 0.2), st.floats(0.0, 3.0))
 def test_the_phase_margin_is_that_of_the_open_loop_where_its_gain_is_1(corner, integral, delay_rad):
     margin = HarmonicsSettings(corner=corner, integral=integral).phase_margin_deg(delay_rad)
