@@ -452,18 +452,27 @@ def learn_plant(parameters: Record, state: Record) -> None:
             again = True
     if again:
         listen(parameters, state, 0)
-    else:
-        begin_to_control(parameters, state)
+        return
+    for order in range(2, parameters.highest + 1):
+        if state.off[order] == 1:
+            state.volts[order] = 0.0
+    begin_to_control(parameters, state)
 
 
 @kernel
 def end_means(parameters: Record, state: Record) -> None:
     """Take the means of the errors over the period that has ended; harmonics above the highest leave no ripple in them.
 
-    Update their slow mean and mean square, and, except under the step, the mean square of their change from period to period,
-    by which noise is told.
+    Update their slow mean and mean square, and, except under the step and shortly after one, the mean square of their change
+    from period to period, by which noise is told. Before a step only the periods count whose mean is taken.
     """
     n = max(state.samples, 1)
+    weight = JUDGED
+    if state.stage == PROBING:
+        weight = 0.0
+    elif state.stage == LISTENING:
+        averaged = state.periods + 1 - WAIT_PERIODS
+        weight = 1.0 / averaged if averaged > 0 else 0.0
     for order in range(2, parameters.highest + 1):
         mean = state.total[order] / n
         change = size(mean - state.mean[order])
