@@ -392,7 +392,8 @@ def end_harmonics_period(
     if state.stage == WAITING:
         for order in range(2, parameters.highest + 1):
             state.probe[order] = parameters.probe
-        listen(parameters, state, WAIT_PERIODS)  # a steady vibration has been waited for
+        first = state.probe_v == 0.0 and state.probes == 0  # else the loops have only now come to rest
+        listen(parameters, state, WAIT_PERIODS if first else 0)
         return
     if state.periods <= WAIT_PERIODS:
         return
@@ -480,10 +481,10 @@ def end_means(parameters: Record, state: Record) -> None:
         state.total[order] = 0.0
         state.judged[order] += JUDGED * (mean - state.judged[order])
         state.square[order] += JUDGED * (size(mean) ** 2 - state.square[order])
-        if state.stage != PROBING:
-            scatter = state.scatter_square[order] + JUDGED * (change * change - state.scatter_square[order])
-            state.scatter_square[order] = scatter
-            quiet = state.quiet_square[order]
+        if weight > 0.0:
+            state.scatter_square[order] += weight * (change * change - state.scatter_square[order])
+        if state.stage in (WAITING, CONTROLLING):
+            scatter, quiet = state.scatter_square[order], state.quiet_square[order]
             state.quiet_square[order] = min(LEAK * quiet, scatter) if quiet > 0.0 else scatter
     state.samples = 0
 
