@@ -518,6 +518,9 @@ def judge_harmonics(parameters: Record, state: Record, amplitude_v: float, stead
     if state.periods > PATIENCE or grows:
         stays = grows or (steady and state.miss > DECAYED * state.miss_before)
         state.periods = 0
-        if stays and state.bounded == 0 and state.probes < MOST_PROBES:
+        if stays and state.probes < MOST_PROBES:
             state.stage = WAITING
             state.probes += 1
+            for order in range(2, parameters.highest + 1):
+                if state.bounded == 1:  # there is no room for a step
+                    state.volts[order] = 0.0
