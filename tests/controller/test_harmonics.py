@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.linalg import expm
@@ -39,7 +39,7 @@ def waiting(*args, **keys):
 # The filter
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(st.lists(complex_numbers(2.0), min_size=8, max_size=8))
 def test_all_harmonics_and_the_mean_are_estimated_at_once(amplitudes):
     plant = waiting(0.0, dict(enumerate(amplitudes)))
@@ -67,7 +67,7 @@ def decayed(corner, integral, periods):
     return np.array([(expm(system * t) @ [1.0, 1.0])[0] for t in periods])
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(st.floats(0.02, 0.1), st.floats(0.05, 0.6), complex_numbers(1.0).filter(lambda p: abs(p) > 0.2))
 def test_every_error_decays_as_the_closed_form_says_whatever_the_plants_phase(corner, ratio, p):
     integral = ratio * corner
@@ -95,7 +95,7 @@ def test_a_slow_loop_decays_exactly_as_the_closed_form_says():
 # Prescribed harmonics
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(complex_numbers(3.0).filter(lambda f: abs(f) > 0.1), st.floats(0.0, 1.0), st.floats(-360.0, 360.0))
 def test_a_prescribed_harmonic_turns_with_the_fundamental(fundamental, ratio, phase_deg):
     plant = waiting(0.5j, {1: fundamental, 2: 0.1}, wanted={3: (ratio, phase_deg)}, largest=10.0)
@@ -107,11 +107,11 @@ def test_a_prescribed_harmonic_turns_with_the_fundamental(fundamental, ratio, ph
 
 @pytest.mark.parametrize(("phase_deg", "sign"), [(0.0, 1.0), (180.0, -1.0), (360.0, 1.0)])
 def test_at_phase_0_a_peak_of_the_harmonic_coincides_with_a_peak_of_the_fundamental(phase_deg, sign):
-    plant = waiting(0.5j, {1: 2.0 * cmath.exp(0.7j)}, wanted={2: (0.3, phase_deg)}).controlling().run(100, free=False)
+    plant = waiting(0.5j, {1: 2.0 * cmath.exp(0.7j)}, wanted={2: (0.2, phase_deg)}).controlling().run(100, free=False)
     theta = np.linspace(-math.pi, math.pi, 10_001)
     one, two = (np.real(plant.force_n[-1, h] * np.exp(1j * h * theta)) for h in (1, 2))
     peak = np.argmax(one)
-    assert two[peak] == pytest.approx(sign * 0.3 * 2.0, abs=1e-3)
+    assert two[peak] == pytest.approx(sign * 0.2 * 2.0, abs=1e-3)
 
 
 def test_harmonics_that_are_prescribed_later_replace_those_before():
@@ -129,17 +129,15 @@ def test_harmonics_that_are_prescribed_later_replace_those_before():
 # The step that measures the plant
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(st.lists(complex_numbers(2.0).filter(lambda p: abs(p) > 0.05), min_size=6, max_size=6))
 def test_without_noise_the_step_measures_every_plant_up_to_what_the_filter_has_not_settled(values):
     plants = dict(zip(ORDERS.tolist(), values, strict=True))
-    for corner in (0.2, 0.5):
-        plant = waiting(plants, DISTURBANCE, corner=corner).controlling()
-        left = math.exp(-2 * math.pi * corner * WAIT_PERIODS)
-        # A step of one harmonic shows for some periods in the others: all amplitudes count.
-        most = (left + 1e-7) * max(map(abs, values))
-        np.testing.assert_allclose(plant.state["plant"][0, 2:8], values, atol=1.5 * most)
-        assert left_alone(plant.parameters[0], plant.state[0]) == 0
+    plant = waiting(plants, DISTURBANCE).controlling()
+    left = math.exp(-2 * math.pi * 0.2 * WAIT_PERIODS)
+    # What the filter has not settled of one harmonic shows in the others too.
+    np.testing.assert_allclose(plant.state["plant"][0, 2:8], values, atol=3.0 * left * max(map(abs, values)))
+    assert left_alone(plant.parameters[0], plant.state[0]) == 0
 
 
 def test_the_step_is_taken_back_and_lasts_no_longer_than_it_is_averaged():
@@ -155,7 +153,7 @@ def test_the_step_is_taken_back_and_lasts_no_longer_than_it_is_averaged():
 
 
 def test_the_step_of_all_harmonics_has_a_low_crest():
-    plant = waiting(1.0).run(2 + WAIT_PERIODS + MEAN_PERIODS)
+    plant = waiting(1.0).run(3 + MEAN_PERIODS)
     assert plant.stage is HarmonicStage.PROBING
     theta = np.linspace(0, 2 * math.pi, 1000)
     step = np.real(plant.volts[-1, 2:8] @ np.exp(1j * np.outer(ORDERS, theta)))
@@ -203,7 +201,7 @@ def test_what_was_left_alone_is_tried_again_at_a_clearly_higher_output():
 
 
 def test_an_unsteady_vibration_ends_the_step_and_takes_it_back():
-    plant = waiting(1.0).run(2 + WAIT_PERIODS + MEAN_PERIODS)
+    plant = waiting(1.0).run(3 + MEAN_PERIODS)
     assert plant.stage is HarmonicStage.PROBING
     plant.run(1, steady=False)
     assert plant.stage is HarmonicStage.WAITING
@@ -216,7 +214,7 @@ def test_an_unsteady_vibration_ends_the_step_and_takes_it_back():
 
 
 def test_known_plants_are_controlled_as_soon_as_the_loop_is_locked_without_a_step():
-    known = {order: (0.3, -0.4) for order in range(2, 8)}
+    known = dict.fromkeys(range(2, 8), (0.3, -0.4))
     plant = waiting(0.3 - 0.4j, DISTURBANCE, force_per_v=known).run(1, steady=False)
     assert plant.stage is HarmonicStage.CONTROLLING
     plant.run(100, steady=False)
@@ -242,14 +240,14 @@ def test_harmonics_that_the_plan_leaves_alone_stay_as_they_are_and_are_no_surpri
 @pytest.mark.parametrize("turn_deg", [120.0, -120.0, 180.0])
 def test_a_wrong_plant_makes_errors_grow_and_is_measured_again(turn_deg, known):
     turned = cmath.rect(0.5, math.radians(turn_deg))
-    table = {"force_per_v": {order: (0.5, 0.0) for order in range(2, 8)}} if known else {}
+    table = {"force_per_v": dict.fromkeys(range(2, 8), (0.5, 0.0))} if known else {}
     plant = waiting(turned if known else 0.5, {1: 1.0, 2: 0.02, 3: -0.02}, **table).controlling()
     plant.run(0 if known else 60)
     plant.plant[2:] = turned
     plant.disturbance[2] += 0.02
-    plant.run(60)
-    assert plant.state["probes"][0] == 1
-    plant.run(QUIET + 150)
+    plant.run(100)
+    assert plant.state["probes"][0] >= 1
+    plant.run(200)
     assert plant.stage is HarmonicStage.CONTROLLING
     assert plant.state["plant"][0, 2] == pytest.approx(turned, rel=0.1)
     assert np.abs(plant.force_n[-1, 2:8]).max() < 0.002
@@ -279,16 +277,17 @@ def test_a_harmonic_stays_within_its_bound_and_leaves_it_without_windup():
     plant = waiting(0.5, {1: 1.0, 2: 0.5j}, largest=0.2).controlling().run(300, free=False)
     assert abs(plant.volts[-1, 2]) == pytest.approx(0.2, abs=1e-12)
     assert np.abs(plant.volts[:, 2]).max() <= 0.2 + 1e-12
-    held = plant.volts[-1, 2]
     plant.disturbance[2] = 0.0
-    plant.run(60, free=False)
+    plant.run(40, free=False)
     left = np.abs(plant.volts[:, 2])
-    assert left[PER_PERIOD] < 0.99 * abs(held)  # after a period
-    free = 0.2 * decayed(0.2, 0.04, np.arange(60))
-    assert left[-1] == pytest.approx(free[-1], abs=0.02)
+    # The filter passes from 0.4 N to -0.1 N within 1.3 periods; from then on the harmonic decays.
+    np.testing.assert_array_less(
+        left[4 * PER_PERIOD :], 0.2 * decayed(0.2, 0.04, np.arange(left.size - 4 * PER_PERIOD) / PER_PERIOD) + 0.01
+    )
+    assert left[-1] < 1e-3
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(
     st.lists(complex_numbers(1.0), min_size=6, max_size=6),
     complex_numbers(1.0),
@@ -316,7 +315,7 @@ def test_harmonics_give_way_to_the_fundamental_and_come_back_without_windup():
     assert np.abs(plant.force_n[-1, 2:8]).max() < 2e-3
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(st.floats(1e-6, 1e-3))
 def test_no_harmonic_changes_faster_than_the_bench_allows_the_output(step_v):
     plant = waiting(0.01, {1: 1.0, 2: 0.5, 3: 0.2j}, step_v=step_v, largest=10.0).controlling().run(30, free=False)
@@ -328,12 +327,10 @@ def test_no_harmonic_changes_faster_than_the_bench_allows_the_output(step_v):
 # The end of a run
 
 
-@pytest.mark.parametrize("periods", [0, 5, 15, 60], ids=["waiting", "listening", "probing", "controlling"])
+@pytest.mark.parametrize("periods", [0, 3, 10, 60], ids=["waiting", "listening", "probing", "controlling"])
 def test_the_harmonics_come_down_with_the_fundamental_from_every_stage(periods):
-    stages = {0: "WAITING", 5: "LISTENING", 15: "PROBING", 60: "CONTROLLING"}
+    stages = {0: "WAITING", 3: "LISTENING", 10: "PROBING", 60: "CONTROLLING"}
     plant = waiting(0.5, {1: 1.0, 2: 0.2j, 7: 0.1}).run(max(periods, 1), steady=periods > 0)
-    if periods == 5:
-        plant = waiting(0.5, {1: 1.0, 2: 0.2j}).run(4)
     assert plant.stage.name == stages[periods]
     before = plant.volts[-1].copy()
     down = np.linspace(1.0, 0.0, 10 * PER_PERIOD + 1)[1:]
@@ -413,7 +410,7 @@ def test_ratios_are_complex_with_the_phase_in_degrees():
     [
         ({"highest": 12}, 200.0, 1.0, r"harmonics.highest = 12: allowed .* is up to 10"),
         ({"corner": 0.5}, 60.0, 1.0, r"harmonics.corner = 0.5: allowed .* up to 0.35 "),
-        ({}, 24.0, 500.0, r"harmonics.integral = 0.04: its phase margin .* with 500 samples from output to input"),
+        ({}, 24.0, 1000.0, r"harmonics.integral = 0.04: its phase margin .* with 1000 samples from output to input"),
     ],
 )
 def test_what_the_highest_frequency_or_the_delay_does_not_allow_is_refused(changes, highest_hz, lead, named):
@@ -424,7 +421,7 @@ def test_what_the_highest_frequency_or_the_delay_does_not_allow_is_refused(chang
         HarmonicsSettings.model_validate(changes).check_frequency(rate, highest_hz, lead)
 
 
-@settings(max_examples=15, phases=[Phase.generate])
+@settings(max_examples=15)
 @given(st.floats(0.05, 0.5), st.floats(0.01, 0.2), st.floats(0.0, 3.0))
 def test_the_phase_margin_is_that_of_the_open_loop_where_its_gain_is_1(corner, integral, delay_rad):
     margin = HarmonicsSettings(corner=corner, integral=integral).phase_margin_deg(delay_rad)
@@ -438,7 +435,7 @@ def test_the_phase_margin_is_that_of_the_open_loop_where_its_gain_is_1(corner, i
 def test_the_step_counts_as_clear_by_the_scatter_from_period_to_period():
     # The change under the step beside the scatter, above and below the factor, without any chance.
     for factor, clear in ((1.3, True), (0.7, False)):
-        plant = waiting(1.0, highest=2).run(WAIT_PERIODS + MEAN_PERIODS + 2)
+        plant = waiting(1.0, highest=2).run(1 + MEAN_PERIODS)
         assert plant.stage is HarmonicStage.PROBING
         plant.state["probe"][0, 2] = 0.036
         plant.state["volts"][0, 2] *= 9.0
