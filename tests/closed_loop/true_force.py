@@ -45,6 +45,8 @@ class TruePoint:
 def virtual_rig(bench: Bench, *, silent: bool = True) -> VirtualRig:
     """Return the rig of a virtual bench, ``silent`` without noise."""
     table = {key: value for key, value in bench.driver.options.items() if key not in Queue.model_fields}
+    converter = {"sample_rate_hz": bench.sample_rate_hz, "dac_range_v": bench.output_range_v}
+    table["converter"] = converter | table.get("converter", {})
     return VirtualRig.model_validate(table | ({"noise_scale": 0.0} if silent else {}))
 
 
