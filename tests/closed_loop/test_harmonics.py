@@ -300,7 +300,7 @@ def test_a_run_that_ends_brings_the_whole_output_down_smoothly_from_every_stage(
             if asked and GuardMode(int(tick.guard["mode"][0])) is GuardMode.ARMED:
                 ended = sum(map(len, rows))
                 if spoilt:
-                    tick.arrays.limits["displacement_m"] = 1.3e-3  # 1.7 mm swing: far more would drop the output
+                    tick.arrays.limits["highest_rad_s"] = 2 * math.pi * 23.0  # a trip that ramps
                 else:
                     tick.request_stop()
     output = np.concatenate(rows)["output_v"].astype(float)

@@ -5,7 +5,7 @@ New points of a changed plan are numbered after all existing ones.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
@@ -83,7 +83,17 @@ def identities(plan: Plan) -> tuple[Identity, ...]:
 
 
 def _rounded(values: Iterable[Any]) -> Identity:
-    return tuple(f"{value + 0.0:.9g}" if isinstance(value, float) else value for value in values)
+    return tuple(_comparable(value) for value in values)
+
+
+def _comparable(value: Any) -> Any:
+    if isinstance(value, float):
+        return f"{value + 0.0:.9g}"
+    if isinstance(value, Mapping):
+        return tuple(sorted((key, _comparable(item)) for key, item in value.items()))
+    if isinstance(value, tuple | list):
+        return _rounded(value)
+    return value
 
 
 def numbered(plans: Sequence[tuple[Plan, Sequence[int] | None]], change: Plan) -> tuple[int, ...]:
