@@ -72,7 +72,7 @@ def what_is_left(recording: Recording, change: Plan | None = None, source: str |
 
 def identities(plan: Plan) -> tuple[Identity, ...]:
     """Return the physical identity of each target, with numbers rounded to nine digits. The last entry counts equal targets."""
-    common = _rounded(attrgetter(path)(plan) for path in KINDS[plan.kind].identity)
+    common = _rounded((*(attrgetter(path)(plan) for path in KINDS[plan.kind].identity), *_controlled(plan)))
     seen: Counter[Identity] = Counter()
     out = []
     for target in plan.targets():
@@ -80,6 +80,12 @@ def identities(plan: Plan) -> tuple[Identity, ...]:
         out.append((*what, seen[what]))
         seen[what] += 1
     return tuple(out)
+
+
+def _controlled(plan: Plan) -> tuple[Any, ...]:
+    """Return what the harmonics loop makes of the force, nothing without the loop."""
+    loop = plan.law.harmonics
+    return () if loop is None else (loop.channel, loop.highest, loop.left_alone, loop.wanted)
 
 
 def _rounded(values: Iterable[Any]) -> Identity:

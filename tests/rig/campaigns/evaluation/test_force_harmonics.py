@@ -192,3 +192,19 @@ def test_a_resumed_run_makes_the_harmonics_of_the_points_that_are_left(tmp_path)
         wanted = 0.5 * np.exp(2j * np.pi / 3) if point["number"] % 2 else 0.0
         assert recorded_ratio(point, 2) == pytest.approx(wanted, abs=0.003)
         assert recorded_ratio(point, 3) == pytest.approx(0.0, abs=0.003)
+
+
+def test_points_of_another_force_are_measured_again_when_the_loop_is_added_or_asked_for_something_else(tmp_path):
+    file, levels = tmp_path / "points.h5", {"levels_v": (0.6,), "record_periods": 10}
+    table = plan_with(**levels).model_dump()
+    table["controller"]["harmonics"] = None
+    rig.run(type(plan_with()).model_validate(table), output=file, seed=1).close()
+    for part, loop in enumerate(({}, {"wanted": {2: (0.5, 0.0)}}), start=1):
+        with rig.resume(file, plan=plan_with(loop, **levels)) as run:
+            assert run.complete
+            point = list(run.recording.latest.values())[-1]
+        assert point["part"] == part
+        assert recorded_ratio(point, 2) == pytest.approx(0.5 if part == 2 else 0.0, abs=0.003)
+    with rig.resume(file, plan=plan_with({"wanted": {2: (0.5, 0.0)}, "corner": 0.25}, **levels)) as run:
+        assert run.complete
+        assert len(run.recording.points) == 3  # other gains make no other point
