@@ -62,6 +62,7 @@ MOST_PROBES = 4
 LOUDER = 1.5  # times the output at which a harmonic was found too quiet: where it is tried again
 JUDGED = 0.2  # weight of the last period in the slow means
 LARGEST_WANTED = 10.0
+FULL = 1.0 - 1e-9  # of the largest voltage: above it harmonics are held back
 LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
 
 SMALLEST_MARGIN_DEG = 35.0
@@ -329,9 +330,8 @@ def drive_harmonics(
         volts *= most / max(size(volts), most) if most > 0.0 else 0.0
         state.volts[order] = volts
         total += size(volts)
-    state.bounded = 0
+    state.bounded = 1 if amplitude_v + total > FULL * parameters.largest_v else 0
     if amplitude_v + total > parameters.largest_v and total > 0.0:
-        state.bounded = 1
         left = max(parameters.largest_v - amplitude_v, 0.0) / total
         for order in range(2, highest + 1):
             state.volts[order] *= left
@@ -438,6 +438,11 @@ def learn_plant(parameters: Record, state: Record) -> None:
 
     Where a change is not clear, repeat with a larger step of that harmonic; leave it alone if the largest one shows nothing.
     """
+    if state.bounded == 1:  # the step was held back: nothing is learned from it
+        for order in range(2, parameters.highest + 1):
+            state.volts[order] = 0.0
+        state.stage = WAITING
+        return
     again = False
     for order in range(2, parameters.highest + 1):
         change, step = state.sum[order] - state.before[order], probe_of(parameters, state, order)

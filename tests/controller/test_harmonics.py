@@ -443,3 +443,14 @@ def test_the_step_counts_as_clear_by_the_scatter_from_period_to_period():
         plant.run(WAIT_PERIODS + MEAN_PERIODS)
         assert plant.stage is HarmonicStage.CONTROLLING
         assert (left_alone(plant.parameters[0], plant.state[0]) == 0) is clear
+
+
+@pytest.mark.parametrize("left_v", [0.0, 0.002])
+def test_no_plant_is_learned_from_a_step_that_the_voltage_limit_holds_back(left_v):
+    plant = waiting(0.5, {1: 1.0, 2: 0.3}).run(100, LARGEST_V - left_v)
+    assert plant.stage is not HarmonicStage.CONTROLLING
+    assert plant.state["miss"][0] == math.inf
+    assert not plant.state["plant"][0].any()
+    plant.run(100, 2.0)
+    assert plant.stage is HarmonicStage.CONTROLLING
+    np.testing.assert_allclose(plant.state["plant"][0, 2:8], 0.5, rtol=0.01)
