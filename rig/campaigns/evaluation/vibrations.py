@@ -85,10 +85,21 @@ def failed_point(
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
         why += f" ({phase}amplitude drift {100.0 * drift:.3g} %)"
+    if code is Outcome.NOT_SETTLED:
+        why += _of_harmonics(float(outcome["distortion"]))
     if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
         why += f"; {POLARITY_HINT}"
     failed = replace(planned_point(plan, target), settled=False, settle_periods=float(outcome["periods"]))
     return failed.refused(why, Quality(code.name.lower().replace("_", "-")))
+
+
+def _of_harmonics(distortion: float) -> str:
+    """Return what the harmonics loop did not reach; ``distortion`` is its largest error over its tolerance."""
+    if distortion == math.inf:
+        return "; the harmonics loop could not measure its plant, or the voltage limit left no room for it"
+    if distortion > 1.0:
+        return f"; controlled harmonics are {distortion:.3g} times their tolerance off (controller.harmonics.largest, voltage?)"
+    return ""
 
 
 def recorded_vibration(

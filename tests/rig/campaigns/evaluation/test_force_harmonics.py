@@ -148,7 +148,10 @@ def test_prescribed_harmonics_of_points_need_the_loop_and_its_harmonics():
 
 def test_a_frequency_that_is_too_high_for_the_loop_is_refused_before_anything_moves():
     plan = plan_with({"highest": 12}, levels_v=(1.0,))
-    bench = bench_with({"sample_rate_hz": 500.0, "limits": {"frequency_hz": (8.0, 100.0)}}, converter={"anti_alias_hz": 0.0, "oversampling": 1, "substeps": 20})
+    bench = bench_with(
+        {"sample_rate_hz": 500.0, "limits": {"frequency_hz": (8.0, 100.0)}},
+        converter={"anti_alias_hz": 0.0, "oversampling": 1, "substeps": 20},
+    )
     with pytest.raises(ConfigurationError, match=r"controller.harmonics.highest = 12: allowed at 26.807 Hz"):
         rig.run(plan, bench=bench)
 
@@ -208,3 +211,21 @@ def test_points_of_another_force_are_measured_again_when_the_loop_is_added_or_as
     with rig.resume(file, plan=plan_with({"wanted": {2: (0.5, 0.0)}, "corner": 0.25}, **levels)) as run:
         assert run.complete
         assert len(run.recording.points) == 3  # other gains make no other point
+
+
+@pytest.mark.parametrize(
+    ("limit_v", "loop", "said"),
+    [
+        (1.2, {}, "the voltage limit left no room"),
+        (9.5, {"largest": 0.005}, "times their tolerance off"),
+    ],
+)
+def test_a_point_whose_harmonics_are_out_of_reach_does_not_settle_and_says_why(limit_v, loop, said):
+    bench = bench_with({"limits": {"voltage_v": limit_v}})
+    table = plan_with(loop, levels_v=(0.6, 1.2), record_periods=10).model_dump()
+    table["settle"]["longest_periods"] = 150
+    with rig.run(type(plan_with()).model_validate(table), bench=bench, seed=1) as run:
+        assert not run.complete
+        last = run.recording.points[-1]
+    assert last["quality"] == "not-settled"
+    assert said in last["reason"]
