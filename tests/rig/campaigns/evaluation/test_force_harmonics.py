@@ -142,7 +142,7 @@ def test_prescribed_harmonics_of_points_need_the_loop_and_its_harmonics():
     with pytest.raises(ValueError, match=r"force_harmonics\[1\]: has harmonic 9, allowed is 2 to 7"):
         type(varied).model_validate(table | {"force_harmonics": [{}, {9: (0.5, 0.0)}]})
     table["controller"]["harmonics"] = None
-    with pytest.raises(ValueError, match="force_harmonics: need the table controller.harmonics"):
+    with pytest.raises(ValueError, match=r"force_harmonics: need the table controller\.harmonics"):
         type(varied).model_validate(table)
 
 
