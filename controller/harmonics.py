@@ -150,7 +150,8 @@ class HarmonicsSettings(Settings):
     """Harmonics up to the highest that are not controlled."""
     force_per_v: dict[int, tuple[float, float]] = Field(default_factory=dict)
     """P_h by harmonic: real and imaginary part of the channel over the output at this harmonic, N/V, without the device's
-    delay. A harmonic that has it is controlled as soon as the loop is locked; the others are measured by a step."""
+    delay. If all controlled harmonics have it, they are controlled as soon as the loop is locked; otherwise those without it
+    are measured by a step before."""
     corner: float = Field(0.2, gt=0, le=0.5)
     """Corner of the adaptive filter, as a fraction of the oscillator's frequency."""
     integral: float = Field(0.04, gt=0, le=0.2)
@@ -451,6 +452,8 @@ def learn_plant(parameters: Record, state: Record) -> None:
         state.off[order] = 0 if clear else 1
         if parameters.left_alone[order] == 1:
             state.off[order] = 1
+        elif parameters.plant[order] != 0.0 and state.probes == 0:
+            state.off[order] = 0  # known beforehand, and not found wrong
         elif clear:
             state.plant[order] = change / step
         elif state.probe[order] * LARGER <= LARGEST_PROBE:

@@ -224,6 +224,18 @@ def test_known_plants_are_controlled_as_soon_as_the_loop_is_locked_without_a_ste
     assert not unlocked.volts.any()
 
 
+def test_where_some_plants_are_known_only_the_others_are_measured():
+    table = {"highest": 3, "force_per_v": {3: (0.001, 0.0)}}  # a step shows nothing of it in this noise
+    plant = waiting({2: 1.0, 3: 0.001}, {1: 1.0, 2: 0.1, 3: 5e-4}, noise=1e-3, largest=10.0, **table)
+    assert plant.stage is HarmonicStage.WAITING  # not steady
+    plant.controlling()
+    assert left_alone(plant.parameters[0], plant.state[0]) == 0
+    assert plant.state["plant"][0, 3] == 0.001
+    assert plant.state["plant"][0, 2] == pytest.approx(1.0, abs=0.1)
+    plant.run(200, free=False)
+    assert abs(plant.force_n[-PER_PERIOD:, 3].mean()) < 2.5e-4
+
+
 def test_harmonics_that_the_plan_leaves_alone_stay_as_they_are_and_are_no_surprise():
     plant = waiting(0.5, DISTURBANCE, left_alone=(3, 5)).controlling().run(100, free=False)
     assert plant.force_n[-1, 3] == pytest.approx(DISTURBANCE[3], abs=1e-9)
