@@ -205,6 +205,16 @@ def test_the_loop_suits_a_held_force_and_a_held_response():
             assert worst(true_points(run.recording, 4)) < SHARE
 
 
+def test_the_drive_point_moves_in_a_sine_where_its_acceleration_is_controlled():
+    plan = changed("magnet-beam/backbone-pure", harmonics={"channel": "drive"}, levels_v=(0.5866,))
+    with rig.run(plan, seed=1) as run:
+        assert run.complete
+        (true,) = true_points(run.recording, 1)
+    acceleration = true.drive_m * np.arange(true.drive_m.size) ** 2
+    assert np.abs(acceleration[2:8] / acceleration[1]).max() < 5e-4
+    assert np.abs(true.ratios()).max() > 1.0  # for which the force needs harmonics
+
+
 def test_short_points_follow_the_ramp_with_a_small_error_and_say_so():
     plan = changed("magnet-beam/backbone-pure", evaluation="slow-flow")
     with rig.run(plan, seed=1) as run:
