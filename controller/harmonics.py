@@ -48,6 +48,7 @@ class HarmonicStage(IntEnum):
 WAITING, LISTENING, PROBING, CONTROLLING = (int(stage) for stage in HarmonicStage)
 
 WAIT_PERIODS = 6  # for filter and exciter after the step
+MOST_UNSTEADY = 8  # periods in a row, at a lock, that do not end the measurement of the plant
 MEAN_PERIODS = 4  # of the averages before and under the step
 LARGER, LARGEST_PROBE = 3.0, 0.04  # factor of the next step, and the largest, relative to the fundamental
 CLEAR = 4.0  # times its scatter from period to period: the least change under the step from which a plant is learned
@@ -106,6 +107,7 @@ HARMONICS_STATE = np.dtype(
         ("probe_v", "f8"),
         ("probe", "f8", ORDERS),
         ("bounded", "i8"),
+        ("unsteady", "i8"),
         ("samples", "i8"),
         ("off", "i8", ORDERS),
         ("prescribed", "i8"),
@@ -126,13 +128,14 @@ HARMONICS_STATE = np.dtype(
     ]
 )
 """State of the harmonics loop (one record). ``periods``: of the present stage. ``probes``: how often the plant was measured
-again. ``miss``: largest judged error over its tolerance; infinite before the loop controls. ``bounded``: the bound of the
-voltage holds harmonics back. ``amplitude_v``: the output's fundamental. ``share``: what is left of the harmonics while a run
-comes down. ``probe``: sizes of the step, relative to ``probe_v``. ``off``: harmonics that are left alone. ``wanted``: ratios to
-the fundamental where some are ``prescribed``. ``filter``: F_h. ``volts``: V_h. ``error``: F_h - G_h. ``total``, ``samples``,
-``mean``: its sum over the present period, and its mean over the last one. ``judged``, ``square``: slow means of the mean and of
-its square. ``sum``, ``before``: averages while the plant is measured. ``plant``: P_h. ``scatter_square``: mean square of the
-mean's change from period to period; ``quiet_square``: its smallest of late."""
+again. ``miss``: largest judged error over its tolerance; infinite before the loop controls. ``unsteady``: unsteady periods
+in a row. ``bounded``: the bound of the voltage holds harmonics back. ``amplitude_v``: the output's fundamental. ``share``:
+what is left of the harmonics while a run comes down. ``probe``: sizes of the step, relative to ``probe_v``. ``off``:
+harmonics that are left alone. ``wanted``: ratios to the fundamental where some are ``prescribed``. ``filter``: F_h.
+``volts``: V_h. ``error``: F_h - G_h. ``total``, ``samples``, ``mean``: its sum over the present period, and its mean over
+the last one. ``judged``, ``square``: slow means of the mean and of its square. ``sum``, ``before``: averages while the
+plant is measured. ``plant``: P_h. ``scatter_square``: mean square of the mean's change from period to period;
+``quiet_square``: its smallest of late."""
 
 
 class HarmonicsSettings(Settings):
@@ -384,7 +387,8 @@ def end_harmonics_period(
     if state.probes == 0 and state.stage == WAITING and locked and knows_plant(parameters, state):
         begin_to_control(parameters, state)
         return
-    if not steady:
+    state.unsteady = 0 if steady else state.unsteady + 1
+    if not steady and (state.stage == WAITING or not (locked and free) or state.unsteady > MOST_UNSTEADY):
         if state.stage == PROBING:
             for order in range(2, parameters.highest + 1):
                 state.volts[order] -= probe_of(parameters, state, order)

@@ -14,6 +14,7 @@ from controller.harmonics import (
     CLEAR,
     LARGEST_PROBE,
     MEAN_PERIODS,
+    MOST_UNSTEADY,
     WAIT_PERIODS,
     HarmonicsSettings,
     HarmonicStage,
@@ -201,8 +202,9 @@ def test_what_was_left_alone_is_tried_again_at_a_clearly_higher_output():
 
 
 def test_an_unsteady_vibration_ends_the_step_and_takes_it_back():
-    plant = waiting(1.0).run(3 + MEAN_PERIODS)
-    assert plant.stage is HarmonicStage.PROBING
+    plant = waiting(1.0).run(1)
+    plant.run(MOST_UNSTEADY, steady=False)
+    assert plant.stage is HarmonicStage.PROBING  # noise alone may say so for a while
     plant.run(1, steady=False)
     assert plant.stage is HarmonicStage.WAITING
     plant.run(1, steady=False)
@@ -211,6 +213,13 @@ def test_an_unsteady_vibration_ends_the_step_and_takes_it_back():
 
 
 # Plants that are known beforehand, harmonics that the plan leaves alone
+
+
+def test_a_loop_that_is_not_locked_ends_the_step_at_once():
+    plant = waiting(1.0).run(3 + MEAN_PERIODS)
+    assert plant.stage is HarmonicStage.PROBING
+    plant.run(1, steady=False, locked=False)
+    assert plant.stage is HarmonicStage.WAITING
 
 
 def test_known_plants_are_controlled_as_soon_as_the_loop_is_locked_without_a_step():
