@@ -211,6 +211,9 @@ class Point(Generic[Result]):
     """Frequency that the plan asks for, Hz."""
     asked_phase_lag_deg: float | None = None
     """Lag that the plan asks for, of the drive-point acceleration behind the force, deg."""
+    asked_harmonics: tuple[tuple[int, float, float], ...] | None = None
+    """Harmonics of the force that the plan asks for at this point: number, amplitude relative to the fundamental, phase in
+    deg."""
     realisation: int | None = None
     """Number of a multisine's realisation, from 0."""
     repeats_first: bool = False
@@ -291,6 +294,9 @@ def planned_point(plan: Plan, target: Target) -> Point[Any]:
         repeat=target.repeat,
         asked_frequency_hz=target.frequency_hz,
         asked_phase_lag_deg=target.phase_lag_deg,
+        asked_harmonics=None
+        if target.harmonics is None
+        else tuple((order, *wanted) for order, wanted in sorted(target.harmonics.items())),
         realisation=target.realisation,
         repeats_first=target.repeats_first,
         settled=None,
