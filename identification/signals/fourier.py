@@ -23,7 +23,7 @@ from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
 from identification.signals.chunks import ArrayRecord, Phase, Record
 from identification.signals.columns import Columns, least_squares
-from identification.signals.rounding import rounding_errors
+from identification.signals.rounding import part_of_each, rounding_errors
 from identification.validation import finite_array, positive
 
 __all__ = ["batches_of", "periodic_vibration", "vibration_in"]
@@ -35,6 +35,7 @@ _MAX_BATCHES = 20
 _MIN_BATCHES = 4
 _MANY = 50
 _MOST_LOST = 0.05
+_THIRD_DIFFERENCES = 20.0  # variance of a third difference of white noise: 1 + 9 + 9 + 1
 _SAMPLES_TO_SPARE = 3  # largest number of samples beyond the last whole period that is left out without a warning
 
 
@@ -77,8 +78,8 @@ def periodic_vibration(
     PeriodicVibration
         The vibration over the whole periods from the start of the record. ``harmonics_std`` is the scatter of the residual's
         coefficients over up to 20 batches of whole periods, which fully includes coloured noise and slow variations. Below
-        four periods it takes the residual as white noise. With ``resolution`` it includes the rounding error that repeats in
-        every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run scatter.
+        four periods it takes the residual as white noise. With ``resolution`` it includes ``rounding_std``, the rounding error
+        that repeats in every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run scatter.
 
     Raises
     ------
@@ -126,18 +127,21 @@ def vibration_in(
     frequency_hz, periods, count, warnings = _whole_periods(phase, record.size, rate_hz, harmonics)
     chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
     solution, kept = _solved(chunks)
-    squares, means = _residual(chunks, solution, periods)
+    squares, rough, means = _residual(chunks, solution, periods)
     coefficients, residual_rms = _coefficients(solution, harmonics), np.sqrt(squares / kept)
     scatter = _standard_errors(squares, means, kept, periods, 2 * harmonics + 1)
-    rounding = rounding_errors(coefficients, _steps(resolution, len(channels)), residual_rms)
+    steps = _steps(resolution, len(channels))
+    noise_rms = np.sqrt(np.maximum(np.minimum(rough, squares) / kept - steps**2 / 12.0, 0.0))
+    rounding = rounding_errors(coefficients, steps, noise_rms)
     return PeriodicVibration(
         channels=tuple(channels),
         frequency_hz=frequency_hz,
         harmonics=coefficients,
         periods=periods,
         residual_rms=residual_rms,
-        harmonics_std=np.hypot(scatter, rounding),
+        harmonics_std=np.hypot(scatter, part_of_each(rounding)),
         drift=_relative_drift(solution, harmonics),
+        rounding_std=rounding if resolution is not None else None,
         phase_lag_target_deg=phase_lag_target_deg,
         settled=settled,
         warnings=warnings,
@@ -211,14 +215,15 @@ def _solved(chunks: Columns) -> tuple[Float, int]:
     return least_squares(np.asarray(normal), np.asarray(right)), chunks.count - lost
 
 
-def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float | None]:
-    """Return sums of squares of the residual, float[n_channels], and its coefficients batch by batch.
+def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float, Float | None]:
+    """Return sums of squares of the residual and of its white part, float[n_channels], and its coefficients batch by batch.
 
-    The latter are float[n_batches, 2 H + 1, n_channels]; None below four periods.
+    The white part is that of third differences, which higher harmonics and slow variations hardly have. The coefficients are
+    float[n_batches, 2 H + 1, n_channels]; None below four periods.
     """
     columns = solution.shape[0] - 2
     batches = batches_of(periods) if periods >= _MIN_BATCHES else 0
-    squares = np.zeros(solution.shape[1])
+    squares, rough = np.zeros(solution.shape[1]), np.zeros(solution.shape[1])
     sums, known = np.zeros((batches, columns, solution.shape[1])), np.zeros(batches, int)
     borders: Float | None = None
     for chunk in chunks:
@@ -231,9 +236,11 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
             if stop > start:
                 sums[batch] += chunk.design[start:stop, :columns].T @ residual[start:stop]
                 known[batch] += int((~chunk.lost[start:stop]).sum())
+        thirds = np.diff(residual, 3, axis=0)
+        rough += np.einsum("kc,kc->c", thirds, thirds) / _THIRD_DIFFERENCES
         squares += np.sum(np.multiply(residual, residual, out=residual), axis=0)
-        del chunk, residual  # before the next is read
-    return squares, sums / np.maximum(known, 1)[:, None, None] if batches else None
+        del chunk, residual, thirds  # before the next is read
+    return squares, rough, sums / np.maximum(known, 1)[:, None, None] if batches else None
 
 
 def _coefficients(solution: Float, harmonics: int) -> Complex:

@@ -169,6 +169,7 @@ def vibration_from(
         spectrum.drift,
         phase_lag_target_deg=phase_lag_target_deg,
         warnings=point.warnings or (),
+        rounding_std=spectrum.rounding_std,
     )
 
 
@@ -210,11 +211,12 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
 def _corrected(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
     """Correct the harmonics of every channel, and their standard errors, for the skew and the high-pass of the channel."""
     factors = channel_factors(bench, vibration.frequency_hz * np.arange(vibration.harmonics.shape[1]))
-    std = vibration.harmonics_std
+    std, rounding = vibration.harmonics_std, vibration.rounding_std
     return replace(
         vibration,
         harmonics=vibration.harmonics * factors,
         harmonics_std=None if std is None else std * np.abs(factors),
+        rounding_std=None if rounding is None else rounding * np.abs(factors),
     )
 
 
