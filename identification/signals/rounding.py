@@ -6,39 +6,43 @@ standard deviation sigma the mean of the error is (Widrow & Kollar, Quantization
 
     e(x) = sum_n (-1)^n q/(pi n) exp(-2 (pi n sigma/q)^2) sin(2 pi n x/q).
 
-With noise above about half a step it vanishes. Its coefficients depend on where the vibration stands between two steps and on
-its size to a fraction of a step. Neither is known well enough to correct for it: their variance is taken over sizes within one
-step, and over the two positions in which odd and even harmonics have the largest error (the mean on a step, which is that of an
-AC-coupled sensor, and a quarter of a step above). The error of a vibration that is nearly a sine is in phase with the fundamental: it
+With noise above about half a step it vanishes. What is left of it in a coefficient is the sum over the samples: that over the
+period, and what a rate of nearly a whole number of samples in a few periods leaves, as the same instants of the period are then
+read again and again. Both depend on where the vibration stands between two steps and on its size to a fraction of a step. Neither
+is known well enough to correct for it. The variance is the sum of those at the two positions in which odd and even harmonics have
+the largest error (the mean on a step, which is that of an AC-coupled sensor, and a quarter of a step above), and the largest of
+three sizes that are a quarter of a step apart. The error of a vibration that is nearly a sine is in phase with the fundamental: it
 is one of the amplitude, not of the phase. Both parts are therefore stated by themselves.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["part_of_each", "rounding_errors"]
+__all__ = ["JUDGED", "part_of_each", "rounding_errors"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_INSTANTS = (512, 16384)
-"""Least and largest number of instants in a period: enough for vibrations of some hundred steps, beyond which the error is
-negligible."""
-_PER_STEP = 48
-"""Instants in a period for each step of the amplitude and each term of the sawtooth."""
+JUDGED = 16384
+"""Number of samples of a record from which its rounding is judged; a longer record has no more of it."""
 _ORDERS = 6
 _NEGLIGIBLE = 1e-3
-_SIZES = (-0.375, -0.125, 0.125, 0.375)
-"""Changes of the peak of the vibration in steps: one step in all."""
+_SIZES = (-0.25, 0.0, 0.25)
+"""Changes of the peak of the vibration in steps."""
+_SPREAD = np.sqrt(0.5)
+"""Standard deviation of a sine of unknown phase over its largest value, as the error is over the size of the vibration. The part
+in quadrature depends on the shape besides, and is not reduced."""
 
 
-def rounding_errors(harmonics: Complex, resolution: Float, noise_rms: Float) -> Complex:
+def rounding_errors(theta_rad: Float, harmonics: Complex, resolution: Float, noise_rms: Float) -> Complex:
     """Standard errors of each coefficient due to rounding: in phase with the coefficient (real), in quadrature (imaginary).
 
     Parameters
     ----------
+    theta_rad
+        float[n], phase of the vibration at every sample, whole periods.
     harmonics
-        complex[n_channels, H + 1], as measured.
+        complex[n_channels, H + 1], as measured; all that are a hundredth of a step or more.
     resolution
         float[n_channels], step q of the converter in the unit of the channel; 0 for none.
     noise_rms
@@ -49,10 +53,12 @@ def rounding_errors(harmonics: Complex, resolution: Float, noise_rms: Float) -> 
     complex[n_channels, H + 1]
     """
     out = np.zeros(harmonics.shape, np.complex128)
+    orders = np.arange(harmonics.shape[1])
+    turns = np.exp(1j * np.outer(orders, theta_rad)) if np.any(resolution > 0.0) else np.zeros((1, 1))
     for row in np.flatnonzero(resolution > 0.0):
         sizes = _sizes(noise_rms[row] / resolution[row])
         if sizes:
-            out[row] = resolution[row] * _of_a_channel(harmonics[row] / resolution[row], sizes)
+            out[row] = resolution[row] * _of_a_channel(harmonics[row] / resolution[row], sizes, turns)
     return out
 
 
@@ -72,25 +78,26 @@ def _sizes(noise_steps: float) -> list[float]:
     return sizes
 
 
-def _of_a_channel(steps: Complex, sizes: list[float]) -> Complex:
-    """complex[H + 1]: standard errors in steps of a channel whose harmonics are given in steps."""
-    orders = np.arange(steps.size)
-    bound = float(np.sum(np.abs(steps[1:]))) + 1.0
-    instants = int(np.clip(2 ** np.ceil(np.log2(_PER_STEP * bound * len(sizes))), *_INSTANTS))
-    turns = np.exp(2j * np.pi * np.outer(np.arange(instants) / instants, orders[1:]))
-    position = np.real(turns @ steps[1:])
+def _of_a_channel(steps: Complex, sizes: list[float], turns: Complex) -> Complex:
+    """complex[H + 1]: standard errors in steps of a channel whose harmonics are given in steps.
+
+    ``turns``, complex[H + 1, n], are the harmonics of size 1 at every sample.
+    """
+    position = np.real(steps[1:] @ turns[1:])
     peak = max(float(np.max(np.abs(position))), 1e-9)
     unit = np.divide(steps, np.abs(steps), out=np.ones_like(steps), where=steps != 0.0)
-    squares = np.zeros((2, steps.size))
+    largest = np.zeros((2, steps.size))
     for change in _SIZES:
+        squares = np.zeros((2, steps.size))
         first = np.exp(2j * np.pi * max(1.0 + change / peak, 0.0) * position)
         for offset in (1.0, 1j):  # the mean on a step, and a quarter of a step above
-            turn, error = np.ones_like(first), np.zeros(instants)
+            turn, error = np.ones_like(first), np.zeros(position.size)
             for size in sizes:
                 turn = turn * first * offset
                 error += size * turn.imag
-            found = np.fft.rfft(error)[: steps.size] * (2.0 / instants)
+            found = (turns @ error).conj() * (2.0 / error.size)
             found[0] *= 0.5
             along = found * np.conj(unit)
-            squares += [along.real**2 / len(_SIZES), along.imag**2 / len(_SIZES)]
-    return np.asarray(np.sqrt(squares[0]) + 1j * np.sqrt(squares[1]))
+            squares += [along.real**2, along.imag**2]
+        largest = np.maximum(largest, squares)
+    return np.asarray(_SPREAD * np.sqrt(largest[0]) + 1j * np.sqrt(largest[1]))

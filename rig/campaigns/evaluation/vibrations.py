@@ -105,6 +105,7 @@ def recorded_vibration(
         sample_rate_hz=bench.sample_rate_hz,
         harmonics=harmonics,
         resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
+        noise_rms=[channel.noise_rms for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )
     return _corrected(vibration, bench)
