@@ -96,9 +96,16 @@ def continuous(exact: VirtualRig) -> tuple[VirtualRig, int]:
     """
     converter = exact.converter
     if converter.reconstruction_hz:
-        raise ValueError(f"reconstruction_hz = {converter.reconstruction_hz:g}: allowed is 0, a replay holds the output")
+        raise ValueError(
+            f"reconstruction_hz = {converter.reconstruction_hz:g}: allowed is 0, a replay holds the output"
+        )
     finer = converter.substeps * -(-FINER // converter.substeps)
-    changes = {"sample_rate_hz": finer * converter.sample_rate_hz, "substeps": 1, "oversampling": 1, "anti_alias_hz": 0.0}
+    changes = {
+        "sample_rate_hz": finer * converter.sample_rate_hz,
+        "substeps": 1,
+        "oversampling": 1,
+        "anti_alias_hz": 0.0,
+    }
     table = {name: getattr(exact, name) for name in VirtualRig.model_fields}
     table |= {"converter": converter.model_copy(update=changes), "noise_scale": 0.0}
     return VirtualRig.model_validate(table), finer
@@ -145,7 +152,10 @@ def run_once(plan: BackbonePlan, bench: Bench, exact: VirtualRig, seed: int) -> 
         Measured(
             level=point.number,
             estimate={name: float(getattr(mode, name)[number]) for name in QUANTITIES},
-            ends={name: (float(mode.interval(name)[number, 0]), float(mode.interval(name)[number, 1])) for name in QUANTITIES},
+            ends={
+                name: (float(mode.interval(name)[number, 0]), float(mode.interval(name)[number, 1]))
+                for name in QUANTITIES
+            },
             random={name: float(mode.random(name)[number]) for name in QUANTITIES},
             truth=dict(zip(("force_n", "amplitude_m"), truth, strict=True)),
         )

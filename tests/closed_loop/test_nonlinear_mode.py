@@ -150,7 +150,9 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
         for quantity, hit in hits.items():
             low, high = mode.interval(quantity).T
             exact = getattr(truth, quantity)
-            at = [np.interp(a, truth.amplitude_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)]
+            at = [
+                np.interp(a, truth.amplitude_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)
+            ]
             hit.append((low <= at) & (at <= high))
     for quantity, hit in hits.items():
         # The rounding of the converters is in the interval and the same in every run, so that it may hold the truth always.

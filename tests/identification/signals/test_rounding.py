@@ -37,7 +37,9 @@ def stated(peak_steps: float, noise_steps: float, theta: np.ndarray = THETA) -> 
 
 
 @pytest.mark.parametrize(("peak_steps", "noise_steps"), [(9.6, 0.05), (9.6, 0.17), (3.3, 0.1)])
-def test_rounding_errors_hold_those_of_rounded_records_and_are_not_far_above(peak_steps: float, noise_steps: float) -> None:
+def test_rounding_errors_hold_those_of_rounded_records_and_are_not_far_above(
+    peak_steps: float, noise_steps: float
+) -> None:
     seen = errors_seen(peak_steps, noise_steps, np.linspace(-0.5, 0.5, 16, endpoint=False))
     std = stated(peak_steps, noise_steps)
     assert np.mean(np.abs(seen.real) <= 1.96 * std.real) > 0.95
@@ -48,7 +50,9 @@ def test_rounding_errors_hold_those_of_rounded_records_and_are_not_far_above(pea
 def test_a_sine_between_steps_has_an_error_of_amplitude_and_none_of_phase() -> None:
     """The fundamental of ``sin(2 pi A cos(theta))`` is ``2 J_1(2 pi A)``: in phase, and of either sign."""
     sine = np.array([[0.0, 7.0, 0.0, 0.0]])
-    in_phase, across = (part(rounding_errors(THETA, sine, np.ones(1), np.zeros(1))[0, 1]) for part in (np.real, np.imag))
+    in_phase, across = (
+        part(rounding_errors(THETA, sine, np.ones(1), np.zeros(1))[0, 1]) for part in (np.real, np.imag)
+    )
     assert in_phase == pytest.approx(np.sqrt(0.5) * 2.0 / np.pi * np.sqrt(2.0 / (np.pi * 2.0 * np.pi * 7.0)), rel=0.4)
     assert across < 0.1 * in_phase
 
@@ -91,7 +95,13 @@ def test_harmonics_beyond_those_asked_for_count_in_the_shape_but_are_not_returne
     exact = 9.6 * np.cos(theta) + 0.3 * np.cos(9.0 * theta + 1.0)  # turns part of the error by 90 degrees
     noisy = np.round(exact + 0.17 * np.random.default_rng(5).standard_normal(theta.size))
     found = periodic_vibration(
-        theta, [noisy, noisy], CHANNELS, sample_rate_hz=5000.0, harmonics=3, resolution=[1.0, 1.0], noise_rms=[0.17, 0.17]
+        theta,
+        [noisy, noisy],
+        CHANNELS,
+        sample_rate_hz=5000.0,
+        harmonics=3,
+        resolution=[1.0, 1.0],
+        noise_rms=[0.17, 0.17],
     )
     assert found.rounding_std is not None
     assert found.rounding_std.shape == (2, 4)
