@@ -57,7 +57,7 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Measured:
-    """One point of one run: estimate, both ends of the interval, standard error of the random part, and the truth by quantity."""
+    """One point of one run: estimate, ends of the interval, standard error of the random part, and the truth, by quantity."""
 
     level: int
     estimate: dict[str, float]
@@ -236,7 +236,10 @@ def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude")
     return {"planned": planned, **{quantity: summary(points, quantity) for quantity in QUANTITIES}}
 
 
-HEAD = "plan                            noise  quantity             n  covered %  p(93 %)  random %  half-width %  bias/half-width"
+HEAD = (
+    "plan                            noise  quantity             n  covered %  p(93 %)  random %  half-width %  "
+    "bias/half-width"
+)
 
 
 def lines(name: str, factor: float, found: dict[str, Any], levels: bool) -> list[str]:
@@ -244,16 +247,14 @@ def lines(name: str, factor: float, found: dict[str, Any], levels: bool) -> list
     out = []
     for quantity in QUANTITIES:
         of = found[quantity]
-        out.append(
-            f"{name:<30}  {factor:>5g}  {quantity:<18} {of['outcomes']:>4}  {100 * of['covered']:>9.1f}  {of['p_of_93']:>7.3f}  "
-            f"{100 * of['random_covered']:>8.1f}  {100 * of['half_width']:>12.5f}  {of['largest_bias_over_half_width']:>15.2f}"
-        )
+        shares = f"{100 * of['covered']:>9.1f}  {of['p_of_93']:>7.3f}  {100 * of['random_covered']:>8.1f}"
+        widths = f"{100 * of['half_width']:>12.5f}  {of['largest_bias_over_half_width']:>15.2f}"
+        out.append(f"{name:<30}  {factor:>5g}  {quantity:<18} {of['outcomes']:>4}  {shares}  {widths}")
         for row in of["levels"] if levels else ():
-            out.append(
-                f"    point {row['level'] + 1:>3}: covered {100 * row['covered']:>5.1f} %, random {100 * row['random_covered']:>5.1f} %, "
-                f"bias {1e6 * row['bias']:>9.2f}, 1.96 scatter {1.96e6 * row['scatter']:>9.2f}, "
-                f"half-width {1e6 * row['half_width']:>9.2f}, random {1e6 * row['random_half_width']:>9.2f} ppm"
-            )
+            held = f"covered {100 * row['covered']:>5.1f} %, random {100 * row['random_covered']:>5.1f} %"
+            moved = f"bias {1e6 * row['bias']:>9.2f}, 1.96 scatter {1.96e6 * row['scatter']:>9.2f}"
+            wide = f"half-width {1e6 * row['half_width']:>9.2f}, random {1e6 * row['random_half_width']:>9.2f} ppm"
+            out.append(f"    point {row['level'] + 1:>3}: {held}, {moved}, {wide}")
     return out
 
 

@@ -1,11 +1,11 @@
 """Monte Carlo propagation of measurement errors to the properties of a nonlinear mode.
 
-Random errors are independent between points and between runs: those of the Fourier coefficients of all channels and harmonics,
-drawn from Student's distribution for the number of batches behind a standard error, and that of the slope of the drift.
-Systematic errors are the same in a further run. Some are the same at all points: mass-normalised shapes, gains of the channels,
-and phase skew (a delay: the phase of harmonic h changes h times as much). The rounding by the converters is another one at every
-point (`identification.signals.rounding`). The damping goes with the square of the mode shape at the drive point, so that twice the
-relative standard error of this shape is in that of the damping.
+Random errors are independent between points and between runs: those of the Fourier coefficients of all channels and
+harmonics, drawn from Student's distribution for the number of batches behind a standard error, and that of the slope of the
+drift. Systematic errors are the same in a further run. Some are the same at all points: mass-normalised shapes, gains of the
+channels, and phase skew (a delay: the phase of harmonic h changes h times as much). The rounding by the converters is another
+one at every point (`identification.signals.rounding`). The damping goes with the square of the mode shape at the drive point,
+so that twice the relative standard error of this shape is in that of the damping.
 """
 
 from collections.abc import Mapping

@@ -71,8 +71,8 @@ def periodic_vibration(
     resolution
         float[n_channels], step of each channel's converter in the unit of the channel, 0 for none; None if unknown.
     noise_rms
-        float[n_channels], noise ahead of the converter as far as it is known, 0 where it is not; None if unknown. More noise than
-        the residual has does not count.
+        float[n_channels], noise ahead of the converter as far as it is known, 0 where it is not; None if unknown. More noise
+        than the residual has does not count.
     lost
         bool[n], true where a sample was lost: values of ``samples`` there, such as NaN, are ignored. None: no sample was
         lost.
@@ -85,7 +85,8 @@ def periodic_vibration(
         The vibration over the whole periods from the start of the record. ``harmonics_std`` is the scatter of the residual's
         coefficients over up to 20 batches of whole periods, which fully includes coloured noise and slow variations. Below
         four periods it takes the residual as white noise. With ``resolution`` it includes ``rounding_std``, the rounding error
-        that repeats in every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run scatter.
+        that repeats in every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run
+        scatter.
 
     Raises
     ------

@@ -7,12 +7,12 @@ standard deviation sigma the mean of the error is (Widrow & Kollar, Quantization
     e(x) = sum_n (-1)^n q/(pi n) exp(-2 (pi n sigma/q)^2) sin(2 pi n x/q).
 
 With noise above about half a step it vanishes. What is left of it in a coefficient is the sum over the samples: that over the
-period, and what a rate of nearly a whole number of samples in a few periods leaves, as the same instants of the period are then
-read again and again. Both depend on where the vibration stands between two steps and on its size to a fraction of a step. Neither
-is known well enough to correct for it. The variance is the sum of those at the two positions in which odd and even harmonics have
-the largest error (the mean on a step, which is that of an AC-coupled sensor, and a quarter of a step above), and the largest of
-three sizes that are a quarter of a step apart. The error of a vibration that is nearly a sine is in phase with the fundamental: it
-is one of the amplitude, not of the phase. Both parts are therefore stated by themselves.
+period, and what a rate of nearly a whole number of samples in a few periods leaves, as the same instants of the period are
+then read again and again. Both depend on where the vibration stands between two steps and on its size to a fraction of a step.
+Neither is known well enough to correct for it. The variance is the sum of those at the two positions in which odd and even
+harmonics have the largest error (the mean on a step, which is that of an AC-coupled sensor, and a quarter of a step above),
+and the largest of three sizes that are a quarter of a step apart. The error of a vibration that is nearly a sine is in phase
+with the fundamental: it is one of the amplitude, not of the phase. Both parts are therefore stated by themselves.
 """
 
 import numpy as np
@@ -30,8 +30,8 @@ _NEGLIGIBLE = 1e-3
 _SIZES = (-0.25, 0.0, 0.25)
 """Changes of the peak of the vibration in steps."""
 _SPREAD = np.sqrt(0.5)
-"""Standard deviation of a sine of unknown phase over its largest value, as the error is over the size of the vibration. The part
-in quadrature depends on the shape besides, and is not reduced."""
+"""Standard deviation of a sine of unknown phase over its largest value, as the error is over the size of the vibration. The
+part in quadrature depends on the shape besides, and is not reduced."""
 
 
 def rounding_errors(theta_rad: Float, harmonics: Complex, resolution: Float, noise_rms: Float) -> Complex:
@@ -54,7 +54,7 @@ def rounding_errors(theta_rad: Float, harmonics: Complex, resolution: Float, noi
     """
     out = np.zeros(harmonics.shape, np.complex128)
     orders = np.arange(harmonics.shape[1])
-    turns = np.exp(1j * np.outer(orders, theta_rad)) if np.any(resolution > 0.0) else np.zeros((1, 1))
+    turns = np.exp(1j * np.outer(orders, theta_rad if np.any(resolution > 0.0) else theta_rad[:0]))
     for row in np.flatnonzero(resolution > 0.0):
         sizes = _sizes(noise_rms[row] / resolution[row])
         if sizes:

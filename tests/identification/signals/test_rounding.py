@@ -1,4 +1,4 @@
-"""What rounding leaves in Fourier coefficients, against rounded records of vibrations of other sizes and between other two steps."""
+"""What rounding leaves in Fourier coefficients, against rounded records of other sizes and between other two steps."""
 
 import numpy as np
 import pytest
