@@ -204,7 +204,7 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
         if channel.role in ("force", "drive") and bits < FEW_BITS:
             out.append(
                 f"channel {channel.name}: an amplitude of {bits:.1f} steps of its converter; "
-                "rounding is not in the error bounds"
+                "rounding is most of the error bounds"
             )
     return out
 
