@@ -43,6 +43,10 @@ class PeriodicVibration:
         float[n_channels], RMS of the signal minus its harmonics, in the unit of each channel.
     harmonics_std
         float[n_channels, H + 1], standard error of the real part, equal to that of the imaginary part; None if unknown.
+    rounding_std
+        complex[n_channels, H + 1], the part of ``harmonics_std`` that is due to the steps of the converter and would be the
+        same in a further run: standard error in phase with the coefficient (real) and in quadrature (imaginary); None if
+        unknown.
     drift
         complex[n_channels], change of the fundamental over the periods used, relative to the fundamental: the real part is
         that of the amplitude, the imaginary part that of the phase in rad; None if unknown.
@@ -69,6 +73,7 @@ class PeriodicVibration:
     phase_lag_target_deg: float = 90.0
     settled: bool = True
     warnings: tuple[str, ...] = ()
+    rounding_std: Complex | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
@@ -86,12 +91,12 @@ class PeriodicVibration:
         self._check("residual_rms", np.float64, 1)
         if self.drift is not None:
             self._check("drift", np.complex128, 1)
-        if self.harmonics_std is not None:
-            self._check("harmonics_std", np.float64, 2)
-            if self.harmonics_std.shape != self.harmonics.shape:
-                raise IdentificationError(
-                    f"harmonics_std: shape {self.harmonics_std.shape}, harmonics have {self.harmonics.shape}"
-                )
+        for name, dtype in (("harmonics_std", np.float64), ("rounding_std", np.complex128)):
+            if getattr(self, name) is None:
+                continue
+            self._check(name, dtype, 2)
+            if (shape := getattr(self, name).shape) != self.harmonics.shape:
+                raise IdentificationError(f"{name}: shape {shape}, harmonics have {self.harmonics.shape}")
 
     def _check(self, name: str, dtype: type[np.generic], ndim: int) -> None:
         array = finite_array(name, getattr(self, name), dtype, ndim)

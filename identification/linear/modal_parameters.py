@@ -81,7 +81,11 @@ def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool
 def as_linear_modes(
     fit: ModalFit, band: FrequencyResponseMatrix, data: WeightedResponses, *, normal: bool
 ) -> LinearModes:
-    """Return the modes in rising order of frequency; their covariance follows by first-order propagation."""
+    """Return the modes in rising order of frequency; their covariance follows by first-order propagation.
+
+    It grows with the square of a misfit above 1 (the Birge ratio): what the model misses moves its parameters as noise of that
+    size would. One realisation cannot tell nonlinear distortion, which is far above its noise, from the response.
+    """
     drive = find_role(band.outputs, "drive")
     rows, count, terms = len(band.outputs), fit.omega.size, fit.terms.shape[1]
     nonlinear = fit.poles.size
@@ -103,7 +107,8 @@ def as_linear_modes(
     rise = np.argsort(fit.omega, kind="stable")
     order = np.concatenate([block * count + rise for block in range(2 + rows)])
     values = modes(parameters)[order]
-    covariance = (jacobian @ fit.covariance @ jacobian.T)[np.ix_(order, order)]
+    misfit = max(1.0, fit.residual) if np.isfinite(fit.residual) else 1.0
+    covariance = misfit**2 * (jacobian @ fit.covariance @ jacobian.T)[np.ix_(order, order)]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     loose = fit if not normal else fit_modes(data, fit.poles, normal=False, iterations=0)
     return LinearModes(
@@ -154,7 +159,7 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
     if data.kind == "relative":
         notes.append("no covariance of the responses is known: errors are taken from the misfit of the model")
     elif data.kind == "noise":
-        notes.append("errors from noise alone; nonlinear distortion is not in them (needs two realisations)")
+        notes.append("errors from noise and misfit; two realisations or more show nonlinear distortion line by line")
     if modes.fit_residual > _LARGEST_RESIDUAL:
         notes.append(
             f"misfit is {modes.fit_residual:.2f} times what its errors let expect: modes missing, or not linear at this level"

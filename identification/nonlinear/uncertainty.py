@@ -1,10 +1,11 @@
 """Monte Carlo propagation of measurement errors to the properties of a nonlinear mode.
 
-Random errors are independent between points: those of the Fourier coefficients of all channels and harmonics, drawn from
-Student's distribution for the number of batches behind a standard error, and that of the slope of the drift. Systematic
-errors are the same at all points: mass-normalised shapes, gains of the channels, and phase skew (a delay: the phase of
-harmonic h changes h times as much). The damping goes with the square of the mode shape at the drive point, so that twice the
-relative standard error of this shape is in that of the damping.
+Random errors are independent between points and between runs: those of the Fourier coefficients of all channels and
+harmonics, drawn from Student's distribution for the number of batches behind a standard error, and that of the slope of the
+drift. Systematic errors are the same in a further run. Some are the same at all points: mass-normalised shapes, gains of the
+channels, and phase skew (a delay: the phase of harmonic h changes h times as much). The rounding by the converters is another
+one at every point (`identification.signals.rounding`). The damping goes with the square of the mode shape at the drive point,
+so that twice the relative standard error of this shape is in that of the damping.
 """
 
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ from identification.measurements import PeriodicVibration
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
 from identification.nonlinear.properties import States, properties
 from identification.signals.fourier import batches_of
+from identification.signals.rounding import part_of_each
 
 __all__ = ["ErrorModel", "propagated"]
 
@@ -166,12 +168,15 @@ def _systematic(
     drawn = None if shapes is None else shapes.draw(model.draws, rng)
     shape, shape_std = states.drive_shape, backbone.drive_mode_shape_std
     uncertain = shapes is None and shape is not None and bool(shape_std)
-    if not (calibration.any() or skew.any() or drawn is not None or uncertain):
+    rounding = np.array([_rounding(point) for point in backbone.points])
+    if not (calibration.any() or skew.any() or drawn is not None or uncertain or rounding.any()):
         return None
     count = len(backbone.channels)
     gain = 1.0 + calibration * rng.standard_normal((model.draws, count))
     angle = skew * rng.standard_normal((model.draws, count))
     wrong = _repeated(states, model.draws)
+    if rounding.any():
+        wrong = _rounded(wrong, backbone, rows, rounding, rng)
     delay = np.outer(states.frequency_hz / states.frequency_hz[0], np.arange(states.force.shape[-1]))
 
     def turned(row: int) -> Complex:
@@ -194,6 +199,37 @@ def _systematic(
     if same and np.array_equal(states.linear_shape, shapes.tested):
         return replace(wrong, linear_shape=drawn[..., shapes.mode])
     return wrong
+
+
+def _rounding(point: PeriodicVibration) -> Complex:
+    return np.zeros(point.harmonics.shape, np.complex128) if point.rounding_std is None else point.rounding_std
+
+
+def _rounded(
+    wrong: States, backbone: Backbone, rows: tuple[int, ...], rounding: Complex, rng: np.random.Generator
+) -> States:
+    """Add the errors of rounding to ``wrong``, independent at each point; ``rounding`` is complex[n, n_channels, H + 1]."""
+    points = backbone.points
+    harmonics = np.array([point.harmonics for point in points])
+    unit = np.divide(harmonics, np.abs(harmonics), out=np.ones_like(harmonics), where=harmonics != 0.0)
+    size = (wrong.force.shape[0], *rounding.shape)
+    drawn = rounding.real * rng.standard_normal(size) + 1j * rounding.imag * rng.standard_normal(size)
+    return _with_errors(wrong, backbone, rows, unit * drawn)
+
+
+def _with_errors(wrong: States, backbone: Backbone, rows: tuple[int, ...], errors: Complex) -> States:
+    """Add errors of the coefficients, complex[draws, n, n_channels, H + 1] in the units of the channels, to ``wrong``."""
+    points = backbone.points
+    force, drive = find_role(backbone.channels, "force"), find_role(backbone.channels, "drive")
+    deflection = wrong.deflection_m.copy()
+    for column, row in enumerate(rows):
+        deflection[..., column] += errors[:, :, row, 1] * _to_displacement(points, row)[:, 1]
+    return replace(
+        wrong,
+        force=wrong.force + errors[:, :, force],
+        drive_m=wrong.drive_m + errors[:, :, drive] * _to_displacement(points, drive),
+        deflection_m=deflection,
+    )
 
 
 def _random(
@@ -225,14 +261,18 @@ def _random(
 
 
 def _errors(point: PeriodicVibration) -> Float:
-    return np.zeros(point.harmonics.shape) if point.harmonics_std is None else point.harmonics_std
+    """float[n_channels, H + 1]: standard errors without those of rounding, which are systematic."""
+    if point.harmonics_std is None:
+        return np.zeros(point.harmonics.shape)
+    squares = point.harmonics_std**2 - part_of_each(_rounding(point)) ** 2
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
-def _to_displacement(points: tuple[PeriodicVibration, ...], row: int) -> Float:
-    """float[n, H + 1]: displacement per unit of the channel, in magnitude; 1 for harmonic 0, which is not used."""
+def _to_displacement(points: tuple[PeriodicVibration, ...], row: int) -> Complex:
+    """complex[n, H + 1]: displacement per unit of the channel; 1 for harmonic 0, which is not used."""
     order = MOTION_ORDER[points[0].channels[row].motion]
     harmonic = np.maximum(np.arange(points[0].harmonics.shape[1]), 1)
-    return np.asarray([(2.0 * np.pi * point.frequency_hz * harmonic) ** -order for point in points], dtype=np.float64)
+    return np.asarray([(2j * np.pi * point.frequency_hz * harmonic) ** -order for point in points], dtype=np.complex128)
 
 
 def _drift_noise(states: States, backbone: Backbone, rng: np.random.Generator, draws: int) -> Complex:

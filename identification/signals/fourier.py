@@ -23,7 +23,7 @@ from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
 from identification.signals.chunks import ArrayRecord, Phase, Record
 from identification.signals.columns import Columns, least_squares
-from identification.signals.rounding import rounding_errors
+from identification.signals.rounding import JUDGED, part_of_each, rounding_errors
 from identification.validation import finite_array, positive
 
 __all__ = ["batches_of", "periodic_vibration", "vibration_in"]
@@ -35,6 +35,9 @@ _MAX_BATCHES = 20
 _MIN_BATCHES = 4
 _MANY = 50
 _MOST_LOST = 0.05
+_SHAPE_HARMONICS = 30
+_BELOW_HALF = 0.45  # of the samples per period: highest harmonic of a shape
+_THIRD_DIFFERENCES = 20.0  # variance of a third difference of white noise: 1 + 9 + 9 + 1
 _SAMPLES_TO_SPARE = 3  # largest number of samples beyond the last whole period that is left out without a warning
 
 
@@ -46,6 +49,7 @@ def periodic_vibration(
     sample_rate_hz: float,
     harmonics: int = 7,
     resolution: ArrayLike | None = None,
+    noise_rms: ArrayLike | None = None,
     lost: ArrayLike | None = None,
     phase_lag_target_deg: float = 90.0,
     settled: bool = True,
@@ -66,6 +70,9 @@ def periodic_vibration(
         Highest harmonic H.
     resolution
         float[n_channels], step of each channel's converter in the unit of the channel, 0 for none; None if unknown.
+    noise_rms
+        float[n_channels], noise ahead of the converter as far as it is known, 0 where it is not; None if unknown. More noise
+        than the residual has does not count.
     lost
         bool[n], true where a sample was lost: values of ``samples`` there, such as NaN, are ignored. None: no sample was
         lost.
@@ -77,8 +84,9 @@ def periodic_vibration(
     PeriodicVibration
         The vibration over the whole periods from the start of the record. ``harmonics_std`` is the scatter of the residual's
         coefficients over up to 20 batches of whole periods, which fully includes coloured noise and slow variations. Below
-        four periods it takes the residual as white noise. With ``resolution`` it includes the rounding error that repeats in
-        every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run scatter.
+        four periods it takes the residual as white noise. With ``resolution`` it includes ``rounding_std``, the rounding error
+        that repeats in every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run
+        scatter.
 
     Raises
     ------
@@ -100,6 +108,7 @@ def periodic_vibration(
         sample_rate_hz=sample_rate_hz,
         harmonics=harmonics,
         resolution=resolution,
+        noise_rms=noise_rms,
         phase_lag_target_deg=phase_lag_target_deg,
         settled=settled,
     )
@@ -112,6 +121,7 @@ def vibration_in(
     sample_rate_hz: float,
     harmonics: int = 7,
     resolution: ArrayLike | None = None,
+    noise_rms: ArrayLike | None = None,
     phase_lag_target_deg: float = 90.0,
     settled: bool = True,
 ) -> PeriodicVibration:
@@ -126,18 +136,23 @@ def vibration_in(
     frequency_hz, periods, count, warnings = _whole_periods(phase, record.size, rate_hz, harmonics)
     chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
     solution, kept = _solved(chunks)
-    squares, means = _residual(chunks, solution, periods)
+    squares, rough, means = _residual(chunks, solution, periods)
     coefficients, residual_rms = _coefficients(solution, harmonics), np.sqrt(squares / kept)
     scatter = _standard_errors(squares, means, kept, periods, 2 * harmonics + 1)
-    rounding = rounding_errors(coefficients, _steps(resolution, len(channels)), residual_rms)
+    steps = _per_channel("resolution", resolution, len(channels))
+    seen_rms = np.sqrt(np.maximum(np.minimum(rough, squares) / kept - steps**2 / 12.0, 0.0))
+    known_rms = _per_channel("noise_rms", noise_rms, len(channels))
+    dither_rms = np.where(known_rms > 0.0, np.minimum(known_rms, np.sqrt(squares / kept)), seen_rms)
+    rounding = rounding_errors(*_shape_of(chunks, solution, coefficients), steps, dither_rms)[:, : harmonics + 1]
     return PeriodicVibration(
         channels=tuple(channels),
         frequency_hz=frequency_hz,
         harmonics=coefficients,
         periods=periods,
         residual_rms=residual_rms,
-        harmonics_std=np.hypot(scatter, rounding),
+        harmonics_std=np.hypot(scatter, part_of_each(rounding)),
         drift=_relative_drift(solution, harmonics),
+        rounding_std=rounding if resolution is not None else None,
         phase_lag_target_deg=phase_lag_target_deg,
         settled=settled,
         warnings=warnings,
@@ -160,16 +175,14 @@ def _refuse_lost(lost: int, size: int) -> None:
         raise IdentificationError(f"samples: {lost} of {size} were lost, allowed is up to {100.0 * _MOST_LOST:g} %")
 
 
-def _steps(resolution: ArrayLike | None, channels: int) -> Float:
-    """float[n_channels]: converter steps; zero where unknown."""
-    if resolution is None:
+def _per_channel(name: str, given: ArrayLike | None, channels: int) -> Float:
+    """float[n_channels]: converter steps or noise; zero where unknown."""
+    if given is None:
         return np.zeros(channels)
-    steps = finite_array("resolution", resolution, np.float64, 1)
-    if steps.size != channels or np.any(steps < 0.0):
-        raise IdentificationError(
-            f"resolution: is {resolution}, needs {channels} numbers of 0 or above, one per channel"
-        )
-    return steps
+    values = finite_array(name, given, np.float64, 1)
+    if values.size != channels or np.any(values < 0.0):
+        raise IdentificationError(f"{name}: is {given}, needs {channels} numbers of 0 or above, one per channel")
+    return values
 
 
 def _whole_periods(phase: Phase, size: int, rate_hz: float, harmonics: int) -> tuple[float, int, int, tuple[str, ...]]:
@@ -211,14 +224,15 @@ def _solved(chunks: Columns) -> tuple[Float, int]:
     return least_squares(np.asarray(normal), np.asarray(right)), chunks.count - lost
 
 
-def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float | None]:
-    """Return sums of squares of the residual, float[n_channels], and its coefficients batch by batch.
+def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Float, Float | None]:
+    """Return sums of squares of the residual and of its white part, float[n_channels], and its coefficients batch by batch.
 
-    The latter are float[n_batches, 2 H + 1, n_channels]; None below four periods.
+    The white part is that of third differences, which higher harmonics and slow variations hardly have. The coefficients are
+    float[n_batches, 2 H + 1, n_channels]; None below four periods.
     """
     columns = solution.shape[0] - 2
     batches = batches_of(periods) if periods >= _MIN_BATCHES else 0
-    squares = np.zeros(solution.shape[1])
+    squares, rough = np.zeros(solution.shape[1]), np.zeros(solution.shape[1])
     sums, known = np.zeros((batches, columns, solution.shape[1])), np.zeros(batches, int)
     borders: Float | None = None
     for chunk in chunks:
@@ -231,9 +245,11 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
             if stop > start:
                 sums[batch] += chunk.design[start:stop, :columns].T @ residual[start:stop]
                 known[batch] += int((~chunk.lost[start:stop]).sum())
+        thirds = np.diff(residual, 3, axis=0)
+        rough += np.einsum("kc,kc->c", thirds, thirds) / _THIRD_DIFFERENCES
         squares += np.sum(np.multiply(residual, residual, out=residual), axis=0)
-        del chunk, residual  # before the next is read
-    return squares, sums / np.maximum(known, 1)[:, None, None] if batches else None
+        del chunk, residual, thirds  # before the next is read
+    return squares, rough, sums / np.maximum(known, 1)[:, None, None] if batches else None
 
 
 def _coefficients(solution: Float, harmonics: int) -> Complex:
@@ -242,6 +258,20 @@ def _coefficients(solution: Float, harmonics: int) -> Complex:
     result[:, 0] = solution[0]
     result[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : 2 * harmonics + 1]).T
     return result
+
+
+def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[Float, Complex]:
+    """Return the phase of some samples, and the harmonics of the vibration there: more than are asked for.
+
+    Rounding depends on the shape of a vibration to a fraction of a step, to which harmonics above H still contribute.
+    """
+    chunk = next(iter(chunks))
+    theta = chunk.theta[:JUDGED]
+    residual = chunk.data[:JUDGED] - chunk.design[:JUDGED] @ solution
+    per_period = 2.0 * np.pi * (theta.size - 1) / (theta[-1] - theta[0])
+    first, last = coefficients.shape[1], min(_SHAPE_HARMONICS, int(_BELOW_HALF * per_period))
+    turns = np.exp(-1j * np.outer(np.arange(first, last + 1), theta))
+    return theta, np.hstack([coefficients, (turns @ residual).T * (2.0 / theta.size)])
 
 
 def _relative_drift(solution: Float, harmonics: int) -> Complex:

@@ -85,6 +85,10 @@ class Channel(Configured):
     """Noise of sensor and converter, RMS in the physical unit, as far as known."""
     skew_samples: float = Field(0.0, ge=-100, le=100)
     """Delay of this channel behind the others, samples; taken out of the measured phase lag and of every amplitude."""
+    high_pass_hz: float = Field(0.0, ge=0, le=100)
+    """Corner of the first-order high-pass of sensor and conditioner, Hz: 0.16 divided by the discharge time constant in
+    seconds. Its gain and phase are taken out of the harmonics of every steady vibration and out of sweeps, not out of
+    multisines, where those of two channels with the same corner cancel; 0 for none."""
     sensor: str = ""
     """Make and model, for the record."""
     serial_number: str = ""

@@ -25,7 +25,7 @@ def backbone_parts(backbone: Backbone) -> Contents:
         "harmonics": np.array([point.harmonics for point in points]),
         "residual_rms": np.array([point.residual_rms for point in points]),
     }
-    for name in ("harmonics_std", "drift"):
+    for name in ("harmonics_std", "drift", "rounding_std"):
         values = [getattr(point, name) for point in points]
         if any(value is not None for value in values):
             like = np.full_like(next(value for value in values if value is not None), np.nan)
@@ -43,7 +43,7 @@ def backbone_parts(backbone: Backbone) -> Contents:
     names = tuple(channel.name for channel in channels)
     units = np.array([channel.unit for channel in channels])
     orders = tuple(str(order) for order in range(points[0].harmonics.shape[1]))
-    harmonic, single = ("harmonics", "harmonics_std"), ("residual_rms", "drift")
+    harmonic, single = ("harmonics", "harmonics_std", "rounding_std"), ("residual_rms", "drift")
     return Contents(
         kind="backbone",
         title=backbone.specimen,
@@ -72,6 +72,7 @@ def backbone_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> B
             phase_lag_target_deg=float(arrays["phase_lag_target_deg"][row]),
             settled=bool(arrays["settled"][row]),
             warnings=tuple(warnings[row]),
+            rounding_std=_known(arrays.get("rounding_std"), row),
         )
         for row in range(count)
     )

@@ -16,7 +16,7 @@ __all__ = ["as_json", "fundamentals_of", "shown_bins", "shown_frame", "shown_lin
 SCOPE_PERIODS = 3
 SCOPE_POINTS = 400
 HARMONICS = 10
-BULKY = {"harmonics", "harmonics_std"}  # numbers for every channel and harmonic
+BULKY = {"harmonics", "harmonics_std", "rounding_std"}  # numbers for every channel and harmonic
 RECORDS = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
 GUARDS = {
     GuardMode.DISARMED: "not armed",

@@ -142,7 +142,6 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
     steps = FINE_STEPS[name]  # harmonic balance knows no time step
     near = np.linspace(0.994, 1.004, 11)
     truth = phase_resonance_backbone(virtual, voltages_v=np.outer(levels, near).ravel())
-    seen_m = truth.amplitude_m / np.hypot(1.0, virtual.sensors[0].high_pass_hz / truth.frequency_hz)
     rows = [slice(11 * level, 11 * level + 11) for level in range(len(levels))]
     hits: dict[str, list[np.ndarray]] = {"modal_frequency_hz": [], "damping_ratio": []}
     for seed in range(1, 11):
@@ -151,11 +150,13 @@ def test_the_truth_lies_in_the_interval(name: str) -> None:
         for quantity, hit in hits.items():
             low, high = mode.interval(quantity).T
             exact = getattr(truth, quantity)
-            at = [np.interp(a, seen_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)]
+            at = [
+                np.interp(a, truth.amplitude_m[row], exact[row]) for a, row in zip(mode.amplitude_m, rows, strict=True)
+            ]
             hit.append((low <= at) & (at <= high))
     for quantity, hit in hits.items():
-        # 50 seeds cover 0.905 (magnet, frequency) to 0.992; the mean over so few runs scatters by 0.025
-        assert 0.84 <= np.mean(hit) <= 0.998, (quantity, np.mean(hit))
+        # The rounding of the converters is in the interval and the same in every run, so that it may hold the truth always.
+        assert np.mean(hit) >= 0.9, (quantity, np.mean(hit))
 
 
 def test_scatter_of_the_specimen_from_run_to_run_is_recovered() -> None:

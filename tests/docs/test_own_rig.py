@@ -131,7 +131,9 @@ def test_the_force_law_of_the_page_damps_as_the_energy_that_it_takes(folder):
         # Energy of c v |v| per period, 8/3 c w^2 X^3, over 2 pi w^2 q^2 / 2 is 4 pi zeta: zeta = 4/(3 pi) c X phi^2.
         tip_m = ratio * drag["amplitude_m"]
         added = 4.0 / (3.0 * math.pi) * 0.05 * tip_m * (ratio * modes.drive_shape[0]) ** 2
-        assert drag["damping_ratio"] - bare["damping_ratio"] == pytest.approx(added, rel=0.03)
+        assert drag["damping_ratio"] - bare["damping_ratio"] == pytest.approx(
+            added, rel=0.03, abs=4e-6
+        )  # 4e-6 is a thousandth of the damping, its noise at these levels
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,9 @@ class Spectrum:
     """float64[channel]: RMS of the signal after the harmonics are subtracted."""
     drift: NDArray[np.complex128] | None = field(metadata=PAIRS)
     """complex128[channel]: relative change of the fundamental over the record; None if the vibration was not steady."""
+    rounding_std: NDArray[np.complex128] | None = field(default=None, metadata=PAIRS)
+    """complex128[channel, h]: the part of the standard errors that is due to the steps of the converter, in phase with the
+    harmonic and in quadrature; None if it was not computed."""
 
 
 @dataclass(frozen=True, kw_only=True)

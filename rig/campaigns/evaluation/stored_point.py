@@ -46,7 +46,7 @@ def _table(value: Any) -> dict[str, Any]:
         content = getattr(value, one.name)
         if one.metadata == PART:
             out |= {} if content is None else _table(content)
-        elif one.default is MISSING or content != one.default:
+        elif one.default is MISSING or (content is not None if one.default is None else content != one.default):
             out[one.name] = _plain(content)
     return out
 

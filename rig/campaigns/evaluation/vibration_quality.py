@@ -108,5 +108,6 @@ def vibration_part(vibration: PeriodicVibration, rows: Rows) -> Vibration:
             harmonics_std=vibration.harmonics_std,
             residual_rms=vibration.residual_rms,
             drift=vibration.drift,
+            rounding_std=vibration.rounding_std,
         ),
     )

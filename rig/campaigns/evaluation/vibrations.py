@@ -21,6 +21,7 @@ from rig.tick.sequencer.layout import Outcome
 
 __all__ = [
     "VOLTAGE",
+    "channel_factors",
     "channels_from",
     "channels_of",
     "failed_point",
@@ -105,7 +106,7 @@ def _of_harmonics(distortion: float) -> str:
 def recorded_vibration(
     bench: Bench, rows: Rows, harmonics: int, phase_lag_target_deg: float = 90.0
 ) -> PeriodicVibration:
-    """Return the periodic vibration in recorded rows, with the skew of the channels removed.
+    """Return the periodic vibration in recorded rows, with the skew and the high-pass of the channels removed.
 
     Lost rows are left out. Raises `identification.IdentificationError` if the rows contain no vibration.
     """
@@ -115,9 +116,10 @@ def recorded_vibration(
         sample_rate_hz=bench.sample_rate_hz,
         harmonics=harmonics,
         resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
+        noise_rms=[channel.noise_rms for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )
-    return _without_skew(vibration, bench)
+    return _corrected(vibration, bench)
 
 
 class _Record:
@@ -179,6 +181,7 @@ def vibration_from(
         spectrum.drift,
         phase_lag_target_deg=phase_lag_target_deg,
         warnings=point.warnings or (),
+        rounding_std=spectrum.rounding_std,
     )
 
 
@@ -212,15 +215,31 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
         if channel.role in ("force", "drive") and bits < FEW_BITS:
             out.append(
                 f"channel {channel.name}: an amplitude of {bits:.1f} steps of its converter; "
-                "rounding is not in the error bounds"
+                "rounding is most of the error bounds"
             )
     return out
 
 
-def _without_skew(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
-    """Correct the harmonics of every channel for the skew of the channel: ``Y_h exp(i h Omega tau)``."""
-    orders = np.arange(vibration.harmonics.shape[1])
-    return replace(vibration, harmonics=vibration.harmonics * skew_turn(bench, vibration.frequency_hz * orders))
+def _corrected(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
+    """Correct the harmonics of every channel, and their standard errors, for the skew and the high-pass of the channel."""
+    factors = channel_factors(bench, vibration.frequency_hz * np.arange(vibration.harmonics.shape[1]))
+    std, rounding = vibration.harmonics_std, vibration.rounding_std
+    return replace(
+        vibration,
+        harmonics=vibration.harmonics * factors,
+        harmonics_std=None if std is None else std * np.abs(factors),
+        rounding_std=None if rounding is None else rounding * np.abs(factors),
+    )
+
+
+def channel_factors(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:
+    """Return factors that remove each channel's skew and the first-order high-pass of its sensor, complex[n_channels, n].
+
+    The high-pass is ``1 / (1 - i f_c / f)``. At 0 Hz, which it does not pass, its factor is 1.
+    """
+    corner_hz = np.array([channel.high_pass_hz for channel in bench.channels])
+    over = np.divide(1.0, frequency_hz, out=np.zeros(np.shape(frequency_hz)), where=np.asarray(frequency_hz) != 0.0)
+    return np.asarray(skew_turn(bench, frequency_hz) * (1.0 - 1j * np.outer(corner_hz, over)))
 
 
 def skew_turn(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:

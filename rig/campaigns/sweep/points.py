@@ -11,7 +11,7 @@ from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of
 from rig.campaigns.evaluation.point import PART, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
-from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, not_evaluated, skew_turn
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.recording.reader import Recording
@@ -181,9 +181,9 @@ def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
         (*channels_of(bench), VOLTAGE),
         sample_rate_hz=bench.sample_rate_hz,
     )
-    without_skew = transient.fundamentals.copy()
-    without_skew[:-1] *= skew_turn(bench, transient.frequency_hz)
-    return _without_gaps(replace(transient, fundamentals=without_skew), lost, bench.sample_rate_hz)
+    corrected = transient.fundamentals.copy()
+    corrected[:-1] *= channel_factors(bench, transient.frequency_hz)
+    return _without_gaps(replace(transient, fundamentals=corrected), lost, bench.sample_rate_hz)
 
 
 def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float) -> Transient:

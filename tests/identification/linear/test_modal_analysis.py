@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -164,3 +166,18 @@ def test_two_forces_make_one_diagram() -> None:
 def test_a_mode_that_is_there_is_not_left_out_of_the_fit_because_fewer_were_asked_for() -> None:
     with pytest.raises(IdentificationError, match=r"modes: 2 wanted, but left out: pole at .* raises the misfit"):
         linear_modes(measured(3, 0.5), modes=2)
+
+
+def test_errors_that_are_four_times_what_a_covariance_says_make_intervals_four_times_as_wide() -> None:
+    known, believed = measured(5, 0.5), measured(5, 0.5)
+    small = {
+        name: getattr(believed, name) / 16.0
+        for name in ("noise_covariance", "total_covariance")
+        if getattr(believed, name) is not None
+    }
+    right = linear_modes(known, modes=list(FREQUENCY_HZ), orders=range(2, 15, 2))
+    wrong = linear_modes(replace(believed, **small), modes=list(FREQUENCY_HZ), orders=range(2, 15, 2))
+    assert small
+    assert wrong.fit_residual == pytest.approx(4.0 * right.fit_residual, rel=0.02)
+    for name in ("frequency_std_hz", "damping_ratio_std", "shapes_std"):
+        np.testing.assert_allclose(getattr(wrong, name), getattr(right, name), rtol=0.15)

@@ -230,3 +230,34 @@ def test_without_draws_the_properties_are_the_same_and_their_errors_unknown() ->
     assert quick.interval_95.shape == whole.interval_95.shape
     with pytest.raises(IdentificationError, match="draws: is 99"):
         identify(backbone, draws=99)
+
+
+def test_rounding_is_systematic_and_in_phase_it_moves_force_and_damping_but_not_the_frequency() -> None:
+    plain = noisy_point(relative=1e-6)
+    rounding = np.zeros(plain.harmonics.shape, complex)
+    rounding[0, 1] = 0.01 * abs(plain.harmonics[0, 1])
+    std = np.hypot(plain.harmonics_std, np.abs(rounding) / np.sqrt(2.0))
+    rounded = replace(plain, rounding_std=rounding, harmonics_std=std)
+    mode = identify(Backbone((rounded, rounded), drive_mode_shape=PHI), draws=5000)
+    without = identify(Backbone((plain, plain), drive_mode_shape=PHI), draws=5000)
+    for name in ("force_n", "damping_ratio"):
+        value = getattr(mode, name)
+        np.testing.assert_allclose(mode.systematic(name), 0.01 * value, rtol=0.05)
+        np.testing.assert_allclose(mode.random(name), without.random(name), rtol=0.1)
+        np.testing.assert_allclose(np.diff(mode.interval(name)), 2 * 1.96 * 0.01 * value[:, None], rtol=0.06)
+    assert np.all(mode.systematic("modal_frequency_hz") < 1e-6 * mode.modal_frequency_hz)
+    assert np.all(mode.systematic("amplitude_m") < 1e-9 * mode.amplitude_m)
+
+
+def test_rounding_in_quadrature_turns_the_phase_and_so_moves_the_frequency() -> None:
+    plain = noisy_point(relative=1e-6)
+    rounding = np.zeros(plain.harmonics.shape, complex)
+    rounding[0, 1] = 0.01j * abs(plain.harmonics[0, 1])
+    std = np.hypot(plain.harmonics_std, np.abs(rounding) / np.sqrt(2.0))
+    mode = identify(
+        Backbone((replace(plain, rounding_std=rounding, harmonics_std=std),), drive_mode_shape=PHI), draws=5000
+    )
+    # w^2 = W^2 + (phi F / q) cos psi: one part in a hundred of a radian is z w of it in the frequency.
+    expected = 0.01 * mode.damping_ratio * mode.frequency_hz
+    np.testing.assert_allclose(mode.systematic("modal_frequency_hz"), expected, rtol=0.05)
+    assert mode.systematic("damping_ratio")[0] < 1e-3 * mode.damping_ratio[0]

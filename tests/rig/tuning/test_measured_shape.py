@@ -89,7 +89,9 @@ def test_damping_is_that_of_harmonic_balance_within_its_interval(tuned, run):
     bound = np.array([1.96 * point["damping_ratio_std"] for point in points])
     assert np.all(np.abs(found - true) < bound)
     relative = tuned.plant.drive_shape_std / tuned.plant.drive_shape
-    assert bound == pytest.approx(1.96 * 2.0 * relative * found, rel=0.2)  # the shape's part, noise adds little
+    of_the_shape = 1.96 * 2.0 * relative * found
+    assert bound[1:] == pytest.approx(of_the_shape[1:], rel=0.2)  # noise adds little
+    assert bound[0] > of_the_shape[0]  # where the force is some steps of its converter, rounding adds much
     assert {point["drive_mode_shape"] for point in points} == {tuned.plant.drive_shape}
 
 
@@ -101,9 +103,9 @@ def test_the_model_names_its_mode_shape_with_that_of_the_bench_beside_it(tuned, 
     assert mode.damping_ratio == pytest.approx(truth(mode), rel=0.02)
     low, high = mode.interval("damping_ratio").T
     assert np.all((low < truth(mode)) & (truth(mode) < high))
-    assert mode.systematic("damping_ratio") == pytest.approx(
-        2.0 * mode.damping_ratio * tuned.plant.drive_shape_std / tuned.plant.drive_shape, rel=0.1
-    )
+    of_the_shape = 2.0 * mode.damping_ratio * tuned.plant.drive_shape_std / tuned.plant.drive_shape
+    assert mode.systematic("damping_ratio")[1:] == pytest.approx(of_the_shape[1:], rel=0.1)
+    assert mode.systematic("damping_ratio")[0] > of_the_shape[0]  # rounding of the smallest force besides
     assert "mode shape at the drive point: 0.90" in command("show", run)
 
 
