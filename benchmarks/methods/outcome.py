@@ -63,6 +63,10 @@ class Outcome:
     failed: str = ""
     """Why there is no backbone; empty if there is one."""
 
+    def row(self) -> dict[str, Any]:
+        """Return it as JSON."""
+        return asdict(self)
+
 
 def turns(theta_rad: Real) -> float:
     """Return the periods that an oscillator phase, wrapped to a period, passes through."""
@@ -91,7 +95,7 @@ def carried_out(name: str, method: str, pure: bool, condition: str, knob: float,
     try:
         plan = plan_of(method, name, pure, condition, knob)
         run = rig.run(plan, bench=bench_of(name, condition), seed=seed)
-    except (RigError, ValueError) as error:
+    except (RigError, ValueError) as error:  # a tune that fails, a plan that the bench refuses
         return Outcome(**fixed, **nothing, failed=f"{type(error).__name__}: {error}"[:300])
     with run:
         effort = _effort(run.recording, bench_of(name).sample_rate_hz)
@@ -209,7 +213,7 @@ def _from_sweeps(run: rig.Run) -> Measured:
         past = np.flatnonzero((lag[:-1] < 0.5 * np.pi) & (lag[1:] >= 0.5 * np.pi))
         if not past.size:
             continue
-        first = int(past[0])
+        first = int(past[np.argmax(np.abs(drive[past]))])  # noise passes it, too, where there is hardly a response
         part = (0.5 * np.pi - lag[first]) / (lag[first + 1] - lag[first])
         omega, force_n, drive_m_s2 = (
             float(values[first] + part * (values[first + 1] - values[first]))
@@ -220,8 +224,3 @@ def _from_sweeps(run: rig.Run) -> Measured:
     if not found:
         raise IdentificationError("sweeps: none passed resonance")
     return Measured(*np.array(found, float).T)
-
-
-def as_row(outcome: Outcome) -> dict[str, Any]:
-    """Return an outcome as JSON."""
-    return asdict(outcome)

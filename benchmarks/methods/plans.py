@@ -9,13 +9,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.methods.rigs import CONTROLLED, SHIPPED, bench_of, levels_of
+import numpy as np
+
+from benchmarks.methods.rigs import CONTROLLED, SHIPPED, bench_of, levels_of, truth_at
 from rig.arming.run_options import RunOptions
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
 from rig.tuning import TuningRequest, tune
 
-__all__ = ["METHODS", "Method", "plan_of"]
+__all__ = ["METHODS", "Method", "plan_of", "tuned", "usual_knob"]
 
 Table = dict[str, Any]
 
@@ -31,7 +33,7 @@ class Method:
     knob: str
     """Name of the key that the knob is."""
     usual: float
-    """Value of the knob that a person would begin with."""
+    """Value of the knob that a person would begin with; see `usual_knob`."""
     pure: bool = True
     """Whether harmonics of the force can be controlled."""
 
@@ -102,7 +104,7 @@ def _short(rig: str, pure: bool, known: Table, knob: float) -> Table:
         "levels_m": levels_of(rig, pure)[1],
         "ramp_periods": max(1.0, knob / 3.0),
         "record_periods": max(4, round(2.0 * knob / 3.0)),
-        "accepted_phase_error_deg": 45,
+        "accepted_phase_error_deg": 60,
     }
 
 
@@ -140,40 +142,42 @@ def _stepped(rig: str, pure: bool, known: Table, knob: float) -> Table:
 
 
 def _sweep(rig: str, pure: bool, known: Table, knob: float) -> Table:
-    """A sweep at every held response over 1 % more than the backbone's frequencies; ``knob``: periods per half bandwidth."""
-    law, plant = known["controller"], known["plant"]
-    shipped = _shipped(rig, "controlled-sweep-up")
-    held = dict(shipped["controller"]) if shipped else {
-        "detector": "adaptive",
-        "harmonics_followed": 5,
-        **{key: law[key] for key in ("low_pass_rad_s", "response_integral_per_s", "plant_pole_rad_s")},
-    }
-    for key in ("force_loop", "reference_integral_per_s"):
-        held.pop(key, None)
-    low, high = frequencies_of(rig)
+    """A sweep at every held force over 1 % more than the backbone's frequencies, in the direction in which these shift.
+
+    The knob is the number of periods in which the frequency moves by half a bandwidth of the linear mode.
+    """
+    law, plant, shipped = known["controller"], known["plant"], _shipped(rig, "controlled-sweep-up")
+    keys = ("low_pass_rad_s", "force_loop", "reference_integral_per_s", "response_integral_per_s", "plant_pole_rad_s")
+    tuned_law = {"detector": "adaptive", "harmonics_followed": 5} | {key: law[key] for key in keys}
+    linear, highest = frequencies_of(rig)
+    way = 1.0 if highest > linear else -1.0
     hertz = plant["frequency_rad_s"] / (2.0 * math.pi)
-    half_bandwidth = hertz * plant["damping_ratio"]
     return {
         "kind": "sweep",
-        "levels_m": levels_of(rig, pure)[1],
+        "levels_n": levels_of(rig, pure)[0],
         "start_v": known["start_v"],
         "start_periods": 10,
-        "start_hz": 0.99 * low,
-        "stop_hz": 1.01 * high,
-        "rate_hz_per_s": half_bandwidth * hertz / knob,
-        "controller": held,
+        "start_hz": (1.0 - 0.01 * way) * linear,
+        "stop_hz": (1.0 + 0.01 * way) * highest,
+        "rate_hz_per_s": plant["damping_ratio"] * hertz**2 / knob,
+        "controller": tuned_law if shipped is None else shipped["controller"],
     }
 
 
 @cache
 def frequencies_of(rig: str) -> tuple[float, float]:
-    """Return the lowest and the highest frequency of the backbone, Hz."""
-    import numpy as np
-
-    from benchmarks.methods.rigs import truth_at
-
+    """Return the frequency at the lowest and at the highest level of the backbone, Hz."""
     found = truth_at(rig, False, np.array(levels_of(rig, False)[1]))[0]
-    return float(found.min()), float(found.max())
+    return float(found[0]), float(found[-1])
+
+
+def usual_knob(method: str, rig: str) -> float:
+    """Return the knob that a person would begin with: that of the shipped plan where a rig has one."""
+    if method == "continuous" and rig not in ("magnet-beam", "magnet-beam-symmetric"):
+        return 300.0 if rig == "friction-beam" else 100.0
+    if method == "short" and rig not in ("magnet-beam", "magnet-beam-symmetric"):
+        return 30.0
+    return METHODS[method].usual
 
 
 METHODS: dict[str, Method] = {
@@ -183,5 +187,5 @@ METHODS: dict[str, Method] = {
     "continuous": Method("continuous", _continuous, "sweep_periods", 50),
     "response": Method("response-controlled, cut", _response, "record_periods", 20),
     "stepped-phase": Method("stepped phase at -90 deg", _stepped, "record_periods", 20),
-    "sweep": Method("controlled sweep", _sweep, "periods per half bandwidth", 20, pure=False),
+    "sweep": Method("controlled sweep", _sweep, "periods per half bandwidth", 60, pure=False),
 }

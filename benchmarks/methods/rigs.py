@@ -23,7 +23,7 @@ FORCES_N = {
     "friction-beam": (0.1, 16.6),
     "cubic-beam": (0.05, 1.0),
     "stop-beam": (0.05, 1.0),
-    "joint-beam": (0.5, 10.0),
+    "joint-beam": (0.25, 5.0),
 }
 """Range of the backbone: fundamental of the force at phase resonance, N. That of the shipped rigs is the paper's."""
 LEVELS = 13
