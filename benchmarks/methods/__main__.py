@@ -1,6 +1,6 @@
 """The race of methods: a backbone of 13 levels by each method, on six rigs, with noise and drift, against harmonic balance.
 
-    python -m benchmarks.methods run RUNS.jsonl [--seeds 3] [--rig NAME ...] [--condition NAME ...] [--method NAME ...]
+    python -m benchmarks.methods run RUNS.jsonl [--seeds 2] [--rig NAME ...] [--condition NAME ...] [--method NAME ...]
     python -m benchmarks.methods table RUNS.jsonl [--page docs/reference/race-of-methods.md]
     python -m benchmarks.methods figure RUNS.jsonl -o race.png
 
@@ -24,7 +24,7 @@ def main() -> None:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     running = commands.add_parser("run", help="run what is not in the file yet")
-    running.add_argument("--seeds", type=int, default=3)
+    running.add_argument("--seeds", type=int, default=2)
     running.add_argument("--rig", action="append", choices=RIGS)
     running.add_argument("--condition", action="append", choices=tuple(CONDITIONS))
     running.add_argument("--method", action="append", choices=tuple(METHODS))

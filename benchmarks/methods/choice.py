@@ -9,7 +9,7 @@ __all__ = ["DAMPING_WITHIN", "FREQUENCY_WITHIN", "cheapest", "meets", "together"
 
 FREQUENCY_WITHIN, DAMPING_WITHIN = 2e-4, 0.02
 """Bounds of the errors of a backbone: of every level, relative."""
-FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)
 """Values of a knob that are tried, over the usual one."""
 
 Row = dict[str, Any]
@@ -28,7 +28,7 @@ def _largest(errors: Sequence[float]) -> float:
 
 
 def cheapest(usual: float, suffices: Callable[[float], bool], possible: Callable[[float], bool] = lambda _: True) -> float:
-    """Return the smallest knob that suffices, of those from a quarter to eight times the usual one; NaN if none does.
+    """Return the smallest knob that suffices, of those from half to eight times the usual one; NaN if none does.
 
     From the usual one the knob is halved while it suffices, or doubled until it does. ``possible`` says whether a value is
     worth a try; where it is not, none beyond it is.
