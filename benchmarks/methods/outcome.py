@@ -59,7 +59,7 @@ class Outcome:
     """Whether the stated 95 % interval holds the truth; empty if the method states none."""
     damping_covered: list[bool]
     reason: str = ""
-    """Why the first of the refused points was refused, or how the run ended."""
+    """How the run ended early, or why the first of the refused points was refused."""
     failed: str = ""
     """Why there is no backbone; empty if there is one."""
 
@@ -102,8 +102,8 @@ def carried_out(name: str, method: str, pure: bool, condition: str, knob: float,
         asked = len(plan.targets())
         points = points_of(run.recording)
         accepted = sum(point.accepted for point in points)
-        end = run.recording.parts[-1].end or {}
-        reason = next((point.reason for point in points if not point.accepted), "" if run.complete else end.get("text", ""))
+        end = "" if run.complete else str((run.recording.parts[-1].end or {}).get("text", ""))
+        reason = end or next((point.reason for point in points if not point.accepted), "")
         counts = nothing | effort | {"asked_points": asked, "refused": asked - accepted, "reason": reason[:300]}
         try:
             found = measured(run)
