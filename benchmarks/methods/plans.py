@@ -173,11 +173,11 @@ def frequencies_of(rig: str) -> tuple[float, float]:
 
 def usual_knob(method: str, rig: str) -> float:
     """Return the knob that a person would begin with: that of the shipped plan where a rig has one."""
-    if method == "continuous" and rig not in ("magnet-beam", "magnet-beam-symmetric"):
-        return 300.0 if rig == "friction-beam" else 100.0
-    if method == "short" and rig not in ("magnet-beam", "magnet-beam-symmetric"):
-        return 30.0
-    return METHODS[method].usual
+    quick = rig in ("magnet-beam", "magnet-beam-symmetric")
+    if method == "continuous":
+        shipped = _shipped(rig, "continuous-backbone")
+        return float(shipped["sweep_periods"]) if shipped else METHODS[method].usual * (1.0 if quick else 2.0)
+    return METHODS[method].usual * (2.0 if method == "short" and not quick else 1.0)
 
 
 METHODS: dict[str, Method] = {

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from benchmarks.methods.choice import cheapest, meets, together
+from benchmarks.methods.choice import meets, together
 from benchmarks.methods.plans import METHODS, usual_knob
 from benchmarks.methods.race import Cell, Runs, cells
 from benchmarks.methods.rigs import CONDITIONS, RIGS
@@ -17,15 +17,11 @@ BEGIN, END = "<!-- race: begin -->", "<!-- race: end -->"
 
 
 def needed(runs: Runs, cell: Cell) -> tuple[float, Row] | None:
-    """Return the cheapest knob that meets the bounds in all its runs, and these together; None if none is known."""
-    rig, method, _, _ = cell
-
-    def suffices(knob: float) -> bool:
-        known = runs.of(cell, knob)
-        return bool(known) and all(meets(row) for row in known)
-
-    knob = cheapest(usual_knob(method, rig), suffices)
-    return None if math.isnan(knob) else (knob, together(runs.of(cell, knob)))
+    """Return the knob with the fewest periods of those whose runs all meet the bounds, and these together; None if there is none."""
+    knobs = {row["knob"] for row in runs.rows if meets(row) and runs.cell_of(row) == cell}
+    known = [(knob, runs.of(cell, knob)) for knob in sorted(knobs)]
+    found = [(knob, together(rows)) for knob, rows in known if all(meets(row) for row in rows)]
+    return min(found, key=lambda one: float(one[1]["periods"]), default=None)
 
 
 def tables(runs: Runs) -> str:
