@@ -27,7 +27,9 @@ def _largest(errors: Sequence[float]) -> float:
     return max((abs(error) if math.isfinite(error) else math.inf for error in errors), default=math.inf)
 
 
-def cheapest(usual: float, suffices: Callable[[float], bool], possible: Callable[[float], bool] = lambda _: True) -> float:
+def cheapest(
+    usual: float, suffices: Callable[[float], bool], possible: Callable[[float], bool] = lambda _: True
+) -> float:
     """Return the smallest knob that suffices, of those from half to eight times the usual one; NaN if none does.
 
     From the usual one the knob is halved while it suffices, or doubled until it does. ``possible`` says whether a value is

@@ -86,7 +86,14 @@ def covered(errors: Real, stds: Real) -> list[bool]:
 
 def carried_out(name: str, method: str, pure: bool, condition: str, knob: float, seed: int) -> Outcome:
     """Run a method once, and compare what it found with the truth."""
-    fixed: dict[str, Any] = {"rig": name, "method": method, "pure": pure, "condition": condition, "knob": knob, "seed": seed}
+    fixed: dict[str, Any] = {
+        "rig": name,
+        "method": method,
+        "pure": pure,
+        "condition": condition,
+        "knob": knob,
+        "seed": seed,
+    }
     nothing: dict[str, Any] = {
         "levels": len(levels_of(name, pure)[0]),
         **{"asked_points": 0, "refused": 0, "seconds": UNKNOWN, "periods": UNKNOWN},

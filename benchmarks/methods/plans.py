@@ -84,7 +84,12 @@ def _paper(rig: str, pure: bool, known: Table, knob: float) -> Table:
         controller |= {"centre_frequency_hz": known["controller"]["centre_frequency_hz"], "frequency_window_hz": window}
     if pure:
         controller |= {"harmonics": known["controller"]["harmonics"], "period_mean": True}
-    table = {"kind": "backbone", "levels_v": levels_of(rig, pure)[2], "record_periods": round(knob), "controller": controller}
+    table = {
+        "kind": "backbone",
+        "levels_v": levels_of(rig, pure)[2],
+        "record_periods": round(knob),
+        "controller": controller,
+    }
     settle = (plan or {}).get("settle") if rig in SHIPPED else None
     return table if settle is None else table | {"settle": settle}
 

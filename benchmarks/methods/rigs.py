@@ -162,5 +162,7 @@ def levels_of(rig: str, pure: bool) -> tuple[tuple[float, ...], tuple[float, ...
     low, high = FORCES_N[rig]
     forces = np.geomspace(low, high, LEVELS)
     found = phase_resonance_backbone(_virtual(rig), forces_n=forces, force_harmonics=CONTROLLED if pure else None)
-    rounded = [tuple(float(f"{value:.5g}") for value in values) for values in (forces, found.amplitude_m, found.voltage_v)]
+    rounded = [
+        tuple(float(f"{value:.5g}") for value in values) for values in (forces, found.amplitude_m, found.voltage_v)
+    ]
     return rounded[0], rounded[1], rounded[2]

@@ -17,7 +17,7 @@ BEGIN, END = "<!-- race: begin -->", "<!-- race: end -->"
 
 
 def needed(runs: Runs, cell: Cell) -> tuple[float, Row] | None:
-    """Return the knob with the fewest periods of those whose runs all meet the bounds, and these together; None if there is none."""
+    """Return the knob with the fewest periods whose runs all meet the bounds, and these together; None if there is none."""
     knobs = {row["knob"] for row in runs.rows if meets(row) and runs.cell_of(row) == cell}
     known = [(knob, runs.of(cell, knob)) for knob in sorted(knobs)]
     found = [(knob, together(rows)) for knob, rows in known if all(meets(row) for row in rows)]

@@ -198,9 +198,7 @@ def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float,
     """Return widths and fits at every level of one ramp, over the bandwidth or a width with enough instants."""
     size = np.log(flow.amplitude_m)
     widths = np.array([_wide_enough(size, level, bandwidth) for level in np.log(levels)])
-    return widths, [
-        _fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)
-    ]
+    return widths, [_fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)]
 
 
 def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:

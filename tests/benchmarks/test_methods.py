@@ -50,7 +50,9 @@ def test_bounds_are_met_by_whole_backbones_only():
     assert not meets(row(failed="TuningError: no mode"))
 
 
-@pytest.mark.parametrize(("least", "found"), [(10.0, 50.0), (50.0, 50.0), (100.0, 100.0), (101.0, 200.0), (800.0, 800.0)])
+@pytest.mark.parametrize(
+    ("least", "found"), [(10.0, 50.0), (50.0, 50.0), (100.0, 100.0), (101.0, 200.0), (800.0, 800.0)]
+)
 def test_the_cheapest_knob_is_the_smallest_that_suffices(least, found):
     assert cheapest(100.0, lambda knob: knob >= least) == found
 
@@ -95,15 +97,18 @@ def test_tables_show_the_cheapest_known_knob_and_go_into_a_page(tmp_path):
     runs.rows += [row(), row(knob=25.0, periods=150.0), row(seed=1)]
     cell = ("magnet-beam", "exact", False, "1 x noise")
     found = needed(runs, cell)
-    assert found is not None and (found[0], found[1]["periods"]) == (25.0, 150.0)
+    assert found is not None
+    assert (found[0], found[1]["periods"]) == (25.0, 150.0)
     runs.rows.append(row(knob=25.0, seed=1, damping=(0.5,)))
     found = needed(runs, cell)
-    assert found is not None and found[0] == 50
+    assert found is not None
+    assert found[0] == 50
     page = tmp_path / "page.md"
     page.write_text(f"# Page\n\n{BEGIN}\nold\n{END}\n\nafter\n", encoding="utf-8")
     put(page, tables(runs))
     text = page.read_text(encoding="utf-8")
-    assert "old" not in text and text.endswith("after\n")
+    assert "old" not in text
+    assert text.endswith("after\n")
     assert re.search(r"settled, exact laws \| exciter's \| 1 x noise \| 13 \| 0 \| 10\.0 \| 250 ", text)
 
 
