@@ -109,8 +109,9 @@ def carried_out(name: str, method: str, pure: bool, condition: str, knob: float,
         asked = len(plan.targets())
         points = points_of(run.recording)
         accepted = sum(point.accepted for point in points)
-        end = "" if run.complete else str((run.recording.parts[-1].end or {}).get("text", ""))
-        reason = end or next((point.reason for point in points if not point.accepted), "")
+        end = run.recording.parts[-1].end or {"reason": "none", "text": "the recording was cut short"}
+        early = "" if end["reason"] == "completed" else str(end["text"])
+        reason = early or next((point.reason for point in points if not point.accepted), "")
         counts = nothing | effort | {"asked_points": asked, "refused": asked - accepted, "reason": reason[:300]}
         try:
             found = measured(run)
