@@ -72,8 +72,9 @@ def race(runs: Runs, seeds: int, wanted: Iterator[Cell]) -> None:
         first = [runs.run(cell, usual, seed) for seed in some]
         if any(row["asked_points"] == 0 for row in first):
             continue  # the plan was refused
-        if condition == "drift":  # more time does not help
-            all(meets(runs.run(cell, 0.5 * usual, seed)) for seed in some)
+        if condition == "drift":  # much more time does not help
+            for factor in (0.5, 2.0):
+                all(meets(runs.run(cell, factor * usual, seed)) for seed in some)
             continue
         longest = max(row["periods"] for row in first)
         cheapest(
