@@ -26,7 +26,7 @@ def needed(runs: Runs, cell: Cell) -> tuple[float, Row] | None:
 
 def tables(runs: Runs) -> str:
     """Return all tables."""
-    parts = ["## Periods needed for 0.02 % and 2 %\n", _overview(runs)]
+    parts = [f"## Periods needed for 0.02 % and 2 %\n\nEntries: {' / '.join(CONDITIONS)}.\n", _overview(runs)]
     parts += [f"## {rig}\n\n{_all_numbers(runs, rig)}" for rig in RIGS]
     return "\n".join(parts)
 
