@@ -17,6 +17,7 @@ from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
 from identification.nonlinear.phase_resonance import nonlinear_mode
 from identification.slow_flows.fits import LocalFit, noise_variances
 from identification.slow_flows.resonance import Amplitudes, amplitudes_at, fit_at, resonant_vibration
+from identification.slow_flows.signals import WINDOW_VARIANCE
 from identification.slow_flows.slow_flow import SlowFlow
 from identification.validation import finite_array
 from vibrolock.results import Result
@@ -32,6 +33,7 @@ _MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees o
 _FEWEST_INSTANTS = 8
 _NEIGHBOURS = 2
 _WIDEN = 1.25
+_SLOPE_WIDTH = 0.25  # in the logarithm of the amplitude; derivatives of the stiffness need more instants than itself
 _WIDEST = 1.0  # in the logarithm of the amplitude
 
 
@@ -196,9 +198,7 @@ def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float,
     """Return widths and fits at every level of one ramp, over the bandwidth or a width with enough instants."""
     size = np.log(flow.amplitude_m)
     widths = np.array([_wide_enough(size, level, bandwidth) for level in np.log(levels)])
-    return widths, [
-        fit_at(*_around(flow, at, width), _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)
-    ]
+    return widths, [_fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)]
 
 
 def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
@@ -255,7 +255,7 @@ def _along(
             if width > _WIDEST:
                 break
             degree = _NOISY_DEGREE
-            fits[n] = fit_at(*_around(flow, level, width), degree)
+            fits[n] = _fit_around(flow, level, width, degree)
         part, place, weight = _around(flow, level, min(width, _WIDEST))
         found.append(amplitudes_at(part, place, weight, degree))
         periods.append(place.size * step)
@@ -271,6 +271,28 @@ def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:
     expected = float(fit.expected[0] @ sensors)
     more = max(1.0, float(fit.moments[0]) / expected) if expected > 0.0 else 1.0
     return np.asarray(by_sensors * np.sqrt(more))
+
+
+def _fit_around(flow: SlowFlow, level: float, width: float, degree: int) -> LocalFit:
+    """Fit stiffness and damping at ``ln X = level``, without the bias of the window in which the level moves.
+
+    Within the demodulation's window, of variance s^2, the stiffness changes with the level l at its rate r. To second order
+    the window gives
+
+        g(X) = k + s^2 [(k_l + k_ll) r^2 + k_l d^2] / 2 + i s^2 k_l r d
+
+    at the amplitude X that it gives, with d the rate of the vibration's phase against that of the oscillator.
+    """
+    wide = max(width, _SLOPE_WIDTH)
+    slopes = fit_at(*_around(flow, level, wide), degree).slopes
+    slope = float(slopes[0]) / wide
+    bend = slope + (2.0 * float(slopes[1]) / wide**2 if degree > 1 else 0.0)
+    part, place, weight = _around(flow, level, width)
+    turning = 2.0 * np.pi * np.gradient(part.phase_periods, part.time_s)
+    growth, detuning = part.growth_1_s, part.rate_1_s.imag - turning
+    variance = WINDOW_VARIANCE * (2.0 * np.pi / turning) ** 2
+    bias = variance * (0.5 * ((slope + bend) * growth**2 + slope * detuning**2) + 1j * slope * growth * detuning)
+    return fit_at(replace(part, dynamic_stiffness=part.dynamic_stiffness - bias), place, weight, degree)
 
 
 def _around(flow: SlowFlow, level: float, width: float) -> tuple[SlowFlow, Float, Float]:

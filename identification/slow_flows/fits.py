@@ -30,6 +30,7 @@ class LocalFit:
 
     ``spread`` float[2, 2] is the variance of k and c per unit variance of each part of the noise. ``moments`` float[2] are
     moments of the residuals, and ``expected`` float[2, 2] are the contributions of each part of the noise to them.
+    ``slopes`` float[degree] are the coefficients of the first and higher powers of the place in k.
     """
 
     stiffness: float
@@ -37,6 +38,7 @@ class LocalFit:
     spread: Float
     moments: Float
     expected: Float
+    slopes: Float
 
     def standard_errors(self, variances: Float) -> tuple[float, float]:
         """Return the standard errors of k and c for these variances of both parts of the noise."""
@@ -83,6 +85,7 @@ def local_fit(
         spread=np.maximum(np.column_stack([np.sum(wanted @ noise * wanted, axis=1) for noise in correlations]), 0.0),
         moments=np.array([residual @ residual, residual @ correlations[0] @ residual]),
         expected=np.array([[np.trace(part) for part in left], [np.sum(correlations[0] * part) for part in left]]),
+        slopes=solution[1 : degree + 1],
     )
 
 

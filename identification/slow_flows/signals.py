@@ -18,6 +18,8 @@ Float = NDArray[np.float64]
 
 WINDOW_PERIODS = 3.0
 """Length of the Blackman window: its zeros lie at all other multiples of the fundamental frequency, including zero."""
+WINDOW_VARIANCE = 0.25 * WINDOW_PERIODS**2 * (0.28 - 1.92 / np.pi**2) / 0.84
+"""Variance of the Blackman window as a distribution, periods^2."""
 
 _STOP, _PASS = 0.25, 0.6  # edges of the high-pass over the fundamental frequency
 _END_FIT_PERIODS = 3.0

@@ -239,7 +239,7 @@ def test_short_points_are_measured_again_after_the_last_level_for_their_ramp_bel
 
 def test_a_continuous_backbone_goes_up_and_down_again_over_the_levels_that_are_missing():
     plan = load_plan("magnet-beam/continuous-backbone")
-    points, parts, complete = again_at_the_end(plan, late_bench({"held_per_s": 0.3, "held_s": 0.014}))
+    points, parts, complete = again_at_the_end(plan, late_bench({"held_per_s": 0.25, "held_s": 0.014}))
     assert complete
     assert len(parts) == 2
     accepted_at_once = {table["number"] for table in parts[0].points if table["accepted"]}

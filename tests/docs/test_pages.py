@@ -64,6 +64,7 @@ NOT_RUN = {
     ("docs/how-to/reproduce-the-paper.md", "takes a quarter of an hour"),
     ("docs/reference/wire-protocol-can.md", "needs a CAN interface"),
     ("docs/reference/benchmarks.md", "takes minutes"),
+    ("docs/reference/race-of-methods.md", "takes an hour"),
     ("docs/reference/firmware-sizes.md", "takes minutes and needs a compiler for ARM and QEMU"),
 }
 

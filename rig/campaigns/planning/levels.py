@@ -17,6 +17,7 @@ from rig.tick.sequencer.segments import Excitation, Segment
 __all__ = ["LEVELS", "ONE_LEVEL_KEY", "Levels", "exactly_one"]
 
 START_RAMP_PERIODS = 10.0
+"""Slow enough that an exciter of another gain than the known plant's is noticed at a small force."""
 
 LEVELS = {
     "levels_v": (AmplitudeLaw.VOLTAGE, "V"),

@@ -46,28 +46,34 @@ def recorded(tmp_path_factory, truth):
     return path
 
 
-def test_it_takes_no_more_than_150_periods_and_keeps_to_harmonic_balance(recorded, truth):
+def periods_until_0_v(part):
+    """Periods from the first driven sample to the last."""
+    driven = np.flatnonzero(part.rows("output_v"))
+    theta = part.rows("theta_rad")[driven[0] : driven[-1] + 1].astype(float)
+    return np.sum(np.mod(np.diff(theta), 2 * np.pi)) / (2 * np.pi)
+
+
+def test_it_takes_100_periods_to_0_v_and_keeps_to_harmonic_balance(recorded, truth):
     summary = summarise(recorded)
     points = summary["points"][1:-1]
     assert all(point["accepted"] for point in summary["points"])
-    waiting = PLAN.start_periods + 10 + PLAN.ramp_periods + PLAN.lock_periods + PLAN.end_periods
-    assert waiting + 2 * PLAN.sweep_periods <= 150
-    np.testing.assert_allclose([point["modal_frequency_hz"] for point in points], truth[1], rtol=5e-4)
-    np.testing.assert_allclose([point["damping_ratio"] for point in points], truth[2], rtol=0.03)
+    with rig.Recording(recorded) as recording:
+        assert periods_until_0_v(recording.parts[0]) <= 100.5
+    np.testing.assert_allclose([point["modal_frequency_hz"] for point in points], truth[1], rtol=1e-4)
+    np.testing.assert_allclose([point["damping_ratio"] for point in points], truth[2], rtol=0.02)
     np.testing.assert_allclose([point["amplitude_m"] for point in points], truth[0], rtol=1e-9)
 
 
-def test_the_friction_beam_keeps_to_harmonic_balance_within_750_periods():
+def test_the_friction_beam_keeps_to_harmonic_balance_in_700_periods_to_0_v():
     plan = load_plan("friction-beam/continuous-backbone")
     found = phase_resonance_backbone(VirtualRig.shipped("friction-beam"), forces_n=(0.46, 2.15, 6.8))
-    waiting = plan.start_periods + 10 + plan.ramp_periods + plan.lock_periods + plan.end_periods
-    assert waiting + 2 * plan.sweep_periods <= 750
     levels = [1.078e-5, *found.amplitude_m.tolist(), 2.424e-4]
     with rig.run(plan_with(plan, levels_m=levels), seed=1) as run:
+        assert periods_until_0_v(run.recording.parts[0]) <= 702.0
         points = list(run.recording.latest.values())[1:-1]
         (ways,) = continuous_backbones(run.recording)
-    np.testing.assert_allclose([p["modal_frequency_hz"] for p in points], found.modal_frequency_hz, rtol=5e-4)
-    np.testing.assert_allclose([p["damping_ratio"] for p in points], found.damping_ratio, rtol=0.03)
+    np.testing.assert_allclose([p["modal_frequency_hz"] for p in points], found.modal_frequency_hz, rtol=1e-4)
+    np.testing.assert_allclose([p["damping_ratio"] for p in points], found.damping_ratio, rtol=0.02)
     # The joint's memory: on the way up less is dissipated than on the way down, and the mean of both lies between.
     assert ways.damping_ratio[0, 3] < found.damping_ratio[2] < ways.damping_ratio[1, 3]
 
@@ -126,7 +132,7 @@ def test_a_trip_on_the_way_up_keeps_what_was_found_there_and_says_so():
 
 class _Stop(Silent):
     def advance(self, rows, tick):
-        if tick.sample > 4.6 * 5000.0:
+        if tick.sample > 2.6 * 5000.0:
             tick.request_stop()
 
 
@@ -218,7 +224,7 @@ def test_levels_are_metres():
 
 
 def test_a_level_whose_margin_leads_beyond_the_limit_is_refused():
-    with pytest.raises(ConfigurationError, match=r"margin = 0\.05: .* 0\.003885 m; .* allows up to 0\.00377 m"):
+    with pytest.raises(ConfigurationError, match=r"margin = 0\.1: .* 0\.00407 m; .* allows up to 0\.00377 m"):
         plan_with(levels_m=[1e-4, 3.7e-3]).check(bench_with())
 
 

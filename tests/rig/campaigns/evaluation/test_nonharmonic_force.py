@@ -76,7 +76,7 @@ def test_every_campaign_under_a_lock_shows_purity_last(kind):
     [
         ("backbone", {"levels_v": (0.2,)}),
         ("backbone-short", {"levels_m": (1e-4,)}),
-        ("continuous-backbone", {"levels_m": (1e-4, 3e-4), "sweep_periods": 40.0}),
+        ("continuous-backbone", {"levels_m": (1e-4, 3e-4), "lock_periods": 20.0, "sweep_periods": 40.0}),
         ("stepped-phase-fast", {"levels_n": (0.25,), "start_deg": None, "stop_deg": None, "phase_lags_deg": (-90.0,)}),
         ("response-controlled", {"levels_m": (5e-4,), "phase_lags_deg": (-90.0,)}),
     ],
