@@ -80,6 +80,7 @@ HARMONICS = np.dtype(
         ("probe", "f8"),
         ("tolerance", "f8"),
         ("smallest", "f8"),
+        ("high_pass_rad_s", "f8"),
         ("largest_v", "f8"),
         ("step_v", "f8"),
         ("dt_s", "f8"),
@@ -91,8 +92,8 @@ HARMONICS = np.dtype(
 """Parameters of the harmonics loop (one record). ``highest``: H, or 0 without the loop. ``of_drive``: the controlled channel
 is the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of |V_h| over the
 fundamental. ``probe``: |V_h| of the step over it. ``tolerance``: of the channel's fundamental. ``smallest``: error (N) that
-always counts as none. ``largest_v``: bound of the whole output. ``step_v``: bound of a harmonic's change from one sample to the
-next. ``wanted``: ratios to the fundamental, where the plan names none. ``plant``: P_h where it is known, else 0.
+always counts as none. ``largest_v``: bound of the whole output. ``step_v``: bound of a harmonic's change from one sample to
+the next. ``wanted``: ratios to the fundamental, where the plan names none. ``plant``: P_h where it is known, else 0.
 ``left_alone``: harmonics that are not controlled."""
 
 HARMONICS_STATE = np.dtype(
@@ -292,7 +293,8 @@ def measure_harmonics(parameters: Record, state: Record, value: float, phasor: c
     gain = parameters.corner * omega * parameters.dt_s
     turn_phasors(state.phasors, highest, phasor.real, phasor.imag)
     adapt(state.filter, state.phasors, highest, value, gain)
-    fundamental = state.filter[1]
+    late = parameters.high_pass_rad_s / omega
+    fundamental = state.filter[1] * complex(1.0, -late)
     amplitude = size(fundamental)
     turn = fundamental / amplitude if amplitude > 0.0 else complex(1.0, 0.0)
     turned = turn * amplitude
@@ -300,7 +302,7 @@ def measure_harmonics(parameters: Record, state: Record, value: float, phasor: c
         error = state.filter[order]
         if state.prescribed == 1:
             turned *= turn
-            error -= state.wanted[order] * turned
+            error = error * complex(1.0, -late / order) - state.wanted[order] * turned
         state.error[order] = error
         state.total[order] += error
     state.samples += 1
