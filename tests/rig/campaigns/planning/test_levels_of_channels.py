@@ -26,7 +26,7 @@ def tone(kind, band_hz, level_m):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_level_that_takes_a_channel_beyond_its_limit_by_the_mode_shapes_is_refused_without_a_plant(kind):
     bench = load_bench("magnet-beam")
-    plan_of(kind, levels_m=[1e-3, 3.5e-3]).check(bench)
+    plan_of(kind, levels_m=[1e-3, 3.3e-3]).check(bench)
     with pytest.raises(
         ConfigurationError,
         match=r"levels_m\[1\] = 0\.004 m: means 0\.00636 m at channel 'acc_magnet', which moves 1\.59 times as far .* "
