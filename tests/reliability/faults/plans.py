@@ -1,4 +1,4 @@
-"""Short plans of every kind of level; three levels each, which without a fault are all accepted."""
+"""Short plans of every kind of level; three levels or four, which without a fault are all accepted."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ def _loops(plan: str, **changes: Any) -> dict[str, Any]:
 
 def _quick(specimen: str, low_pass_rad_s: float, **changes: Any) -> dict[str, Any]:
     """The paper's gains behind an adaptive filter, which follows within a few periods."""
-    filtered = {"detector": "adaptive", "low_pass_rad_s": low_pass_rad_s, "harmonics_followed": 5}
+    filtered = {"detector": "adaptive", "low_pass_rad_s": low_pass_rad_s, "harmonics_followed": 5, "period_mean": False}
     return _loops(f"{specimen}/backbone", **filtered, **changes)
 
 
@@ -52,7 +52,7 @@ LEVELS: dict[str, dict[str, Any]] = {
     "V, friction": {"bench": "friction-beam", "levels_v": [0.3, 0.35, 0.4], "controller": _quick(*FRICTION)},
     "N, friction": {
         "bench": "friction-beam",
-        "levels_n": [1.0, 1.05, 1.1],
+        "levels_n": [1.0, 1.05, 1.1, 1.15],  # long enough for a sensor to be stuck for half a second
         "start_v": 0.28,
         "controller": _quick(*FRICTION, force_loop="logarithmic", force_integral_per_s=5.0),
     },
