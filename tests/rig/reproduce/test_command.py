@@ -145,7 +145,7 @@ def test_other_kinds_of_models_have_a_folder_beside(folder, option, kind):
         assert [channel.name for channel in (*model.inputs, *model.outputs)][:2] == ["voltage", "force"]
         assert len(model.output_features.exponents) == 0
         assert own["mean"] < 0.03
-    elif kind == "force-backbone":
+    elif kind == "force-backbone-fine":
         assert any("backbone" in name for name in model.training)
         (lines,) = (folder / "force" / "models").glob("*01.h5")
         assert model.state_range.max() > 3.0 * load(lines).model.state_range.max()
