@@ -115,6 +115,7 @@ HARMONICS_STATE = np.dtype(
         ("wanted", "c16", ORDERS),
         ("phasors", "c16", ORDERS),
         ("filter", "c16", ORDERS),
+        ("aim", "c16", ORDERS),
         ("volts", "c16", ORDERS),
         ("error", "c16", ORDERS),
         ("judged", "c16", ORDERS),
@@ -133,10 +134,10 @@ again. ``miss``: largest judged error over its tolerance; infinite before the lo
 in a row. ``bounded``: the bound of the voltage holds harmonics back. ``amplitude_v``: the output's fundamental. ``share``:
 what is left of the harmonics while a run comes down. ``probe``: sizes of the step, relative to ``probe_v``. ``off``:
 harmonics that are left alone. ``wanted``: ratios to the fundamental where some are ``prescribed``. ``filter``: F_h.
-``volts``: V_h. ``error``: F_h - G_h. ``total``, ``samples``, ``mean``: its sum over the present period, and its mean over
-the last one. ``judged``, ``square``: slow means of the mean and of its square. ``sum``, ``before``: averages while the
-plant is measured. ``plant``: P_h. ``scatter_square``: mean square of the mean's change from period to period;
-``quiet_square``: its smallest of late."""
+``volts``: V_h, which follows ``aim`` no faster than the slew limit. ``error``: F_h - G_h. ``total``, ``samples``, ``mean``:
+its sum over the present period, and its mean over the last one. ``judged``, ``square``: slow means of the mean and of its
+square. ``sum``, ``before``: averages while the plant is measured. ``plant``: P_h. ``scatter_square``: mean square of the
+mean's change from period to period; ``quiet_square``: its smallest of late."""
 
 
 class HarmonicsSettings(Settings):
@@ -327,20 +328,24 @@ def drive_harmonics(
     gain = parameters.integral * omega * parameters.dt_s
     most = parameters.largest * amplitude_v
     for order in range(2, highest + 1):
-        volts = state.volts[order]
+        aim, volts = state.aim[order], state.volts[order]
         if acts and state.off[order] == 0 and state.stage == CONTROLLING:
             error = state.error[order]
             if size(error) > LEFT_ALONE * parameters.smallest:
                 step = -gain * error / state.plant[order]
-                volts += step * min(1.0, parameters.step_v / max(size(step), parameters.step_v))
+                aim += step * min(1.0, parameters.step_v / max(size(step), parameters.step_v))
+        aim *= most / max(size(aim), most) if most > 0.0 else 0.0
+        way = aim - volts
+        volts += way * min(1.0, parameters.step_v / max(size(way), parameters.step_v))
         volts *= most / max(size(volts), most) if most > 0.0 else 0.0
-        state.volts[order] = volts
+        state.aim[order], state.volts[order] = aim, volts
         total += size(volts)
     state.bounded = 1 if amplitude_v + total > FULL * parameters.largest_v else 0
     if amplitude_v + total > parameters.largest_v and total > 0.0:
         left = max(parameters.largest_v - amplitude_v, 0.0) / total
         for order in range(2, highest + 1):
             state.volts[order] *= left
+            state.aim[order] = state.volts[order]
 
 
 @inner_kernel
@@ -393,12 +398,12 @@ def end_harmonics_period(
     if not steady and (state.stage == WAITING or not (locked and free) or state.unsteady > MOST_UNSTEADY):
         if state.stage == PROBING:
             for order in range(2, parameters.highest + 1):
-                state.volts[order] -= probe_of(parameters, state, order)
+                state.aim[order] -= probe_of(parameters, state, order)
         state.stage = WAITING
         return
     if state.stage == WAITING:
         for order in range(2, parameters.highest + 1):
-            state.probe[order] = parameters.probe
+            state.probe[order] = 0.0 if parameters.left_alone[order] == 1 else parameters.probe
         first = state.probe_v == 0.0 and state.probes == 0  # else the loops have only now come to rest
         listen(parameters, state, WAIT_PERIODS if first else 0)
         return
@@ -412,7 +417,7 @@ def end_harmonics_period(
         state.stage, state.periods, state.probe_v = PROBING, 0, amplitude_v
         for order in range(2, parameters.highest + 1):
             state.before[order] = state.sum[order]
-            state.volts[order] += probe_of(parameters, state, order)
+            state.aim[order] += probe_of(parameters, state, order)
             state.sum[order] = 0.0
     else:
         learn_plant(parameters, state)
@@ -447,13 +452,13 @@ def learn_plant(parameters: Record, state: Record) -> None:
     """
     if state.bounded == 1:  # the step was held back: nothing is learned from it
         for order in range(2, parameters.highest + 1):
-            state.volts[order] = 0.0
+            state.aim[order] = 0.0
         state.stage = WAITING
         return
     again = False
     for order in range(2, parameters.highest + 1):
         change, step = state.sum[order] - state.before[order], probe_of(parameters, state, order)
-        state.volts[order] -= step
+        state.aim[order] -= step
         clear = size(change) > CLEAR * math.sqrt(state.scatter_square[order])
         state.off[order] = 0 if clear else 1
         if parameters.left_alone[order] == 1:
@@ -470,7 +475,7 @@ def learn_plant(parameters: Record, state: Record) -> None:
         return
     for order in range(2, parameters.highest + 1):
         if state.off[order] == 1:
-            state.volts[order] = 0.0
+            state.aim[order] = 0.0
     begin_to_control(parameters, state)
 
 
@@ -537,4 +542,4 @@ def judge_harmonics(parameters: Record, state: Record, amplitude_v: float, stead
             state.probes += 1
             for order in range(2, parameters.highest + 1):
                 if state.bounded == 1:  # there is no room for a step
-                    state.volts[order] = 0.0
+                    state.aim[order] = 0.0

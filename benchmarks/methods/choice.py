@@ -27,13 +27,10 @@ def _largest(errors: Sequence[float]) -> float:
     return max((abs(error) if math.isfinite(error) else math.inf for error in errors), default=math.inf)
 
 
-def cheapest(
-    usual: float, suffices: Callable[[float], bool], possible: Callable[[float], bool] = lambda _: True
-) -> float:
+def cheapest(usual: float, suffices: Callable[[float], bool], largest: float = math.inf) -> float:
     """Return the smallest knob that suffices, of those from half to eight times the usual one; NaN if none does.
 
-    From the usual one the knob is halved while it suffices, or doubled until it does. ``possible`` says whether a value is
-    worth a try; where it is not, none beyond it is.
+    From the usual one the knob is halved while it suffices, or doubled until it does, up to ``largest``.
     """
     found, middle = math.nan, FACTORS.index(1.0)
     if suffices(usual):
@@ -44,7 +41,7 @@ def cheapest(
             found = factor * usual
         return found
     for factor in FACTORS[middle + 1 :]:
-        if not possible(factor * usual):
+        if factor * usual > largest:
             break
         if suffices(factor * usual):
             return factor * usual

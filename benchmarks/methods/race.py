@@ -1,7 +1,8 @@
 """Run all methods on all rigs under all conditions, into a file of one line a run; what is in the file is not run again."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,11 @@ class Runs:
         return [row for row in self.rows if self._key(row)[:5] == (*cell, knob)]
 
 
+def _meets_with(runs: Runs, cell: Cell, seeds: Iterable[int], knob: float) -> bool:
+    """Return whether the runs of a cell with a knob meet the bounds with all seeds; the first that does not is the last."""
+    return all(meets(runs.run(cell, knob, seed)) for seed in seeds)
+
+
 def race(runs: Runs, seeds: int, wanted: Iterator[Cell]) -> None:
     """Run every cell with its usual knob and all seeds, then look for the cheapest knob that meets the bounds with all."""
     for cell in wanted:
@@ -77,8 +83,4 @@ def race(runs: Runs, seeds: int, wanted: Iterator[Cell]) -> None:
                 all(meets(runs.run(cell, factor * usual, seed)) for seed in some)
             continue
         longest = max(row["periods"] for row in first)
-        cheapest(
-            usual,
-            lambda knob, cell=cell, some=some: all(meets(runs.run(cell, knob, seed)) for seed in some),  # type: ignore[misc]
-            lambda knob, longest=longest, usual=usual: longest * knob / usual <= LONGEST_PERIODS,  # type: ignore[misc]
-        )
+        cheapest(usual, partial(_meets_with, runs, cell, some), LONGEST_PERIODS / longest * usual)

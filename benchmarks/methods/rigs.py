@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from rig.bench import Bench, load_bench
+from rig.drivers.virtual.driver import VirtualDAQ
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
 
@@ -120,10 +121,7 @@ def bench_of(rig: str, condition: str = "1 x noise") -> Bench:
 
 
 def _virtual(rig: str) -> VirtualRig:
-    from rig.drivers import make_daq
-
-    found: VirtualRig = make_daq(bench_of(rig)).rig  # type: ignore[attr-defined]
-    return found
+    return VirtualDAQ(bench_of(rig)).rig
 
 
 def truth_at(rig: str, pure: bool, amplitudes_m: Real) -> tuple[Real, Real]:

@@ -75,7 +75,7 @@ class Tick:
                 NEGLIGIBLE_BITS * controlled.resolution_v / abs(controlled.sensitivity_v_per_unit)
             )
             law_record["harmonics"]["high_pass_rad_s"] = 2.0 * math.pi * controlled.high_pass_hz
-            law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"]
+            law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"] / law.harmonics.highest
         loop = np.zeros(1, LOOP)
         loop["lead_whole"] = math.floor(lead_samples)
         loop["lead_fraction"] = lead_samples - math.floor(lead_samples)

@@ -453,13 +453,29 @@ def test_the_phase_margin_is_that_of_the_open_loop_where_its_gain_is_1(corner, i
     assert margin == pytest.approx(expected, abs=0.05)
 
 
+def test_the_step_too_keeps_the_bound_of_its_change_from_sample_to_sample():
+    plant = waiting(0.5, {1: 1.0, 2: 0.3j})
+    plant.parameters["step_v"] = 2e-5
+    plant.run(2 * (WAIT_PERIODS + MEAN_PERIODS))
+    changes = np.abs(np.diff(plant.volts[:, 2:8], axis=0))
+    assert plant.stage is HarmonicStage.CONTROLLING
+    assert 1.9e-5 < changes.max() <= 2e-5 * (1.0 + 1e-9)
+    np.testing.assert_allclose(plant.state["plant"][0, 2:8], 0.5, rtol=0.02)
+
+
+def test_a_harmonic_left_alone_by_the_plan_gets_no_step():
+    plant = waiting(0.5, {1: 1.0, 2: 0.3j}, left_alone=(3,)).run(100)
+    assert plant.stage is HarmonicStage.CONTROLLING
+    assert not plant.volts[:, 3].any()
+
+
 def test_the_step_counts_as_clear_by_the_scatter_from_period_to_period():
     # The change under the step beside the scatter, above and below the factor, without any chance.
     for factor, clear in ((1.3, True), (0.7, False)):
         plant = waiting(1.0, highest=2).run(1 + MEAN_PERIODS)
         assert plant.stage is HarmonicStage.PROBING
         plant.state["probe"][0, 2] = 0.036
-        plant.state["volts"][0, 2] *= 9.0
+        plant.state["aim"][0, 2] *= 9.0
         plant.state["scatter_square"][0, 2] = (0.036 / CLEAR / factor) ** 2
         plant.run(WAIT_PERIODS + MEAN_PERIODS)
         assert plant.stage is HarmonicStage.CONTROLLING
