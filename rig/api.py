@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
 from identification import (
     Backbone,
@@ -39,9 +41,9 @@ __all__ = ["Run", "resume", "run"]
 class Run(Result):
     """A new recording and its measurements. If no output file was given, the recording is deleted together with this object."""
 
-    def __init__(self, recording: Recording, folder: "TemporaryDirectory[str] | None" = None) -> None:
+    def __init__(self, recording: Recording, temporary: Path | None = None) -> None:
         self.recording = recording
-        self._folder = folder
+        self._delete = None if temporary is None else finalize(self, rmtree, temporary, ignore_errors=True)
 
     @property
     def complete(self) -> bool:
@@ -139,8 +141,8 @@ class Run(Result):
     def close(self) -> None:
         """Close the file. A temporary file is deleted."""
         self.recording.close()
-        if self._folder is not None:
-            self._folder.cleanup()
+        if self._delete is not None:
+            self._delete()
 
     def __enter__(self) -> "Run":
         return self
@@ -193,15 +195,14 @@ def run(
         bench = bench_of(plan, source)
     elif not isinstance(bench, Bench):
         bench = load_bench(bench)
-    folder = TemporaryDirectory(prefix="vibrolock-") if output is None else None
-    path = Path(output) if output is not None else Path(folder.name if folder else "") / "run.h5"
+    if output is not None:
+        return Run(carry_out(plan, bench, Path(output), options))
+    folder = Path(mkdtemp(prefix="vibrolock-"))
     try:
-        recording = carry_out(plan, bench, path, options)
+        return Run(carry_out(plan, bench, folder / "run.h5", options), folder)
     except BaseException:
-        if folder is not None:
-            folder.cleanup()
+        rmtree(folder, ignore_errors=True)
         raise
-    return Run(recording, folder)
 
 
 def resume(
