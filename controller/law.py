@@ -8,7 +8,8 @@ import numpy as np
 from controller.amplitude import AMPLITUDE, AMPLITUDE_STATE, AmplitudeLaw, AmplitudeSettings, amplitude_state
 from controller.detector import DETECTOR, DETECTOR_STATE, VIBRATION, DetectorSettings, phase_error
 from controller.frequency import FREQUENCY, FREQUENCY_STATE
-from controller.harmonics import HARMONICS, HARMONICS_STATE, HarmonicsSettings
+from controller.harmonics.records import HARMONICS, HARMONICS_STATE
+from controller.harmonics.settings import HarmonicsSettings
 from controller.lock import LOCK, THRESHOLDS, LockRule
 from controller.period import PERIOD
 from controller.rest import REST, REST_STATE, see_rest, take_as_measured

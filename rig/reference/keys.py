@@ -46,7 +46,7 @@ class Key:
 def tables() -> dict[str, type[BaseModel]]:
     """Return the model of every table by the name under which the reference has it."""
     from controller import LockRule, OpenLoop, PhaseLockedLoop
-    from controller.harmonics import HarmonicsSettings
+    from controller.harmonics.settings import HarmonicsSettings
     from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
     from rig.campaigns.dwell.plan import DriftLimits
     from rig.campaigns.kinds import KINDS

@@ -11,7 +11,7 @@ import numpy as np
 from controller.amplitude import FORCE_RMS, VOLTAGE, demand, held_size, see_output, take_over
 from controller.detector import ADAPTIVE, detect, force_rms
 from controller.frequency import follow
-from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
+from controller.harmonics.law import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
 from controller.law import measure_phase
 from controller.lock import LOST as LOST_LOCK
 from controller.period import add_sample

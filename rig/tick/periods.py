@@ -3,7 +3,7 @@
 import math
 
 from controller.amplitude import RESPONSE, VOLTAGE
-from controller.harmonics import end_harmonics_period, left_alone
+from controller.harmonics.periods import end_harmonics_period, left_alone
 from controller.lock import LOCKED, next_lock_state
 from controller.period import end_period
 from rig.tick.layout import TickArrays

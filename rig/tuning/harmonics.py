@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.adaptive_filter import MOST_HARMONICS
-from controller.harmonics import HarmonicsSettings
+from controller.harmonics.settings import HarmonicsSettings
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 from rig.errors import ConfigurationError

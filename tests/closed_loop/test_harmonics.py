@@ -10,7 +10,8 @@ import pytest
 
 import rig
 from controller import AmplitudeLaw
-from controller.harmonics import HarmonicStage, harmonic_ratios
+from controller.harmonics.records import HarmonicStage
+from controller.harmonics.settings import harmonic_ratios
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan

@@ -6,17 +6,10 @@ from typing import Any
 import numpy as np
 
 from controller.adaptive_filter import MOST_HARMONICS
-from controller.harmonics import (
-    HARMONICS_STATE,
-    HarmonicsSettings,
-    HarmonicStage,
-    drive_harmonics,
-    end_harmonics_period,
-    harmonic_ratios,
-    harmonics_at,
-    measure_harmonics,
-    want_harmonics,
-)
+from controller.harmonics.law import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
+from controller.harmonics.periods import end_harmonics_period
+from controller.harmonics.records import HARMONICS_STATE, HarmonicStage
+from controller.harmonics.settings import HarmonicsSettings, harmonic_ratios
 from vibrolock.compiled import kernel
 
 PER_PERIOD = 200

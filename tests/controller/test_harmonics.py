@@ -10,17 +10,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.linalg import expm
 
-from controller.harmonics import (
-    CLEAR,
-    LARGEST_PROBE,
-    MEAN_PERIODS,
-    MOST_UNSTEADY,
-    WAIT_PERIODS,
-    HarmonicsSettings,
-    HarmonicStage,
-    harmonic_ratios,
-    left_alone,
-)
+from controller.harmonics.periods import left_alone
+from controller.harmonics.plant import CLEAR, LARGEST_PROBE, MEAN_PERIODS, MOST_UNSTEADY, WAIT_PERIODS
+from controller.harmonics.records import HarmonicStage
+from controller.harmonics.settings import HarmonicsSettings, harmonic_ratios
 from tests.controller.linear_plant import LARGEST_V, PER_PERIOD, Plant
 
 ORDERS = np.arange(2, 8)

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from controller.harmonics import ORDERS
+from controller.harmonics.records import ORDERS
 
 __all__ = ["OUTCOME", "PROGRESS", "REFUSED", "RING", "SEGMENT", "Drive", "OnFailure", "Outcome", "SegmentKind"]
 
