@@ -5,7 +5,7 @@
 Every recording is replayed: the recorded output, through the same rig without sensors and with finer steps, gives the true
 force and the true motion of the drive point during every point. The truth of force and amplitude are the
 fundamentals of these. The truth of modal frequency and damping is the harmonic balance of the coupled rig at phase resonance
-and at this amplitude; with ``--at force`` at the measured force instead, whose own error then counts too.
+and at this amplitude; with ``--at force`` at the measured force instead, and of intervals that hold its error as well.
 
 The random part of an interval is compared with the scatter of the errors about their mean over the seeds: it shall cover 95 %.
 The whole interval shall cover the truth. ``--noise 10`` is ten times the noise of all sensors and ten times the steps of
@@ -42,7 +42,8 @@ from simulators.simulation import Simulation
 from simulators.virtual_rig import VirtualRig
 
 PLANS = ("magnet-beam/backbone", "magnet-beam-symmetric/backbone", "friction-beam/backbone")
-QUANTITIES = ("modal_frequency_hz", "damping_ratio", "force_n", "amplitude_m")
+MODAL = ("modal_frequency_hz", "damping_ratio")
+QUANTITIES = (*MODAL, "force_n", "amplitude_m")
 WANTED = 0.93
 HARMONICS, SAMPLES = 15, 1024
 FINER = 8
@@ -142,20 +143,24 @@ def true_vibrations(
     return out
 
 
-def run_once(plan: BackbonePlan, bench: Bench, exact: VirtualRig, seed: int) -> list[Measured]:
-    """Run a backbone, identify it, and return every accepted point with the true force and amplitude."""
+def run_once(plan: BackbonePlan, bench: Bench, exact: VirtualRig, seed: int, at: str) -> list[Measured]:
+    """Run a backbone, identify it, and return every accepted point with the true force and amplitude.
+
+    ``at``: amplitude, or force for intervals of modal frequency and damping at the measured force.
+    """
     with rig.run(plan, bench=bench, seed=seed) as done:
         points = [point for point in points_of(done.recording) if point.accepted]
         mode = nonlinear_mode(done.backbone())
         truths = true_vibrations(exact, done.recording, points, plan, seed)
+    intervals = {
+        name: mode.interval_at("force_n", name) if at == "force" and name in MODAL else mode.interval(name)
+        for name in QUANTITIES
+    }
     return [
         Measured(
             level=point.number,
             estimate={name: float(getattr(mode, name)[number]) for name in QUANTITIES},
-            ends={
-                name: (float(mode.interval(name)[number, 0]), float(mode.interval(name)[number, 1]))
-                for name in QUANTITIES
-            },
+            ends={name: (float(intervals[name][number, 0]), float(intervals[name][number, 1])) for name in QUANTITIES},
             random={name: float(mode.random(name)[number]) for name in QUANTITIES},
             truth=dict(zip(("force_n", "amplitude_m"), truth, strict=True)),
         )
@@ -177,7 +182,7 @@ def add_modal_truth(exact: VirtualRig, points: Sequence[Measured], at: str) -> N
             exact, **{key: np.exp(grid)}, near_hz=near_hz, harmonics=HARMONICS, samples=SAMPLES
         )
         for one, value in zip(some, where, strict=True):
-            for name in ("modal_frequency_hz", "damping_ratio"):
+            for name in MODAL:
                 one.truth[name] = float(np.interp(np.log(value), grid, getattr(found, name)))
 
 
@@ -230,7 +235,7 @@ def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude")
             raise ValueError(f"{name}: is a {plan.kind}, allowed is a backbone")
         bench = noisier(bench_of(plan, path), factor)
         exact = make_daq(bench).rig
-        points = [point for seed in seeds for point in run_once(plan, bench, exact, seed)]
+        points = [point for seed in seeds for point in run_once(plan, bench, exact, seed, at)]
     add_modal_truth(exact, points, at)
     planned = len(plan.targets()) * len(seeds)
     return {"planned": planned, **{quantity: summary(points, quantity) for quantity in QUANTITIES}}

@@ -182,6 +182,19 @@ class NonlinearMode(Result):
         normal = 1.96 * np.asarray(getattr(self, STANDARD_ERRORS[quantity]))
         return np.asarray(np.where(np.isfinite(farther), farther, normal))
 
+    def interval_at(self, axis: str, quantity: str) -> Float:
+        """float[n, 2]: ends of the 95 % interval of the backbone's ``quantity`` at the estimated ``axis`` of each point.
+
+        ``axis``: force_n or amplitude_m. `interval` is about the recorded vibration, at its true amplitude. At the measured
+        force the true backbone has another value: 1.96 standard errors of the force times the slope between the neighbouring
+        points are added at both ends (not in quadrature: the same errors may be in both). NaN with fewer than two levels.
+        """
+        if axis not in _AXES:
+            raise IdentificationError(f"axis: is '{axis}', allowed are {', '.join(_AXES)}")
+        along, values = np.asarray(getattr(self, axis)), np.asarray(getattr(self, quantity))
+        error = 1.96 * np.asarray(getattr(self, STANDARD_ERRORS[axis])) * np.abs(_slopes(along, values))
+        return np.asarray(self.interval(quantity) + error[:, None] * np.array([-1.0, 1.0]))
+
     @property
     def frequency_shift(self) -> float:
         """Modal frequency at the largest amplitude over that at the smallest, minus one."""
@@ -233,12 +246,27 @@ _ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if entry.name not 
 _ADDED = tuple(entry.name for entry in fields(NonlinearMode) if entry.default_factory is _unknown)
 _EARLIER = "written by an earlier version: identify the recording again for the standard errors that are missing"
 _HARMONICS = ("force_harmonics", "response_harmonics_m")
+_AXES = ("force_n", "amplitude_m")
+_SAME_LEVEL = 0.01  # relative distance of points that were measured at one level
 
 
 def _column(quantity: str) -> int:
     if quantity not in QUANTITIES:
         raise IdentificationError(f"quantity: is '{quantity}', allowed are {', '.join(QUANTITIES)}")
     return QUANTITIES.index(quantity)
+
+
+def _slopes(along: Float, values: Float) -> Float:
+    """float[n]: slope of ``values`` between the nearest points at a lower and at a higher level; at the ends to the nearest."""
+    out = np.full(along.size, np.nan)
+    for number, here in enumerate(along):
+        below = np.flatnonzero(along < (1.0 - _SAME_LEVEL) * here)
+        above = np.flatnonzero(along > (1.0 + _SAME_LEVEL) * here)
+        first = below[np.argmax(along[below])] if below.size else number
+        last = above[np.argmin(along[above])] if above.size else number
+        if first != last:
+            out[number] = (values[last] - values[first]) / (along[last] - along[first])
+    return out
 
 
 def _number(value: float) -> float | None:

@@ -261,3 +261,30 @@ def test_rounding_in_quadrature_turns_the_phase_and_so_moves_the_frequency() -> 
     expected = 0.01 * mode.damping_ratio * mode.frequency_hz
     np.testing.assert_allclose(mode.systematic("modal_frequency_hz"), expected, rtol=0.05)
     assert mode.systematic("damping_ratio")[0] < 1e-3 * mode.damping_ratio[0]
+
+
+def test_intervals_at_the_measured_force_hold_its_error_too() -> None:
+    rng = np.random.default_rng(3)
+    forces, slope, force_std, frequency_std = np.array([0.1, 0.2, 0.2, 0.3]), 2.0, 1e-3, 5e-4
+    plain = identify(Backbone(tuple(noisy_point(forces=(0, force, 0)) for force in forces)))
+    inside, outside = [], []
+    for _ in range(500):
+        measured = forces + force_std * rng.standard_normal(4)
+        frequency = 25.0 + slope * forces + frequency_std * rng.standard_normal(4)
+        intervals = plain.interval_95.copy()
+        column = QUANTITIES.index("modal_frequency_hz")
+        intervals[:, column] = frequency[:, None] + 1.96 * frequency_std * np.array([-1.0, 1.0])
+        known = {"force_n": measured, "force_std_n": np.full(4, force_std), "interval_95": intervals}
+        mode = replace(plain, modal_frequency_hz=frequency, **known)
+        truth = 25.0 + slope * measured
+        for hits, ends in (
+            (inside, mode.interval_at("force_n", "modal_frequency_hz")),
+            (outside, intervals[:, column]),
+        ):
+            hits.append((ends[:, 0] <= truth) & (truth <= ends[:, 1]))
+    assert 0.95 <= np.mean(inside) <= 0.995
+    assert np.mean(outside) < 0.5
+    single = identify(Backbone((noisy_point(),)))
+    assert np.isnan(single.interval_at("force_n", "modal_frequency_hz")).all()
+    with pytest.raises(IdentificationError, match=r"axis: is 'force', allowed are force_n, amplitude_m"):
+        single.interval_at("force", "modal_frequency_hz")
