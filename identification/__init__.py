@@ -40,6 +40,8 @@ Responses and errors of PNLSS models
     CoupledRun, simulated_run, SimulatedRun, estimated_initial_state, pnlss_errors, PnlssErrors, error_spectra,
     ErrorSpectra, output_stretch, OutputStretch, ErrorTable, identify_many, ModelJob, IdentifiedModel,
     realisation_combinations
+Structured models
+    fit_structured, StructuredModel, StructuredFit, NonlinearElement
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
@@ -129,6 +131,9 @@ if TYPE_CHECKING:
     from identification.slow_flows.continuous import ContinuousBackbone, continuous_backbone
     from identification.slow_flows.short_points import ShortPoint, short_point
     from identification.slow_flows.slow_flow import SlowFlow, slow_flow
+    from identification.structured.elements import NonlinearElement
+    from identification.structured.fit import StructuredFit, fit_structured
+    from identification.structured.model import StructuredModel
 else:
     __getattr__, __dir__ = on_use(
         __name__,
@@ -166,6 +171,7 @@ else:
             "ModelJob": "pnlss.many",
             "MultisineDesign": "multisine.design",
             "MultisineMapping": "mapping.multisine",
+            "NonlinearElement": "structured.elements",
             "NonlinearMode": "nonlinear.nonlinear_modes",
             "NonlinearModeMapping": "mapping.nonlinear_mode",
             "OutputStretch": "prediction.simulated_runs",
@@ -190,6 +196,8 @@ else:
             "StateSpaceFit": "linear.state_space_fit",
             "SteadyPrediction": "prediction.steady_prediction",
             "SteadyStates": "pnlss.steady.states",
+            "StructuredFit": "structured.fit",
+            "StructuredModel": "structured.model",
             "SweepPrediction": "prediction.sweep_prediction",
             "Transient": "signals.transients",
             "VoltagePath": "prediction.exciter",
@@ -210,6 +218,7 @@ else:
             "extrapolated_to_zero": "linear.extrapolation",
             "fit_pnlss": "pnlss.fitting.fit",
             "fit_state_space": "linear.state_space_fit",
+            "fit_structured": "structured.fit",
             "force_drop_out": "signals.sweeps",
             "force_surface": "response_control.force_surface",
             "frequency_response": "prediction.frequency_response",
@@ -288,6 +297,7 @@ __all__ = [
     "ModelJob",
     "MultisineDesign",
     "MultisineMapping",
+    "NonlinearElement",
     "NonlinearMode",
     "NonlinearModeMapping",
     "OutputStretch",
@@ -312,6 +322,8 @@ __all__ = [
     "StateSpaceFit",
     "SteadyPrediction",
     "SteadyStates",
+    "StructuredFit",
+    "StructuredModel",
     "SweepPrediction",
     "Transient",
     "VoltagePath",
@@ -332,6 +344,7 @@ __all__ = [
     "extrapolated_to_zero",
     "fit_pnlss",
     "fit_state_space",
+    "fit_structured",
     "force_drop_out",
     "force_surface",
     "frequency_response",

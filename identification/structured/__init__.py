@@ -1,0 +1,1 @@
+"""Structured nonlinear state-space models: modes with nonlinear elements between them."""

@@ -1,0 +1,189 @@
+"""Fit of a structured model to experiments in the time domain, by least squares with exact derivatives."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import find_role
+from identification.errors import IdentificationError
+from identification.linear.modes import LinearModes
+from identification.pnlss.experiment import Experiment, same_channels
+from identification.structured.model import StructuredModel
+from identification.structured.parameters import Parameters
+from identification.structured.start import linear_start, with_element
+
+__all__ = ["StructuredFit", "fit_structured"]
+
+Float = NDArray[np.float64]
+
+_TOLERANCE = 1e-6
+_EVALUATIONS = 100
+_SUPPORT = 0.03
+"""Initial stiffness of the support relative to the first mode's at the drive point."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StructuredFit:
+    """A fitted model.
+
+    Parameters
+    ----------
+    model
+        The model.
+    start
+        Its initial values.
+    names
+        Names of the free numbers (`identification.structured.parameters.Parameters`).
+    values
+        float[P], the free numbers.
+    covariance
+        float[P, P], of the free numbers, as if the residual were white: a misfit that repeats makes it too small.
+    training_error
+        RMS of the residual over that of the outputs, every output relative to its own RMS.
+    evaluations, seconds
+        Number of simulations with derivatives, and time.
+    stopped
+        Why the fit ended.
+    """
+
+    model: StructuredModel
+    start: StructuredModel
+    names: tuple[str, ...]
+    values: Float
+    covariance: Float
+    training_error: float
+    evaluations: int
+    seconds: float
+    stopped: str
+
+
+def fit_structured(
+    modes: LinearModes,
+    experiments: Sequence[Experiment],
+    *,
+    springs: int = 4,
+    dampers: int = 1,
+    reach: float = 2.0,
+    support: bool = True,
+    steps: int = 2,
+) -> StructuredFit:
+    """Fit a structured model with one nonlinear element whose direction is free.
+
+    Parameters
+    ----------
+    modes
+        Linear modes at a low level, of the same channels.
+    experiments
+        Training data with one force as input; one at least is periodic. All are simulated from rest.
+    springs, dampers
+        Numbers of coefficients of the element: powers 2 to ``springs + 1`` and 1 to ``dampers`` of its displacement.
+    reach
+        Largest displacement of the laws relative to the largest of the mode in the training data.
+    support
+        Whether the exciter's static force is fitted (`StructuredModel`).
+    steps
+        Steps in a sample.
+
+    Raises
+    ------
+    IdentificationError
+        If experiments differ in channels or rate, have no force, or do not match the modes.
+    """
+    began = time.perf_counter()
+    same_channels(experiments)
+    first = experiments[0]
+    if [channel.role for channel in first.input_channels] != ["force"]:
+        names = ", ".join(f"{channel.name} ({channel.role})" for channel in first.input_channels)
+        raise IdentificationError(f"inputs: are {names}, needs one force alone")
+    if springs < 1 or dampers < 0:
+        raise IdentificationError(f"springs, dampers: are {springs} and {dampers}, allowed are from 1 and from 0")
+    linear = linear_start(modes, first, steps)
+    start = with_element(linear, experiments, len(modes.frequency_hz), springs, dampers, reach)
+    start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
+    tied = (find_role(first.output_channels, "drive"),)
+    problem = _Problem(Parameters(start, tied, False), experiments)
+    vector, evaluations = problem.solve(problem.parameters.vector(start))
+    if support:
+        found = problem.parameters.model(vector)
+        stiffness = _SUPPORT * (found.omega[0] / found.input_shapes[0, 0]) ** 2
+        problem = _Problem(Parameters(start, tied, True), experiments)
+        again = problem.parameters.vector(replace(found, support_n_m=stiffness))
+        vector, more = problem.solve(again)
+        evaluations += more
+    residual, jacobian = problem.both(vector)
+    freedom = max(residual.size - vector.size, 1)
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom
+    return StructuredFit(
+        model=problem.parameters.model(vector),
+        start=start,
+        names=problem.parameters.names,
+        values=vector,
+        covariance=covariance,
+        training_error=float(np.sqrt(np.mean(residual**2))),
+        evaluations=evaluations,
+        seconds=time.perf_counter() - began,
+        stopped=problem.stopped,
+    )
+
+
+class _Problem:
+    """Residuals and their derivatives, computed together and kept for the last vector."""
+
+    def __init__(self, parameters: Parameters, experiments: Sequence[Experiment]) -> None:
+        self.parameters, self.experiments, self.stopped = parameters, experiments, ""
+        outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
+        self._scale = np.sqrt(np.mean(outputs**2, axis=1))
+        for channel, size in zip(experiments[0].output_channels, self._scale, strict=True):
+            if not size > 0.0:
+                raise IdentificationError(
+                    f"output '{channel.name}': is zero throughout the training data; leave it out"
+                )
+        self._known: tuple[bytes, Float, Float] | None = None
+
+    def both(self, vector: Float) -> tuple[Float, Float]:
+        """Return residuals float[N] and derivatives float[N, P]."""
+        key = vector.tobytes()
+        if self._known is None or self._known[0] != key:
+            model = self.parameters.model(vector)
+            residuals, rows = [], []
+            for experiment in self.experiments:
+                weight = np.sqrt(experiment.weight) / self._scale
+                found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from)
+                residuals.append(((found - experiment.counted_outputs.T) * weight).ravel())
+                rows.append((derivatives * weight[:, None]).reshape(-1, vector.size))
+            self._known = key, np.concatenate(residuals), np.concatenate(rows)
+        return self._known[1], self._known[2]
+
+    def _jacobian(self, vector: Float) -> Float:
+        return self.both(vector)[1]
+
+    def residual(self, vector: Float) -> Float:
+        """Return residuals without derivatives, which cost more."""
+        model = self.parameters.model(vector)
+        parts = []
+        for experiment in self.experiments:
+            found = model.simulate(experiment.inputs).outputs[:, experiment.counted_from :]
+            weight = np.sqrt(experiment.weight) / self._scale
+            parts.append(((found - experiment.counted_outputs).T * weight).ravel())
+        return np.concatenate(parts)
+
+    def solve(self, vector: Float) -> tuple[Float, int]:
+        """Return the vector of least squares, and the number of derivatives that it took."""
+        from scipy.optimize import least_squares  # only on use: it takes long to load
+
+        found = least_squares(
+            self.residual,
+            vector,
+            jac=self._jacobian,
+            bounds=self.parameters.bounds(vector),
+            x_scale="jac",
+            ftol=_TOLERANCE,
+            xtol=None,
+            gtol=None,
+            max_nfev=_EVALUATIONS,
+        )
+        self.stopped = str(found.message)
+        return np.asarray(found.x), int(found.njev or 0)

@@ -1,0 +1,231 @@
+"""A structure with nonlinear elements as a state-space model, simulated with a time step that conserves its energy balance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.channels import MOTION_ORDER, Channel
+from identification.errors import IdentificationError
+from identification.structured.elements import NonlinearElement
+from identification.structured.steps import Room, System, run
+from identification.validation import finite_array, positive
+
+__all__ = ["Motion", "StructuredModel", "ends_of_steps", "room_for"]
+
+Float = NDArray[np.float64]
+
+_SOFTEST = -0.5
+"""Least slope of the springs beyond their reach, relative to the static stiffness in their direction, all springs together."""
+_WINDOW = ("kaiser", 8.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A simulated run.
+
+    Parameters
+    ----------
+    outputs
+        float[n_outputs, n].
+    displacement, velocity, acceleration
+        float[n_modes, n], modal coordinates (kg^1/2 m) and their derivatives by time.
+    reach_use
+        float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
+    """
+
+    outputs: Float
+    displacement: Float
+    velocity: Float
+    acceleration: Float
+    reach_use: Float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StructuredModel:
+    """Modes, nonlinear elements along directions in their space, and what a force sensor does not see.
+
+    ``q'' + 2 Z W q' + W^2 q + sum_e direction_e f_e(direction_e . q, direction_e . q') = B (u + s)``
+
+    with mass-normalised modal coordinates q. Outputs are ``C q``, ``C q'`` or ``C q''`` by the unit of their channel, plus
+    ``D u``. s is the static force of a support at the first input that a piezoelectric sensor does not show: minus
+    ``support_n_m`` times the low-passed displacement of the first input, at most ``support_largest_n``.
+
+    The simulation takes ``steps`` steps of the implicit midpoint rule in each sample, with discrete gradients of the potential
+    energies (`identification.structured.steps`): over each step the energy changes by the work of the input less that of the
+    dampers, exactly. The frequencies of the modes are those of the continuous equation; with a step h the rule lowers a
+    frequency f by ``(pi f h)^2 / 3`` of itself.
+
+    Not modelled: damping that couples modes, elements with memory (friction), inputs between samples above half the rate.
+
+    Parameters
+    ----------
+    frequency_hz, damping_ratio
+        float[n_modes], undamped frequencies and damping ratios of the linear part.
+    input_shapes
+        float[n_modes, n_inputs], mass-normalised shapes at the inputs, kg^-1/2.
+    output_shapes
+        float[n_outputs, n_modes], mass-normalised shapes at the outputs, kg^-1/2.
+    direct
+        float[n_outputs, n_inputs], residual of the modes below, unit of the output per N.
+    elements
+        Nonlinear elements.
+    sample_rate_hz
+        Sample rate of inputs and outputs.
+    inputs, outputs
+        Channels: forces, and motions.
+    steps
+        Steps in a sample.
+    support_n_m, support_corner_hz, support_largest_n
+        Stiffness of the unseen support, corner of its low-pass (that of the sensor's high-pass), and its largest force.
+    specimen
+        Name of the test specimen.
+    training
+        Names of the training experiments.
+
+    Raises
+    ------
+    IdentificationError
+        If shapes do not agree, or a number is not allowed.
+    """
+
+    frequency_hz: Float
+    damping_ratio: Float
+    input_shapes: Float
+    output_shapes: Float
+    direct: Float
+    elements: tuple[NonlinearElement, ...]
+    sample_rate_hz: float
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    steps: int = 2
+    support_n_m: float = 0.0
+    support_corner_hz: float = 0.3
+    support_largest_n: float = 100.0
+    specimen: str = ""
+    training: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, dimensions in (
+            ("frequency_hz", 1),
+            ("damping_ratio", 1),
+            ("input_shapes", 2),
+            ("output_shapes", 2),
+            ("direct", 2),
+        ):
+            object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, dimensions))
+        for name in ("elements", "inputs", "outputs", "training"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in ("sample_rate_hz", "support_corner_hz", "support_largest_n"):
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
+        modes, inputs, outputs = len(self.frequency_hz), len(self.inputs), len(self.outputs)
+        for name, needed in (
+            ("damping_ratio", (modes,)),
+            ("input_shapes", (modes, inputs)),
+            ("output_shapes", (outputs, modes)),
+            ("direct", (outputs, inputs)),
+        ):
+            if getattr(self, name).shape != needed:
+                raise IdentificationError(f"{name}: shape {getattr(self, name).shape}, needs {needed}")
+        for name in ("frequency_hz", "damping_ratio"):
+            if not np.all(getattr(self, name) > 0.0):
+                raise IdentificationError(
+                    f"{name}: is {getattr(self, name).tolist()}, allowed are numbers above 0: the model must stay bounded"
+                )
+        if not (modes and inputs and outputs):
+            raise IdentificationError("frequency_hz, inputs, outputs: a model needs one of each at least")
+        for number, element in enumerate(self.elements):
+            if element.direction.shape != (modes,):
+                raise IdentificationError(
+                    f"elements[{number}].direction: shape {element.direction.shape}, needs {(modes,)}"
+                )
+        if self.steps < 1 or self.support_n_m < 0.0:
+            name = "steps" if self.steps < 1 else "support_n_m"
+            least = 1 if self.steps < 1 else 0
+            raise IdentificationError(f"{name}: is {getattr(self, name)}, allowed is {least} or above")
+
+    @property
+    def omega(self) -> Float:
+        """float[n_modes], rad/s."""
+        return np.asarray(2.0 * np.pi * self.frequency_hz)
+
+    @property
+    def motions(self) -> NDArray[np.int64]:
+        """int[n_outputs]: number of derivatives of the displacement that every output shows."""
+        return np.array([MOTION_ORDER[channel.motion] for channel in self.outputs])
+
+    @property
+    def system(self) -> System:
+        """Numbers for the kernels."""
+        laws = [element.law for element in self.elements]
+        padded = np.zeros((len(laws), max((law.size for law in laws), default=1)))
+        for row, law in zip(padded, laws, strict=True):
+            row[: law.size] = law
+        phi = np.array([element.phi for element in self.elements]).reshape(len(laws), len(self.omega))
+        softest = _SOFTEST / max(len(laws), 1) / np.sum((phi / self.omega) ** 2, axis=1)
+        reach = np.array([element.reach for element in self.elements])
+        return System(
+            step_s=1.0 / (self.sample_rate_hz * self.steps),
+            steps=self.steps,
+            omega=self.omega,
+            zeta=np.array(self.damping_ratio),
+            b=np.array(self.input_shapes),
+            phi=phi,
+            laws=padded,
+            sizes=np.array([[e.spring_n.size, e.law.size] for e in self.elements], dtype=np.int64).reshape(-1, 2),
+            limits=np.column_stack([reach, softest]),
+            support=np.array(
+                [self.support_n_m, 2.0 * np.pi * self.support_corner_hz, self.support_largest_n],
+            ),
+        )
+
+    def simulate(self, inputs: ArrayLike) -> Motion:
+        """Return the motion from rest under ``inputs``, float[n_inputs, n]."""
+        u = finite_array("inputs", inputs, np.float64, 2)
+        if len(u) != len(self.inputs):
+            raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
+        system, modes = self.system, len(self.omega)
+        states = np.zeros((u.shape[1], 3, modes))
+        run(system, room_for(system), ends_of_steps(u, self.steps), np.zeros(2 * modes + 1), states)
+        largest = np.max(np.abs(states[:, 0] @ system.phi.T), axis=0, initial=0.0)
+        return Motion(
+            outputs=outputs_of(self, u, states),
+            displacement=states[:, 0].T,
+            velocity=states[:, 1].T,
+            acceleration=states[:, 2].T,
+            reach_use=np.asarray(largest / system.limits[:, 0]),
+        )
+
+    def with_steps(self, steps: int) -> "StructuredModel":
+        """Return the model with another number of steps in a sample."""
+        return replace(self, steps=steps)
+
+
+def outputs_of(model: StructuredModel, u: Float, states: Float) -> Float:
+    """float[n_outputs, n] from inputs and states [n, 3, n_modes]."""
+    motions = states[:, model.motions]  # [n, n_outputs, n_modes]
+    return np.asarray(np.einsum("kom,om->ok", motions, model.output_shapes) + model.direct @ u)
+
+
+def room_for(system: System) -> Room:
+    """Return room for the steps of a system."""
+    n, inputs, elements = len(system.omega), system.b.shape[1], len(system.phi)
+    return Room(
+        mean=np.zeros(n),
+        free=np.zeros(n),
+        u=np.zeros(inputs),
+        w=np.zeros(elements),
+        forces=np.zeros((elements, 3)),
+        coupling=np.zeros((elements, elements)),
+        change=np.zeros((elements, 1)),
+    )
+
+
+def ends_of_steps(inputs: Float | Sequence[Sequence[float]], steps: int) -> Float:
+    """float[n steps + 1, n_inputs]: inputs between the samples, without what lies above half the sample rate."""
+    from scipy.signal import resample_poly  # only on use: it takes a second to load
+
+    u = np.asarray(inputs, dtype=np.float64)
+    ends = u if steps == 1 else resample_poly(u, steps, 1, axis=1, window=_WINDOW, padtype="line")
+    return np.ascontiguousarray(np.concatenate([ends, ends[:, -1:]], axis=1).T)

@@ -1,0 +1,220 @@
+"""Compiled run of a structured model: implicit midpoint rule with discrete gradients, and its exact sensitivities.
+
+A step of length h from (q, v) has the mean velocity V and the end ``q + h V``, ``2 V - v``:
+
+    ``2 (V - v)/h + C V + K (q + h V/2) + sum_e phi_e F_e = B U``
+
+    ``F_e = (P_e(z + h w) - P_e(z))/(h w) + c_e(z + h w/2) w``,  ``z = phi_e . q``,  ``w = phi_e . V``
+
+with the mean input U, the potential P_e of a spring and its damping c_e. Over a step the mechanical energy then changes by the
+work of U less the work of the dampers, exactly (the discrete gradient of Gonzalez, J. Nonlinear Sci. 6, 1996), whatever h is.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.structured.laws import damping_of, element_force, spring_of
+from vibrolock.compiled import inner_kernel, unlocked_kernel
+
+__all__ = ["Room", "System", "accelerate", "along", "end_step", "rigidity", "run", "solve", "take_input", "take_step"]
+
+NEWTON = 40
+EXACT = 1e-13  # relative change of w that ends Newton's iteration
+
+
+class System(NamedTuple):
+    """Numbers of a model; elements have no unit: their displacements are relative to their own scale, their forces J."""
+
+    step_s: float
+    steps: int
+    """In a sample."""
+    omega: np.ndarray
+    """float[n], rad/s."""
+    zeta: np.ndarray
+    """float[n]."""
+    b: np.ndarray
+    """float[n, n_inputs]."""
+    phi: np.ndarray
+    """float[n_elements, n]."""
+    laws: np.ndarray
+    """float[n_elements, ...]: coefficients of the spring from the square on, then of the damping from the first power on."""
+    sizes: np.ndarray
+    """int[n_elements, 2]: numbers of coefficients of the spring, and of all."""
+    limits: np.ndarray
+    """float[n_elements, 2]: displacement up to which the laws reach, least slope of the spring beyond it."""
+    support: np.ndarray
+    """float[3]: stiffness (N/m), corner of its filter (rad/s) and largest force (N) of the unseen support."""
+
+
+class Room(NamedTuple):
+    """Room for a step, so that nothing is allocated."""
+
+    mean: np.ndarray
+    free: np.ndarray
+    u: np.ndarray
+    w: np.ndarray
+    forces: np.ndarray
+    coupling: np.ndarray
+    change: np.ndarray
+
+
+@inner_kernel
+def solve(matrix: np.ndarray, rhs: np.ndarray, n: int, columns: int) -> None:
+    """Solve in place by elimination with row exchange; ``rhs`` gets the solution, ``matrix`` is destroyed."""
+    for i in range(n):
+        best = i
+        for r in range(i + 1, n):
+            if abs(matrix[r, i]) > abs(matrix[best, i]):
+                best = r
+        if best != i:
+            for c in range(n):
+                matrix[i, c], matrix[best, c] = matrix[best, c], matrix[i, c]
+            for c in range(columns):
+                rhs[i, c], rhs[best, c] = rhs[best, c], rhs[i, c]
+        pivot = 1.0 / matrix[i, i]
+        for r in range(i + 1, n):
+            factor = matrix[r, i] * pivot
+            if factor != 0.0:
+                for c in range(i + 1, n):
+                    matrix[r, c] -= factor * matrix[i, c]
+                for c in range(columns):
+                    rhs[r, c] -= factor * rhs[i, c]
+    for i in range(n - 1, -1, -1):
+        pivot = 1.0 / matrix[i, i]
+        for c in range(columns):
+            for r in range(i + 1, n):
+                rhs[i, c] -= matrix[i, r] * rhs[r, c]
+            rhs[i, c] *= pivot
+
+
+@inner_kernel
+def along(vector: np.ndarray, row: np.ndarray) -> float:
+    """Return the scalar product."""
+    total = 0.0
+    for i in range(vector.size):
+        total += vector[i] * row[i]
+    return float(total)
+
+
+@inner_kernel
+def rigidity(system: System, i: int) -> float:
+    """Return what multiplies the mean velocity of a mode in the equation of a step."""
+    h, omega = system.step_s, system.omega[i]
+    return float(2.0 / h + 2.0 * system.zeta[i] * omega + 0.5 * h * omega * omega)
+
+
+@inner_kernel
+def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray) -> None:
+    """Solve a step under the mean input ``room.u``: write the mean velocity, and what every element does at the solution."""
+    h, elements = system.step_s, system.phi.shape[0]
+    for i in range(q.size):
+        push = 2.0 * v[i] / h - system.omega[i] * system.omega[i] * q[i] + along(room.u, system.b[i])
+        room.free[i] = push / rigidity(system, i)
+        room.mean[i] = room.free[i]
+    for e in range(elements):
+        room.w[e] = along(v, system.phi[e])
+    for _ in range(NEWTON if elements else 0):
+        if newton(system, room, q):
+            break
+    for e in range(elements):
+        evaluate(system, room, q, e)
+        for i in range(q.size):
+            room.mean[i] -= system.phi[e, i] * room.forces[e, 0] / rigidity(system, i)
+
+
+@inner_kernel
+def evaluate(system: System, room: Room, q: np.ndarray, e: int) -> None:
+    """Write the mean force of an element over the step, and its derivatives by z and w."""
+    law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
+    found = element_force(
+        along(q, system.phi[e]), room.w[e], system.step_s, law, springs, system.limits[e, 0], system.limits[e, 1]
+    )
+    room.forces[e, 0], room.forces[e, 1], room.forces[e, 2] = found
+
+
+@inner_kernel
+def newton(system: System, room: Room, q: np.ndarray) -> bool:
+    """Correct the mean velocities of all elements once; return whether they do not change any more."""
+    elements = room.w.size
+    for e in range(elements):
+        evaluate(system, room, q, e)
+    for e in range(elements):
+        miss = along(room.free, system.phi[e]) - room.w[e]
+        for f in range(elements):
+            shared = 0.0
+            for i in range(q.size):
+                shared += system.phi[e, i] * system.phi[f, i] / rigidity(system, i)
+            miss -= shared * room.forces[f, 0]
+            room.coupling[e, f] = shared * room.forces[f, 2] + (1.0 if e == f else 0.0)
+        room.change[e, 0] = miss
+    solve(room.coupling, room.change, elements, 1)
+    done = True
+    for e in range(elements):
+        room.w[e] += room.change[e, 0]
+        if abs(room.change[e, 0]) > EXACT * abs(room.w[e]) + 1e-300:
+            done = False
+    return done
+
+
+@inner_kernel
+def accelerate(system: System, room: Room, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
+    """Write the acceleration under ``room.u``, and force of every element with its derivatives by z and its rate."""
+    for i in range(q.size):
+        omega = system.omega[i]
+        out[i] = along(room.u, system.b[i]) - 2.0 * system.zeta[i] * omega * v[i] - omega * omega * q[i]
+    for e in range(system.phi.shape[0]):
+        law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
+        z, rate, reach = along(q, system.phi[e]), along(v, system.phi[e]), system.limits[e, 0]
+        force, slope, _ = spring_of(z, law, springs, reach, system.limits[e, 1])
+        damping, steep = damping_of(z, law, springs, reach)
+        room.forces[e, 0] = force + damping * rate
+        room.forces[e, 1], room.forces[e, 2] = slope + steep * rate, damping
+        for i in range(q.size):
+            out[i] -= system.phi[e, i] * room.forces[e, 0]
+
+
+@inner_kernel
+def static_force(support: np.ndarray, mean: float) -> float:
+    """Return the force of the support on the structure at the filtered displacement ``mean``, bounded smoothly."""
+    return -support[2] * math.tanh(support[0] * mean / support[2]) if support[2] > 0.0 else 0.0
+
+
+@inner_kernel
+def take_input(system: System, room: Room, u: np.ndarray, row: int, other: int, mean: float) -> None:
+    """Write the mean of two rows of the inputs, and add the support's force to the first input."""
+    for j in range(u.shape[1]):
+        room.u[j] = 0.5 * (u[row, j] + u[other, j])
+    room.u[0] += static_force(system.support, mean)
+
+
+@inner_kernel
+def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np.ndarray) -> None:
+    """Go to the end of the step; the support's filter follows the displacement of the first input."""
+    alpha, there = 0.5 * system.step_s * system.support[1], 0.0
+    for i in range(q.size):
+        there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * room.mean[i])
+        q[i] += system.step_s * room.mean[i]
+        v[i] = 2.0 * room.mean[i] - v[i]
+    state[2 * q.size] = ((1.0 - alpha) * state[2 * q.size] + 2.0 * alpha * there) / (1.0 + alpha)
+
+
+@unlocked_kernel
+def run(system: System, room: Room, u: np.ndarray, state: np.ndarray, states: np.ndarray) -> None:
+    """Simulate from ``state`` [2 n + 1] and write displacement, velocity and acceleration at every sample, [N, 3, n].
+
+    ``u``: [N steps + 1, n_inputs], inputs at the ends of all steps.
+    """
+    n = system.omega.size
+    q, v = state[:n], state[n : 2 * n]
+    for sample in range(states.shape[0]):
+        first = sample * system.steps
+        take_input(system, room, u, first, first, state[2 * n])
+        accelerate(system, room, q, v, states[sample, 2])
+        for i in range(n):
+            states[sample, 0, i], states[sample, 1, i] = q[i], v[i]
+        for row in range(first, first + system.steps):
+            take_input(system, room, u, row, row + 1, state[2 * n])
+            take_step(system, room, q, v)
+            end_step(system, room, q, v, state)

@@ -1,0 +1,225 @@
+"""Time steps of structured models: energy, the continuous equation, exact derivatives, far beyond the data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from identification import IdentificationError
+from identification.structured.elements import NonlinearElement
+from identification.structured.laws import damping_of, spring_of
+from identification.structured.model import ends_of_steps, room_for
+from identification.structured.parameters import Parameters
+from identification.structured.steps import end_step, run, take_input, take_step
+from tests.identification.structured.models import RATE_HZ, beam, multisine
+
+
+def spring(system, e, x):
+    """Force, slope and potential of an element (J)."""
+    springs, size = system.sizes[e]
+    return spring_of(x, system.laws[e, :size], springs, *system.limits[e])
+
+
+def energy(system, state):
+    n = system.omega.size
+    q, v = state[:n], state[n : 2 * n]
+    stored = 0.5 * v @ v + 0.5 * np.sum((system.omega * q) ** 2)
+    return stored + sum(spring(system, e, float(phi @ q))[2] for e, phi in enumerate(system.phi))
+
+
+@pytest.mark.parametrize("rms_n", [1.0, 300.0])
+def test_over_every_step_the_energy_changes_by_work_less_damping(rms_n):
+    model = beam(support_n_m=0.0)
+    system, u = model.system, multisine(rms_n, 1)[:, :400]
+    room, ends, state = room_for(system), ends_of_steps(u, model.steps), np.zeros(5)
+    q, v = state[:2], state[2:4]
+    used = []
+    for row in range(len(ends) - 1):
+        before, z = energy(system, state), system.phi @ q
+        take_input(system, room, ends, row, row + 1, 0.0)
+        take_step(system, room, q, v)
+        work = room.mean @ (system.b @ room.u)
+        lost = np.sum(2.0 * system.zeta * system.omega * room.mean**2)
+        for e, w in enumerate(system.phi @ room.mean):
+            law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
+            lost += damping_of(z[e] + 0.5 * system.step_s * w, law, springs, system.limits[e, 0])[0] * w**2
+        end_step(system, room, q, v, state)
+        assert lost >= 0.0
+        used.append(np.abs(system.phi @ q) / system.limits[:, 0])
+        size = max(before, energy(system, state), system.step_s * abs(work))
+        assert energy(system, state) - before == pytest.approx(system.step_s * (work - lost), abs=1e-9 * size)
+    assert (np.max(used) > 1.0) == (rms_n > 100.0)
+
+
+def continuous(model, u, times):
+    """Right-hand side of the equation of motion, written anew, with the support's filter."""
+    omega, zeta, b = model.omega, model.damping_ratio, model.input_shapes[:, 0]
+    system = model.system
+
+    def rates(t, x):
+        q, v = x[:2], x[2:4]
+        force = np.interp(t, times, u)
+        force -= model.support_largest_n * np.tanh(model.support_n_m * x[4] / model.support_largest_n)
+        a = b * force - 2.0 * zeta * omega * v - omega**2 * q
+        for e, element in enumerate(model.elements):
+            z, rate = element.direction @ q, element.direction @ v
+            damper = sum(c * abs(z / element.scale_m) ** (j + 1) for j, c in enumerate(element.damper_n_s_m))
+            a -= element.direction * (spring(system, e, z / element.scale_m)[0] / element.scale_m + damper * rate)
+        return np.concatenate([v, a, [2.0 * np.pi * model.support_corner_hz * (b @ q - x[4])]])
+
+    return rates
+
+
+def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_step():
+    u = multisine(1.0, 2)[:, :300]
+    errors = []
+    for steps in (4, 8):
+        model = beam(steps=steps)
+        ends = ends_of_steps(u, steps)[:, 0]
+        times = np.arange(ends.size) / (RATE_HZ * steps)
+        # steps no longer than the kinks of the linearly interpolated force are apart
+        found = solve_ivp(
+            continuous(model, ends, times),
+            (0.0, times[-1]),
+            np.zeros(5),
+            method="DOP853",
+            t_eval=times[:-1:steps],
+            rtol=1e-9,
+            atol=1e-14,
+            max_step=1.0 / (RATE_HZ * steps),
+        )
+        run_of = model.simulate(u)
+        difference = run_of.displacement - found.y[:2]
+        errors.append(np.linalg.norm(difference) / np.linalg.norm(found.y[:2]))
+    assert errors[0] < 4e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_outputs_are_accelerations_velocities_and_displacements_with_the_residual():
+    model, u = beam(steps=8), multisine(1.0, 3)[:, :500]
+    found = model.simulate(u)
+    acceleration, velocity, displacement = (
+        model.output_shapes[row] @ motion
+        for row, motion in enumerate((found.acceleration, found.velocity, found.displacement))
+    )
+    np.testing.assert_allclose(found.outputs[0], acceleration + 0.01 * u[0])
+    np.testing.assert_allclose(found.outputs[1:], [velocity, displacement])
+    differences = np.gradient(found.displacement, 1.0 / RATE_HZ, axis=1)[:, 5:-5]
+    assert np.linalg.norm(differences[0] - found.velocity[0, 5:-5]) < 0.02 * np.linalg.norm(found.velocity[0])
+
+
+@pytest.mark.parametrize("force_n", [1.0, 30.0])
+def test_derivatives_are_those_of_finite_differences(force_n):
+    """Also beyond the reach of the laws."""
+    start = beam(steps=2)
+    parameters = Parameters(start, (0,), True)
+    vector = parameters.vector(start)
+    u = multisine(force_n, 4)[:, :150]
+    found, exact = parameters.derivatives(parameters.model(vector), u, 20)
+    np.testing.assert_allclose(found, parameters.model(vector).simulate(u).outputs[:, 20:].T, rtol=1e-12)
+    assert len(parameters.names) == vector.size
+    for column, name in enumerate(parameters.names):
+        step = 1e-5 * max(abs(vector[column]), 1e-1)
+        ends = []
+        for sign in (-1.0, 1.0):
+            moved = vector.copy()
+            moved[column] += sign * step
+            model = parameters.model(moved)
+            # the slope limit of the second element follows the parameters in steps between evaluations of a fit
+            ends.append(_with_limits(model, start, u)[:, 20:].T)
+        differences = (ends[1] - ends[0]) / (2.0 * step)
+        size = np.linalg.norm(exact[..., column])
+        assert np.linalg.norm(differences - exact[..., column]) <= 2e-5 * size + 1e-9, name
+
+
+def _with_limits(model, start, u):
+    """Outputs of a model with the least slopes of another."""
+    from identification.structured.model import outputs_of
+
+    system = model.system._replace(limits=start.system.limits)
+    states = np.zeros((u.shape[1], 3, 2))
+    run(system, room_for(system), ends_of_steps(u, model.steps), np.zeros(5), states)
+    return outputs_of(model, u, states)
+
+
+def test_model_and_vector_are_each_other_s_inverse():
+    start = beam()
+    parameters = Parameters(start, (0,), True)
+    again = parameters.model(parameters.vector(start))
+    np.testing.assert_allclose(parameters.vector(again), parameters.vector(start))
+    u = multisine(1.0, 5)[:, :100]
+    np.testing.assert_allclose(again.simulate(u).outputs, start.simulate(u).outputs)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.floats(-50.0, 50.0), min_size=1, max_size=6),
+    st.floats(-3.0, 3.0),
+    st.floats(0.2, 5.0),
+    st.floats(-1.0, 1.0),
+    st.floats(-1.0, 1.0),
+)
+def test_whatever_the_coefficients_the_potential_energy_rises_far_away(springs, across, reach, one, other):
+    element = NonlinearElement(direction=[1.0, across], scale_m=1e-3, spring_n=springs, damper_n_s_m=[], reach=reach)
+    system = beam(elements=(element, element)).system
+    direction = np.array([one, other]) / max(np.hypot(one, other), 1e-3)
+
+    def potential(far):
+        q = far * direction
+        return energy(system, np.concatenate([q, np.zeros(3)])) / max(
+            far * far * np.sum((system.omega * direction) ** 2), 1e-9
+        )
+
+    # half of the linear energy is left; what the polynomials took within their reach grows more slowly
+    assert potential(1e6) >= 0.249 * (np.hypot(one, other) > 1e-3)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
+    rng = np.random.default_rng(seed)
+    model = beam(support_n_m=0.0)
+    samples = 4000
+    forces = {
+        0: multisine(300.0, seed, samples)[0],
+        1: 300.0 * np.sqrt(2.0) * np.sin(2.0 * np.pi * rng.uniform(15.0, 150.0) * np.arange(samples) / RATE_HZ),
+        2: 300.0 * np.sign(np.sin(2.0 * np.pi * 25.0 * np.arange(samples) / RATE_HZ)),
+    }
+    found = model.simulate(forces[seed % 3][None])
+    assert np.all(np.isfinite(found.outputs))
+    # |b|^2 / (4 D) times the integral of the squared force, docs/explanation/structured-models.md
+    slowest = np.min(2.0 * model.damping_ratio * model.omega)
+    held = ends_of_steps(forces[seed % 3][None], model.steps)[:-1, 0]
+    integral = np.cumsum(held**2)[:: model.steps] / (RATE_HZ * model.steps)
+    bound = np.sum(model.input_shapes[:, 0] ** 2) / (4.0 * slowest) * integral
+    states = np.vstack([found.displacement, found.velocity, np.zeros((1, samples))]).T
+    energies = np.array([energy(model.system, state) for state in states])
+    assert np.max(found.reach_use) > 3.0
+    assert np.all(energies[1:] <= bound[1:] + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"frequency_hz": [25.0, -1.0]}, r"frequency_hz: is \[25.0, -1.0\], allowed are numbers above 0"),
+        ({"damping_ratio": [0.01, 0.0]}, r"damping_ratio: is \[0.01, 0.0\], allowed are numbers above 0"),
+        ({"input_shapes": [[1.0]]}, r"input_shapes: shape \(1, 1\), needs \(2, 1\)"),
+        ({"steps": 0}, r"steps: is 0, allowed is 1 or above"),
+        ({"support_n_m": -1.0}, r"support_n_m: is -1.0, allowed is 0 or above"),
+        ({"direct": [[np.nan], [0.0], [0.0]]}, r"direct: value at \[0, 0\] is nan, must be finite"),
+    ],
+)
+def test_a_model_that_cannot_be_is_refused(changes, message):
+    with pytest.raises(IdentificationError, match=message):
+        beam(**changes)
+
+
+def test_an_element_that_would_do_work_is_refused():
+    with pytest.raises(IdentificationError, match=r"damper_n_s_m is \[-1.0\], allowed are numbers from 0"):
+        replace(beam().elements[0], damper_n_s_m=[-1.0])
+    with pytest.raises(IdentificationError, match=r"elements\[0\].direction: shape \(1,\), needs \(2,\)"):
+        beam(elements=(replace(beam().elements[0], direction=[1.0]),))
+    with pytest.raises(IdentificationError, match=r"inputs: shape \(2, 9\), needs 1 rows"):
+        beam().simulate(np.zeros((2, 9)))
