@@ -66,7 +66,7 @@ def fit_structured(
     *,
     springs: int = 4,
     dampers: int = 1,
-    reach: float = 2.0,
+    reach: float = 3.0,
     support: bool = True,
     steps: int = 2,
 ) -> StructuredFit:

@@ -54,8 +54,9 @@ class StructuredModel:
 
     The simulation takes ``steps`` steps of the implicit midpoint rule in each sample, with discrete gradients of the potential
     energies (`identification.structured.steps`): over each step the energy changes by the work of the input less that of the
-    dampers, exactly. The frequencies of the modes are those of the continuous equation; with a step h the rule lowers a
-    frequency f by ``(pi f h)^2 / 3`` of itself.
+    dampers, exactly. The rule lowers frequencies, by ``(pi f h)^2 / 3`` of themselves with a step h. The modes are therefore
+    simulated with ``2/h tan(pi f h)``, which makes their frequencies and accelerations those of the continuous equation;
+    harmonics have errors of that size.
 
     Not modelled: damping that couples modes, elements with memory (friction), inputs between samples above half the rate.
 
@@ -133,6 +134,11 @@ class StructuredModel:
                 raise IdentificationError(
                     f"{name}: is {getattr(self, name).tolist()}, allowed are numbers above 0: the model must stay bounded"
                 )
+        highest = 0.5 * self.sample_rate_hz * self.steps
+        if self.steps >= 1 and not np.all(self.frequency_hz < highest):
+            raise IdentificationError(
+                f"frequency_hz: is {self.frequency_hz.tolist()}, allowed is below {highest:g}, half of the rate of the steps"
+            )
         if not (modes and inputs and outputs):
             raise IdentificationError("frequency_hz, inputs, outputs: a model needs one of each at least")
         for number, element in enumerate(self.elements):
@@ -151,6 +157,11 @@ class StructuredModel:
         return np.asarray(2.0 * np.pi * self.frequency_hz)
 
     @property
+    def step_s(self) -> float:
+        """Length of a step, s."""
+        return 1.0 / (self.sample_rate_hz * self.steps)
+
+    @property
     def motions(self) -> NDArray[np.int64]:
         """int[n_outputs]: number of derivatives of the displacement that every output shows."""
         return np.array([MOTION_ORDER[channel.motion] for channel in self.outputs])
@@ -163,12 +174,13 @@ class StructuredModel:
         for row, law in zip(padded, laws, strict=True):
             row[: law.size] = law
         phi = np.array([element.phi for element in self.elements]).reshape(len(laws), len(self.omega))
-        softest = _SOFTEST / max(len(laws), 1) / np.sum((phi / self.omega) ** 2, axis=1)
+        omega = 2.0 / self.step_s * np.tan(0.5 * self.omega * self.step_s)
+        softest = _SOFTEST / max(len(laws), 1) / np.sum((phi / omega) ** 2, axis=1)
         reach = np.array([element.reach for element in self.elements])
         return System(
-            step_s=1.0 / (self.sample_rate_hz * self.steps),
+            step_s=self.step_s,
             steps=self.steps,
-            omega=self.omega,
+            omega=omega,
             zeta=np.array(self.damping_ratio),
             b=np.array(self.input_shapes),
             phi=phi,

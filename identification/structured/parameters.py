@@ -79,7 +79,8 @@ class Parameters:
         modes = len(self.start.frequency_hz)
         least, largest = np.full(vector.size, -np.inf), np.full(vector.size, np.inf)
         frequency = np.log(self.start.frequency_hz)
-        least[:modes], largest[:modes] = frequency - _NEAR, frequency + _NEAR
+        highest = np.log(0.45 / self.start.step_s)
+        least[:modes], largest[:modes] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
         least[modes : 2 * modes], largest[modes : 2 * modes] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
         return least, largest
 
@@ -145,7 +146,8 @@ class Parameters:
     def _by_vector(self, model: StructuredModel, raw: Float, states: Float, u: Float) -> Float:
         """Chain rule from the kernel's parameters to the vector."""
         modes, inputs = model.input_shapes.shape
-        columns = [raw[..., : 2 * modes] * np.concatenate([model.omega, model.damping_ratio])]
+        by_frequency = model.omega / np.cos(0.5 * model.omega * model.step_s) ** 2
+        columns = [raw[..., : 2 * modes] * np.concatenate([by_frequency, model.damping_ratio])]
         shapes = raw[..., 2 * modes : 2 * modes + modes * inputs].copy()
         motions = states[:, model.motions]  # [n, n_outputs, n_modes]
         for output in self.tied:

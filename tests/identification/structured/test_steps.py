@@ -98,6 +98,23 @@ def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_st
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
 
 
+def test_a_linear_mode_has_the_frequency_response_of_the_continuous_equation():
+    model = beam(elements=(), support_n_m=0.0, damping_ratio=[0.02, 0.02])
+    samples = 4000
+    spectrum = np.zeros(samples // 2 + 1, complex)
+    lines = np.arange(60, 140, 7)  # 15 to 35 Hz
+    spectrum[lines] = np.exp(1j * lines**2)
+    period = np.fft.irfft(spectrum, samples)
+    outputs = model.simulate(np.tile(period, 3)[None]).outputs[0, -samples:]
+    omega = 2.0 * np.pi * lines * RATE_HZ / samples
+    receptance = model.input_shapes[:, 0] ** 2 / (
+        model.omega**2 - omega[:, None] ** 2 + 2j * model.damping_ratio * model.omega * omega[:, None]
+    )
+    exact = -(omega**2) * receptance.sum(axis=1) + 0.01
+    found = np.fft.rfft(outputs)[lines] / np.fft.rfft(period)[lines]
+    np.testing.assert_allclose(found, exact, rtol=4e-3)
+
+
 def test_outputs_are_accelerations_velocities_and_displacements_with_the_residual():
     model, u = beam(steps=8), multisine(1.0, 3)[:, :500]
     found = model.simulate(u)
@@ -206,6 +223,10 @@ def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
         ({"frequency_hz": [25.0, -1.0]}, r"frequency_hz: is \[25.0, -1.0\], allowed are numbers above 0"),
         ({"damping_ratio": [0.01, 0.0]}, r"damping_ratio: is \[0.01, 0.0\], allowed are numbers above 0"),
         ({"input_shapes": [[1.0]]}, r"input_shapes: shape \(1, 1\), needs \(2, 1\)"),
+        (
+            {"frequency_hz": [25.0, 1000.0]},
+            r"frequency_hz: is \[25.0, 1000.0\], allowed is below 1000, half of the rate",
+        ),
         ({"steps": 0}, r"steps: is 0, allowed is 1 or above"),
         ({"support_n_m": -1.0}, r"support_n_m: is -1.0, allowed is 0 or above"),
         ({"direct": [[np.nan], [0.0], [0.0]]}, r"direct: value at \[0, 0\] is nan, must be finite"),
