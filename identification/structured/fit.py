@@ -19,7 +19,8 @@ __all__ = ["StructuredFit", "fit_structured"]
 
 Float = NDArray[np.float64]
 
-_TOLERANCE = 1e-6
+_ROUGH, _FINE = 1e-3, 1e-6
+"""Relative gains of a step below which the fit before the last one, and the last one, end."""
 _EVALUATIONS = 100
 _SUPPORT = 0.03
 """Initial stiffness of the support relative to the first mode's at the drive point."""
@@ -105,13 +106,13 @@ def fit_structured(
     start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     tied = (find_role(first.output_channels, "drive"),)
     problem = _Problem(Parameters(start, tied, False), experiments)
-    vector, evaluations = problem.solve(problem.parameters.vector(start))
+    vector, evaluations = problem.solve(problem.parameters.vector(start), _ROUGH if support else _FINE)
     if support:
         found = problem.parameters.model(vector)
         stiffness = _SUPPORT * (found.omega[0] / found.input_shapes[0, 0]) ** 2
         problem = _Problem(Parameters(start, tied, True), experiments)
         again = problem.parameters.vector(replace(found, support_n_m=stiffness))
-        vector, more = problem.solve(again)
+        vector, more = problem.solve(again, _FINE)
         evaluations += more
     residual, jacobian = problem.both(vector)
     freedom = max(residual.size - vector.size, 1)
@@ -170,7 +171,7 @@ class _Problem:
             parts.append(((found - experiment.counted_outputs).T * weight).ravel())
         return np.concatenate(parts)
 
-    def solve(self, vector: Float) -> tuple[Float, int]:
+    def solve(self, vector: Float, tolerance: float) -> tuple[Float, int]:
         """Return the vector of least squares, and the number of derivatives that it took."""
         from scipy.optimize import least_squares  # only on use: it takes long to load
 
@@ -180,7 +181,7 @@ class _Problem:
             jac=self._jacobian,
             bounds=self.parameters.bounds(vector),
             x_scale="jac",
-            ftol=_TOLERANCE,
+            ftol=tolerance,
             xtol=None,
             gtol=None,
             max_nfev=_EVALUATIONS,

@@ -1,6 +1,6 @@
 """Initial values of a structured model: modes from a modal test, and a linear regression for the nonlinear element."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ Float = NDArray[np.float64]
 
 _LOWEST, _HIGHEST = 0.2, 6.0
 """Lines of the regression, relative to the frequency of the mode."""
-_POSITIONS = np.linspace(-1.0, 1.0, 401)
+_POSITIONS = np.linspace(-1.0, 1.0, 21)
 """Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
 _RESIDUAL_DAMPING = 0.02
 _SMALLEST_ROOT = 1e-3
@@ -87,12 +87,12 @@ def with_element(
     parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
     rms = float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
     omega = linear.omega.copy()
-    found = [_regression(parts, position * rms, springs, dampers) for position in _POSITIONS]
-    unbalanced = [
-        abs(parts[0].mean_force(position * rms, law, springs, omega[mode]))
-        for position, law in zip(_POSITIONS, found, strict=True)
-    ]
-    law = found[int(np.argmin(unbalanced))]
+
+    def unbalanced(position: float) -> float:
+        law = _regression(parts, position, springs, dampers)
+        return parts[0].mean_force(position, law, springs, omega[mode])
+
+    law = _regression(parts, _root(unbalanced, _POSITIONS * rms), springs, dampers)
     omega[mode] = np.sqrt(max(omega[mode] ** 2 + law[-1], 0.25 * omega[mode] ** 2))
     least = (_SMALLEST_ROOT * 2.0 * linear.damping_ratio[mode] * omega[mode]) / shape**2
     direction = np.zeros(len(omega))
@@ -105,6 +105,19 @@ def with_element(
         reach=reach,
     )
     return replace(linear, frequency_hz=omega / (2.0 * np.pi), elements=(element,))
+
+
+def _root(function: Callable[[float], float], places: Float) -> float:
+    """Return the root nearest to zero between two of the places; without a change of sign the place of the least value."""
+    from scipy.optimize import brentq  # only on use: it takes long to load
+
+    values = np.array([function(float(place)) for place in places])
+    crossings = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
+    if not crossings.size:
+        return float(places[np.argmin(np.abs(values))])
+    middles = 0.5 * (places[crossings] + places[crossings + 1])
+    at = crossings[np.argmin(np.abs(middles))]
+    return float(brentq(function, places[at], places[at + 1], rtol=1e-6))
 
 
 def _modal_spectra(linear: StructuredModel, experiment: Experiment, modes: int) -> tuple[Complex, Complex, Float]:
