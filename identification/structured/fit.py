@@ -73,6 +73,9 @@ def fit_structured(
 ) -> StructuredFit:
     """Fit a structured model with one nonlinear element whose direction is free.
 
+    Derivatives of all samples that count are held at once: some 32 bytes for each sample, output and free number, 30 MB for two
+    realisations of 8000 samples with three outputs.
+
     Parameters
     ----------
     modes
@@ -91,7 +94,7 @@ def fit_structured(
     Raises
     ------
     IdentificationError
-        If experiments differ in channels or rate, have no force, or do not match the modes.
+        If experiments differ in channels or rate, have no force, do not match the modes, or do not begin at rest.
     """
     began = time.perf_counter()
     same_channels(experiments)
@@ -99,6 +102,11 @@ def fit_structured(
     if [channel.role for channel in first.input_channels] != ["force"]:
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in first.input_channels)
         raise IdentificationError(f"inputs: are {names}, needs one force alone")
+    for number, experiment in enumerate(experiments):
+        if experiment.initial_state != "zero":
+            raise IdentificationError(
+                f"experiments[{number}].initial_state: is '{experiment.initial_state}', allowed is zero, a run from rest"
+            )
     if springs < 1 or dampers < 0:
         raise IdentificationError(f"springs, dampers: are {springs} and {dampers}, allowed are from 1 and from 0")
     linear = linear_start(modes, first, steps)

@@ -107,6 +107,7 @@ def test_standard_errors_hold_white_noise():
             {},
             r"inputs: are volts \(monitor\), needs one force",
         ),
+        ({"initial_state": "estimated"}, {}, r"experiments\[0\].initial_state: is 'estimated', allowed is zero"),
         ({"period_samples": 0}, {}, r"experiments: none is periodic, needs one at least"),
         ({}, {"springs": 0}, r"springs, dampers: are 0 and 1, allowed are from 1 and from 0"),
         ({}, {"steps": 0}, r"steps: is 0, allowed is 1 or above"),
