@@ -42,6 +42,7 @@ def test_the_shipped_modal_test_finds_the_modes_of_the_virtual_rig(name: str, le
     assert np.abs(shapes).max() < 5e-3
 
 
+@pytest.mark.slow
 def test_ten_times_the_noise_leaves_a_complete_test_and_modes_within_their_errors() -> None:
     modes = modal_test("friction-beam", 0.02, noise_scale=10.0)
     frequency, damping, shapes = against_truth("friction-beam", modes)

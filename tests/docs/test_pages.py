@@ -93,6 +93,7 @@ def followed(tmp_path_factory):
 
 SLOW = (
     "README.md",
+    "docs/explanation/structured-models.md",
     *(
         f"docs/how-to/{name}.md"
         for name in ("tune-a-rig", "rehearse-a-plan", "protect-a-fragile-specimen", "predict-with-a-pnlss-model")

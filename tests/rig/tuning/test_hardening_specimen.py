@@ -73,6 +73,7 @@ def bench():
     )
 
 
+@pytest.mark.slow
 def test_every_point_of_a_hardening_beam_is_accepted_and_on_the_curve_of_harmonic_balance(bench, tmp_path):
     tuned = tune(bench, tmp_path / "test.h5")
     plan = tuned.plan
