@@ -9,6 +9,7 @@ from identification import Channel, IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
 from identification.structured.fit import fit_structured
+from identification.structured.parameters import Parameters
 from tests.identification.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
 
 ELEMENT = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, spring_n=[3.0, 1.5, 0.5, 0.2], damper_n_s_m=[0.4])
@@ -128,3 +129,19 @@ def test_an_output_that_is_zero_is_refused():
     silent = replace(experiment(), outputs=experiment().outputs * [[1.0], [0.0], [1.0]])
     with pytest.raises(IdentificationError, match=r"output 'tip': is zero throughout the training data; leave it out"):
         fit_structured(linear_modes(TRUE, 1), [silent])
+
+
+def test_at_the_minimum_the_residual_is_orthogonal_to_all_derivatives():
+    data = [experiment(noise=0.01, seed=1), experiment(noise=0.01, seed=2, rms_n=1.0)]
+    found = fit_structured(linear_modes(TRUE, 1), data, support=False)
+    parameters = Parameters(found.start, (0,), False)
+    scale = np.sqrt(np.mean(np.concatenate([one.counted_outputs for one in data], axis=1) ** 2, axis=1))
+    rows, residuals = [], []
+    for one in data:
+        outputs, derivatives = parameters.derivatives(found.model, one.inputs, one.counted_from)
+        rows.append((derivatives / scale[:, None]).reshape(-1, found.values.size))
+        residuals.append(((outputs - one.counted_outputs.T) / scale).ravel())
+    jacobian, residual = np.concatenate(rows), np.concatenate(residuals)
+    assert found.training_error == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-9)
+    cosines = jacobian.T @ residual / (np.linalg.norm(jacobian, axis=0) * np.linalg.norm(residual))
+    assert np.max(np.abs(cosines)) < 0.01
