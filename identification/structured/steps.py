@@ -1,4 +1,4 @@
-"""Compiled run of a structured model: implicit midpoint rule with discrete gradients, and its exact sensitivities.
+"""Compiled run of a structured model: implicit midpoint rule with discrete gradients.
 
 A step of length h from (q, v) has the mean velocity V and the end ``q + h V``, ``2 V - v``:
 
@@ -20,7 +20,7 @@ from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 __all__ = ["Room", "System", "accelerate", "along", "end_step", "rigidity", "run", "solve", "take_input", "take_step"]
 
-NEWTON = 40
+NEWTON = 40  # iterations at most; one that has not ended then is not told
 EXACT = 1e-13  # relative change of w that ends Newton's iteration
 
 
