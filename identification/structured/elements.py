@@ -1,27 +1,35 @@
-"""Nonlinear elements of a structured model: a spring and a damper along a direction in the space of the modes."""
+"""Nonlinear elements of a structured model: laws along a direction in the space of the modes, and their tables."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.structured.laws import Damper, Joint, Law, Spring
 from identification.validation import finite_array, positive
 
-__all__ = ["NonlinearElement"]
+__all__ = ["NonlinearElement", "Tables", "changes_of", "tables_of"]
 
 Float = NDArray[np.float64]
+
+NODES = 513
+"""Nodes of a table. Between them a cubic follows a polynomial of degree 5 to 1e-8 of its largest force."""
+_DELTA = 1e-5
+"""Distance of the two forces that give the slope at a node, relative to the reach."""
+_NUDGE = 1e-4
+"""Step of the central differences by the numbers of a law; exact where the law is linear in them, else 1e-8."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NonlinearElement:
-    """A nonlinear spring with a damper beside it.
+    """Springs, dampers and joints that act on one displacement.
 
-    With the element's displacement ``z = direction . q`` relative to its scale, ``x = z / scale_m``, the force on the element
-    is ``sum_k spring_n[k] x^(k+2) + (sum_j damper_n_s_m[j] |x|^(j+1)) dz/dt``. The linear part of spring and damper belongs to
-    the modes. Beyond ``|x| = reach`` the damping is constant, and the spring goes on as a straight line with the slope that it
-    has there, but at least minus half of the structure's static stiffness in this direction (divided by the number of
-    elements): the potential energy is bounded below in every direction.
+    With the element's displacement ``z = direction . q`` relative to its scale, ``x = z / scale_m``, the forces of all laws add
+    up (`identification.structured.laws`). Beyond ``|x| = reach`` dampers stay constant, and springs go on as straight lines with
+    the slope that they have there, within limits that `StructuredModel` states.
 
     Parameters
     ----------
@@ -29,34 +37,29 @@ class NonlinearElement:
         float[n_modes], displacement of the element per modal coordinate, kg^-1/2.
     scale_m
         Displacement for which x is 1.
-    spring_n
-        float[...], coefficients of ``x^2``, ``x^3``, ..., N.
-    damper_n_s_m
-        float[...], coefficients of ``|x|``, ``|x|^2``, ..., N s/m, none below zero.
+    laws
+        Springs, dampers and joints.
     reach
-        Largest ``|x|`` of the polynomials.
+        Largest ``|x|`` of springs and dampers.
 
     Raises
     ------
     IdentificationError
-        If a number is not finite, a damping is below zero, or scale or reach are not above zero.
+        If a number is not finite, a damping is below zero, there is no law, or scale or reach are not above zero.
     """
 
     direction: Float
     scale_m: float
-    spring_n: Float
-    damper_n_s_m: Float
+    laws: tuple[Law, ...]
     reach: float = 3.0
 
     def __post_init__(self) -> None:
-        for name in ("direction", "spring_n", "damper_n_s_m"):
-            object.__setattr__(self, name, finite_array(f"element: {name}", getattr(self, name), np.float64, 1))
+        object.__setattr__(self, "direction", finite_array("element: direction", self.direction, np.float64, 1))
+        object.__setattr__(self, "laws", tuple(self.laws))
         for name in ("scale_m", "reach"):
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
-        if np.any(self.damper_n_s_m < 0.0):
-            raise IdentificationError(
-                f"element: damper_n_s_m is {self.damper_n_s_m.tolist()}, allowed are numbers from 0: it must not do work"
-            )
+        if not self.laws:
+            raise IdentificationError("element: laws is empty, needs one at least")
 
     @property
     def phi(self) -> Float:
@@ -64,6 +67,132 @@ class NonlinearElement:
         return np.asarray(self.direction / self.scale_m)
 
     @property
-    def law(self) -> Float:
-        """float[...]: coefficients of spring and damper as functions of x, J and J s."""
-        return np.concatenate([self.spring_n * self.scale_m, self.damper_n_s_m * self.scale_m**2])
+    def nodes(self) -> Float:
+        """float[NODES]: the displacements x of the tables."""
+        return np.linspace(-self.reach, self.reach, NODES)
+
+    def spring(self, laws: Sequence[Law]) -> Float:
+        """float[3, NODES]: force (J), slope times distance of the nodes (J) and potential (J) of the springs among ``laws``."""
+        table, x = np.zeros((3, NODES)), self.nodes
+        distance, near = 2.0 * self.reach / (NODES - 1), _DELTA * self.reach
+        for law in laws:
+            if isinstance(law, Spring):
+                table[0] += law.force(x)
+                table[1] += (law.force(x + near) - law.force(x - near)) * (0.5 * distance / near)
+        force, slope = table[:2]
+        cells = distance * (0.5 * (force[1:] + force[:-1]) + (slope[:-1] - slope[1:]) / 12.0)
+        middle = NODES // 2
+        table[2, middle + 1 :] = np.cumsum(cells[middle:])
+        table[2, :middle] = -np.cumsum(cells[:middle][::-1])[::-1]
+        return np.asarray(table * self.scale_m)
+
+    def damper(self, laws: Sequence[Law]) -> Float:
+        """float[NODES]: damping of the dampers among ``laws``, J s."""
+        found = np.zeros(NODES)
+        for law in laws:
+            if isinstance(law, Damper):
+                found = found + law.damping(self.nodes)
+        return np.asarray(found * self.scale_m**2)
+
+    def sliders(self, laws: Sequence[Law]) -> Float:
+        """float[n_sliders, 2]: stiffness and largest force of the sliders of the joints among ``laws``, J."""
+        found = [law.sliders().T for law in laws if isinstance(law, Joint)]
+        return np.concatenate([np.zeros((0, 2)), *found]) * self.scale_m
+
+
+class Tables(NamedTuple):
+    """What the kernels know of all elements."""
+
+    springs: np.ndarray
+    """float[n_elements, 3, NODES]."""
+    dampers: np.ndarray
+    """float[n_elements, NODES]."""
+    limits: np.ndarray
+    """float[n_elements, 3]: reach, and slopes of the springs below and above it."""
+    sliders: np.ndarray
+    """float[n_sliders, 2]: stiffness and largest force."""
+    first: np.ndarray
+    """int[n_elements + 1]: first slider of every element."""
+
+
+class Changes(NamedTuple):
+    """Derivatives of `Tables` by the numbers of the laws: first those of all springs, then of dampers, then of joints."""
+
+    element: np.ndarray
+    """int[P]: element of each number."""
+    springs: np.ndarray
+    """float[P_springs, 3, NODES]."""
+    limits: np.ndarray
+    """float[P_springs, 3]: the reach, and derivatives of the slopes."""
+    dampers: np.ndarray
+    """float[P_dampers, NODES]."""
+    sliders: np.ndarray
+    """float[P_joints, n_sliders, 2]."""
+
+
+def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Float) -> Tables:
+    """Return the tables; ``softest`` and ``stiffest``, float[n_elements], limit the slopes (J) beyond the reach."""
+    springs = np.array([element.spring(element.laws) for element in elements]).reshape(-1, 3, NODES)
+    sliders = [element.sliders(element.laws) for element in elements]
+    limits = [
+        [element.reach, *np.clip(_end_slopes(element, table), least, most)]
+        for element, table, least, most in zip(elements, springs, softest, stiffest, strict=True)
+    ]
+    return Tables(
+        springs=springs,
+        dampers=np.array([element.damper(element.laws) for element in elements]).reshape(-1, NODES),
+        limits=np.array(limits).reshape(-1, 3),
+        sliders=np.concatenate([np.zeros((0, 2)), *sliders]),
+        first=np.cumsum([0, *map(len, sliders)]),
+    )
+
+
+def _end_slopes(element: NonlinearElement, table: Float) -> Float:
+    return np.asarray(table[1, [0, -1]] * (NODES - 1) / (2.0 * element.reach))
+
+
+def laws_in_order(elements: Sequence[NonlinearElement]) -> list[tuple[int, int]]:
+    """Elements and laws in the order of their numbers: springs, then dampers, then joints."""
+    return [
+        (e, number)
+        for family in (Spring, Damper, Joint)
+        for e, element in enumerate(elements)
+        for number, law in enumerate(element.laws)
+        if isinstance(law, family)
+    ]
+
+
+def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
+    """Return the derivatives of `tables_of` by the numbers of the laws."""
+    owner, springs, limits, dampers, sliders = [], [], [], [], []
+    for e, number in laws_in_order(elements):
+        element, law = elements[e], elements[e].laws[number]
+        begin = int(tables.first[e]) + sum(len(element.sliders([other])) for other in element.laws[:number])
+        for k in range(law.vector.size):
+            less, more = (_nudged(law, k, sign) for sign in (-1.0, 1.0))
+            owner.append(e)
+            if isinstance(law, Spring):
+                change = (element.spring([more]) - element.spring([less])) / (2.0 * _NUDGE)
+                inside = np.isclose(_end_slopes(element, tables.springs[e]), tables.limits[e, 1:], rtol=1e-12, atol=0.0)
+                springs.append(change)
+                limits.append([element.reach, *(_end_slopes(element, change) * inside)])
+            elif isinstance(law, Damper):
+                dampers.append((element.damper([more]) - element.damper([law])) / _NUDGE)  # linear; less may be below zero
+            else:
+                change = np.zeros_like(tables.sliders)
+                moved = (element.sliders([more]) - element.sliders([less])) / (2.0 * _NUDGE)
+                change[begin : begin + len(moved)] = moved
+                sliders.append(change)
+    return Changes(
+        element=np.array(owner, dtype=np.int64),
+        springs=np.array(springs).reshape(-1, 3, NODES),
+        limits=np.array(limits).reshape(-1, 3),
+        dampers=np.array(dampers).reshape(-1, NODES),
+        sliders=np.array(sliders).reshape(len(sliders), len(tables.sliders), 2),
+    )
+
+
+def _nudged(law: Law, number: int, sign: float) -> Law:
+    vector = law.vector
+    vector[number] += sign * _NUDGE
+    return law.moved(vector)

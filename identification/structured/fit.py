@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,11 @@ from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.pnlss.experiment import Experiment, same_channels
 from identification.pnlss.fitting.threads import threads
+from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
+from identification.structured.leading import Lead
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
-from identification.structured.start import linear_start, with_element
+from identification.structured.start import linear_start, measured_velocity, with_element
 
 __all__ = ["StructuredFit", "fit_structured"]
 
@@ -24,6 +27,8 @@ Float = NDArray[np.float64]
 _ROUGH, _FINE = 1e-3, 1e-6
 """Relative gains of a step below which the fit before the last one, and the last one, end."""
 _EVALUATIONS = 100
+_LEADS = (0.05, 0.01)
+"""Damping ratios of the forces that lead the measured modes in the first fits."""
 _SUPPORT = 0.03
 """Initial stiffness of the support relative to the first mode's at the drive point."""
 
@@ -67,8 +72,7 @@ def fit_structured(
     modes: LinearModes,
     experiments: Sequence[Experiment],
     *,
-    springs: int = 4,
-    dampers: int = 1,
+    laws: Sequence[Law] = (PolynomialSpring(), PolynomialDamper()),
     reach: float = 3.0,
     support: bool = True,
     steps: int = 2,
@@ -84,8 +88,9 @@ def fit_structured(
         Linear modes at a low level, of the same channels.
     experiments
         Training data with one force as input; one at least is periodic. All are simulated from rest.
-    springs, dampers
-        Numbers of coefficients of the element: powers 2 to ``springs + 1`` and 1 to ``dampers`` of its displacement.
+    laws
+        Laws of the element (`identification.structured.laws`): what they declare as linear and as tried gets initial values
+        from the data.
     reach
         Largest displacement of the laws relative to the largest of the mode in the training data.
     support
@@ -109,20 +114,23 @@ def fit_structured(
             raise IdentificationError(
                 f"experiments[{number}].initial_state: is '{experiment.initial_state}', allowed is zero, a run from rest"
             )
-    if springs < 1 or dampers < 0:
-        raise IdentificationError(f"springs, dampers: are {springs} and {dampers}, allowed are from 1 and from 0")
+    if not laws:
+        raise IdentificationError("laws: is empty, needs one at least")
     linear = linear_start(modes, first, steps)
-    start = with_element(linear, experiments, len(modes.frequency_hz), springs, dampers, reach)
+    start = with_element(linear, experiments, len(modes.frequency_hz), laws, reach)
     start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     tied = (find_role(first.output_channels, "drive"),)
-    problem = _Problem(Parameters(start, tied, False), experiments)
-    vector, evaluations = problem.solve(problem.parameters.vector(start), _ROUGH if support else _FINE)
-    if support:
-        found = problem.parameters.model(vector)
-        stiffness = _SUPPORT * (found.omega[0] / found.input_shapes[0, 0]) ** 2
-        problem = _Problem(Parameters(start, tied, True), experiments)
-        again = problem.parameters.vector(replace(found, support_n_m=stiffness))
-        vector, more = problem.solve(again, _FINE)
+    stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2 if support else 0.0
+    start = replace(start, support_n_m=stiffness)
+    parameters, evaluations = Parameters(start, tied, support), 0
+    vector = parameters.vector(start)
+    velocities = [measured_velocity(linear, e, len(modes.frequency_hz)) if e.period_samples else None for e in experiments]
+    before = 2.0 * _LEADS[0] * linear.omega * (np.arange(len(linear.omega)) < len(modes.frequency_hz))
+    for ratio in (*_LEADS, 0.0):
+        rate = before * ratio / _LEADS[0]
+        leads = [None if velocity is None else Lead(before, rate, velocity) for velocity in velocities]
+        problem = _Problem(parameters, experiments, leads)
+        vector, more = problem.solve(vector, _ROUGH if ratio else _FINE)
         evaluations += more
     triangle = problem.triangle(vector)
     jacobian, residual = triangle[:, :-1], triangle[:, -1]
@@ -148,8 +156,11 @@ class _Problem:
     scalar products of the samples, and give the same steps.
     """
 
-    def __init__(self, parameters: Parameters, experiments: Sequence[Experiment]) -> None:
+    def __init__(
+        self, parameters: Parameters, experiments: Sequence[Experiment], leads: Sequence[Lead | None] | None = None
+    ) -> None:
         self.parameters, self.experiments, self.stopped = parameters, experiments, ""
+        self.leads = leads or [None] * len(experiments)
         outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
         self.count = outputs.size
         self._scale = np.sqrt(np.mean(outputs**2, axis=1))
@@ -165,13 +176,13 @@ class _Problem:
         if self._known is None or self._known[0] != vector.tobytes():
             model = self.parameters.model(vector)
             with threads() as count, ThreadPoolExecutor(count) as pool:
-                parts = list(pool.map(lambda experiment: self._of_one(model, experiment), self.experiments))
+                parts = list(pool.map(partial(self._of_one, model), self.experiments, self.leads))
             self._known = vector.tobytes(), _triangle(np.concatenate(parts))
         return self._known[1]
 
-    def _of_one(self, model: StructuredModel, experiment: Experiment) -> Float:
+    def _of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
         weight = np.sqrt(experiment.weight) / self._scale
-        found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from)
+        found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, lead)
         residual = (found - experiment.counted_outputs.T)[..., None]
         both = np.concatenate([derivatives, residual], axis=2) * weight[:, None]
         return _triangle(both.reshape(-1, both.shape[2]))

@@ -1,117 +1,371 @@
-"""Compiled laws of nonlinear elements: a polynomial spring and a damper, over a displacement without unit."""
+"""Laws of nonlinear elements: springs, dampers, and joints with memory, each one declaration.
 
-import math
+All take the displacement without unit, ``x = z / scale_m`` of their element, at which 1 is the largest displacement in the
+training data, and give newtons (dampers N s/m). What a law declares: its numbers, how a fit moves them (`free`), and a function
+of x.
+"""
+
+import importlib
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from itertools import product
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vibrolock.compiled import inner_kernel
+from identification.errors import IdentificationError
 
-__all__ = ["damping_basis", "damping_of", "element_basis", "element_force", "spring_basis", "spring_of"]
+__all__ = [
+    "LAWS",
+    "Damper",
+    "Iwan",
+    "Jenkins",
+    "Joint",
+    "Law",
+    "MagnetSpring",
+    "PolynomialDamper",
+    "PolynomialSpring",
+    "SplineSpring",
+    "Spring",
+    "Stop",
+    "UserSpring",
+    "law_from_dict",
+]
 
-NEAR = 1e-3  # of the reach: over shorter ways the mean force is that of two Gauss points, which is exact to rounding
-GAUSS = 0.5 - 0.5 / math.sqrt(3.0)
+Float = NDArray[np.float64]
+
+_MAGNET_REACH = 0.8
+"""Share of a magnet's gap beyond which its force goes on as a straight line."""
 
 
-@inner_kernel
-def polynomial(x: float, law: np.ndarray, springs: int) -> tuple[float, float]:
-    """Return ``sum_k a_k x^(k+2)`` and its slope."""
-    value, slope = 0.0, 0.0
-    for k in range(springs - 1, -1, -1):
-        slope = slope * x + value
-        value = value * x + law[k]
-    return x * x * value, 2.0 * x * value + x * x * slope
+class Way(NamedTuple):
+    """How a fit moves a number: to a number without limits, and back."""
+
+    to: Callable[[Float], Float]
+    back: Callable[[Float], Float]
+    allowed: str
+    least: float = -np.inf
+    """Least value of what the fit moves."""
 
 
-@inner_kernel
-def spring_of(x: float, law: np.ndarray, springs: int, reach: float, softest: float) -> tuple[float, float, float]:
-    """Return force, slope and potential at ``x``: a polynomial up to +-``reach``, a line beyond it.
+def _between(low: float, high: float) -> Way:
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    return Way(
+        lambda y: np.arctanh((y - middle) / half),
+        lambda v: middle + half * np.tanh(np.clip(v, -8.0, 8.0)),
+        f"between {low:g} and {high:g}",
+    )
 
-    The slope of the line is that of the polynomial at its end, at least ``softest``.
+
+PLAIN = Way(lambda y: y, lambda v: v, "finite numbers")
+POSITIVE = Way(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0")
+FROM_ZERO = Way(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A law of force."""
+
+    kind: ClassVar[str]
+    """Name of the law in files and commands."""
+    free: ClassVar[Mapping[str, Way]]
+    """Numbers that a fit moves, and how."""
+    linear: ClassVar[str] = ""
+    """Those in which the law is linear. A regression finds their initial values."""
+    tried: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+    """Values of other numbers that the regression tries."""
+
+    def __post_init__(self) -> None:
+        for name, way in self.free.items():
+            values = np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64))
+            with np.errstate(all="ignore"):
+                allowed = np.all(np.isfinite(way.to(values)))
+            if not allowed:
+                raise IdentificationError(f"{self.kind}: {name} is {values.tolist()}, allowed are {way.allowed}")
+            if isinstance(getattr(self, name), (list, np.ndarray)):
+                object.__setattr__(self, name, tuple(values.tolist()))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the numbers that a fit moves."""
+        out: list[str] = []
+        for name in self.free:
+            value = getattr(self, name)
+            out += [f"{self.kind} {name}[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [f"{self.kind} {name}"]
+        return tuple(out)
+
+    @property
+    def vector(self) -> Float:
+        """float[P], the numbers as a fit moves them."""
+        parts = [way.to(np.atleast_1d(np.asarray(getattr(self, name), float))) for name, way in self.free.items()]
+        return np.concatenate(parts)
+
+    @property
+    def least(self) -> Float:
+        """float[P], least values of `vector`."""
+        sizes = [np.size(getattr(self, name)) for name in self.free]
+        return np.repeat([way.least for way in self.free.values()], sizes)
+
+    def moved(self, vector: Float) -> Self:
+        """Invert `vector`."""
+        at, changes = 0, {}
+        for name, way in self.free.items():
+            value = getattr(self, name)
+            count = len(value) if isinstance(value, tuple) else 1
+            found = way.back(np.asarray(vector[at : at + count], dtype=np.float64))
+            changes[name] = tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])
+            at += count
+        return replace(self, **changes)
+
+    def candidates(self) -> list[Self]:
+        """Return the law with all combinations of the numbers that a regression tries."""
+        ways = [[(name, value) for value in values] for name, values in self.tried.items()]
+        return [replace(self, **dict(way)) for way in product(*ways)]
+
+    def basis(self) -> list[Self]:
+        """Return the law with one of its linear numbers at 1 and the others at 0, for each."""
+        value = getattr(self, self.linear)
+        if not isinstance(value, tuple):
+            return [replace(self, **{self.linear: 1.0})]
+        return [replace(self, **{self.linear: tuple(row)}) for row in np.eye(len(value)).tolist()]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what a file holds."""
+        return {"kind": self.kind} | {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+class Spring(Law):
+    """A force without memory that depends on the displacement."""
+
+    @abstractmethod
+    def force(self, x: Float) -> Float:
+        """Return the force at ``x``, N."""
+
+
+class Damper(Law):
+    """A damping that depends on the displacement."""
+
+    @abstractmethod
+    def damping(self, x: Float) -> Float:
+        """Return the damping at ``x``, N s/m, nowhere below zero."""
+
+
+class Joint(Law):
+    """A force with memory: Jenkins sliders side by side.
+
+    They stand beside the linear part, which is that of the structure with all sliders slipping.
     """
-    inside = min(max(x, -reach), reach)
-    force, slope = polynomial(inside, law, springs)
-    potential = 0.0
-    for k in range(springs - 1, -1, -1):
-        potential = potential * inside + law[k] / (k + 3)
-    potential *= inside * inside * inside
-    beyond = x - inside
-    if beyond != 0.0:
-        slope = max(slope, softest)
-        potential += beyond * (force + 0.5 * slope * beyond)
-        force += slope * beyond
-    return force, slope, potential
+
+    @abstractmethod
+    def sliders(self) -> Float:
+        """float[2, n]: stiffness (N per unit of x) and largest force (N) of each slider."""
 
 
-@inner_kernel
-def spring_basis(x: float, k: int, law: np.ndarray, springs: int, reach: float, softest: float) -> tuple[float, float]:
-    """Return derivatives of force and potential at ``x`` by the coefficient ``k``."""
-    inside = min(max(x, -reach), reach)
-    beyond = x - inside
-    force, potential = inside ** (k + 2), inside ** (k + 3) / (k + 3)
-    if beyond != 0.0:
-        slope = (k + 2) * inside ** (k + 1)
-        if polynomial(inside, law, springs)[1] < softest:
-            slope = 0.0
-        potential += beyond * (force + 0.5 * slope * beyond)
-        force += slope * beyond
-    return force, potential
+@dataclass(frozen=True, eq=False)
+class PolynomialSpring(Spring):
+    """``sum_k c_k x^(k+2)``."""
+
+    kind = "polynomial-spring"
+    free: ClassVar = {"coefficients_n": PLAIN}
+    linear = "coefficients_n"
+
+    coefficients_n: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    """Coefficients of the square, the cube, ..., N."""
+
+    def force(self, x: Float) -> Float:
+        """Return the force at ``x``, N."""
+        return np.asarray(np.polynomial.polynomial.polyval(x, [0.0, 0.0, *self.coefficients_n]))
 
 
-@inner_kernel
-def damping_of(x: float, law: np.ndarray, springs: int, reach: float) -> tuple[float, float]:
-    """Return the damping ``sum_j g_j |x|^(j+1)`` and its slope by x, constant beyond the reach."""
-    size = min(abs(x), reach)
-    value, slope = 0.0, 0.0
-    for j in range(law.size - springs - 1, -1, -1):
-        slope = slope * size + value
-        value = value * size + law[springs + j]
-    slope = value + size * slope
-    if abs(x) > reach:
-        slope = 0.0
-    return size * value, math.copysign(slope, x)
+@dataclass(frozen=True, eq=False)
+class SplineSpring(Spring):
+    """A cubic spline, given by its second derivative at knots; force and slope are zero at rest."""
+
+    kind = "spline-spring"
+    free: ClassVar = {"curvatures_n": PLAIN}
+    linear = "curvatures_n"
+
+    curvatures_n: tuple[float, ...] = (0.0,) * 7
+    """Second derivative by x at the knots, N."""
+    knots: tuple[float, ...] = (-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0)
+    """Displacements x, rising. Beyond the first and the last one the curvature stays."""
+
+    def force(self, x: Float) -> Float:
+        """Return the force at ``x``, N."""
+        from scipy.interpolate import make_interp_spline  # only on use: it takes long to load
+
+        far = 10.0 * max(map(abs, self.knots))
+        knots = np.array([-far, *self.knots, far])
+        curvatures = np.array([self.curvatures_n[0], *self.curvatures_n, self.curvatures_n[-1]])
+        slope = make_interp_spline(knots, curvatures, k=1).antiderivative()
+        integral = slope.antiderivative()
+        return np.asarray(integral(x) - integral(0.0) - slope(0.0) * x)
 
 
-@inner_kernel
-def damping_basis(x: float, j: int, reach: float) -> float:
-    """Return the derivative of the damping at ``x`` by its coefficient ``j``."""
-    return float(min(abs(x), reach) ** (j + 1))
+@dataclass(frozen=True, eq=False)
+class Stop(Spring):
+    """An elastic stop beyond a gap, on one side or on both: ``k (x - gap)``."""
+
+    kind = "stop"
+    free: ClassVar = {"stiffness_n": POSITIVE, "gap": POSITIVE}
+    linear = "stiffness_n"
+    tried: ClassVar = {"gap": (0.1, 0.2, 0.35, 0.5, 0.65, 0.8)}
+
+    stiffness_n: float = 1.0
+    """Stiffness of the contact, N per unit of x."""
+    gap: float = 0.5
+    """Displacement x at which contact begins."""
+    sides: str = "above"
+    """``above``, ``below`` or ``both``."""
+
+    def force(self, x: Float) -> Float:
+        """Return the force at ``x``, N."""
+        above = np.maximum(x - self.gap, 0.0) if self.sides != "below" else 0.0
+        below = np.minimum(x + self.gap, 0.0) if self.sides != "above" else 0.0
+        return np.asarray(self.stiffness_n * (above + below))
 
 
-@inner_kernel
-def element_force(
-    z: float, w: float, h: float, law: np.ndarray, springs: int, reach: float, softest: float
-) -> tuple[float, float, float]:
-    """Return the mean force over a step, and its derivatives by ``z`` and by ``w``."""
-    end = z + h * w
-    middle = z + 0.5 * h * w
-    if abs(end - z) > NEAR * reach:
-        first, _, before = spring_of(z, law, springs, reach, softest)
-        last, _, after = spring_of(end, law, springs, reach, softest)
-        mean = (after - before) / (end - z)
-        by_z = (last - first) / (end - z)
-        by_end = (last - mean) / (end - z)
-    else:
-        first, steep_first, _ = spring_of(z + GAUSS * (end - z), law, springs, reach, softest)
-        last, steep_last, _ = spring_of(end - GAUSS * (end - z), law, springs, reach, softest)
-        mean, by_z = 0.5 * (first + last), 0.5 * (steep_first + steep_last)
-        by_end = 0.5 * (GAUSS * steep_first + (1.0 - GAUSS) * steep_last)
-    damping, steep = damping_of(middle, law, springs, reach)
-    return mean + damping * w, by_z + steep * w, h * by_end + damping + 0.5 * h * steep * w
+@dataclass(frozen=True, eq=False)
+class MagnetSpring(Spring):
+    """A magnet that faces another one: ``a ((1 - x/gap)^-4 - 1 - 4 x/gap)``, without its linear part.
+
+    Beyond 0.8 of the gap the force goes on as a straight line. A positive gap lies above, a negative one below.
+    """
+
+    kind = "magnet"
+    free: ClassVar = {"strength_n": PLAIN, "gap": PLAIN}
+    linear = "strength_n"
+    tried: ClassVar = {"gap": (-8.0, -4.0, -2.0, -1.4, 1.4, 2.0, 4.0, 8.0)}
+
+    strength_n: float = 0.1
+    """Force a between the magnets at rest, N; above zero they repel each other."""
+    gap: float = 4.0
+    """Gap at rest, in units of x."""
+
+    def force(self, x: Float) -> Float:
+        """Return the force at ``x``, N."""
+        share = x / self.gap
+        near = np.minimum(share, _MAGNET_REACH)
+        open_ = 1.0 - near
+        along = open_**-4.0 + 4.0 * open_**-5.0 * (share - near)
+        return np.asarray(np.sign(self.gap) * self.strength_n * (along - 1.0 - 4.0 * share))
 
 
-@inner_kernel
-def element_basis(
-    z: float, w: float, h: float, k: int, law: np.ndarray, springs: int, reach: float, softest: float
-) -> float:
-    """Return the derivative of the mean force by the number ``k`` of the law."""
-    end = z + h * w
-    middle = z + 0.5 * h * w
-    if k >= springs:
-        return damping_basis(middle, k - springs, reach) * w
-    if abs(end - z) > NEAR * reach:
-        before = spring_basis(z, k, law, springs, reach, softest)[1]
-        after = spring_basis(end, k, law, springs, reach, softest)[1]
-        return (after - before) / (end - z)
-    first = spring_basis(z + GAUSS * (end - z), k, law, springs, reach, softest)[0]
-    last = spring_basis(end - GAUSS * (end - z), k, law, springs, reach, softest)[0]
-    return 0.5 * (first + last)
+@dataclass(frozen=True, eq=False)
+class UserSpring(Spring):
+    """A function of the user's own, ``function(x, numbers)``, of arrays."""
+
+    kind = "user-spring"
+    free: ClassVar = {"numbers": PLAIN}
+
+    function: str
+    """``"module:name"``."""
+    numbers: tuple[float, ...]
+    """What the function is given, and what a fit moves."""
+
+    def force(self, x: Float) -> Float:
+        """Return the force at ``x``, N."""
+        module, _, name = self.function.partition(":")
+        try:
+            function = getattr(importlib.import_module(module), name)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise IdentificationError(
+                f"user-spring: function is '{self.function}', allowed is 'module:name' of a function that can be imported ({error})"
+            ) from None
+        found = np.asarray(function(x, np.array(self.numbers)), dtype=np.float64)
+        if found.shape != np.shape(x) or not np.all(np.isfinite(found)):
+            raise IdentificationError(
+                f"user-spring: '{self.function}' gives {found.shape} values, allowed are finite ones, one for each x"
+            )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialDamper(Damper):
+    """``sum_j c_j |x|^(j+1)``."""
+
+    kind = "polynomial-damper"
+    free: ClassVar = {"coefficients_n_s_m": FROM_ZERO}
+    linear = "coefficients_n_s_m"
+
+    coefficients_n_s_m: tuple[float, ...] = (0.0,)
+    """Coefficients of the size, its square, ..., N s/m, none below zero."""
+
+    def damping(self, x: Float) -> Float:
+        """Return the damping at ``x``, N s/m."""
+        return np.asarray(np.polynomial.polynomial.polyval(np.abs(x), [0.0, *self.coefficients_n_s_m]))
+
+
+@dataclass(frozen=True, eq=False)
+class Jenkins(Joint):
+    """One slider: a spring in series with dry friction."""
+
+    kind = "jenkins"
+    free: ClassVar = {"stiffness_n": POSITIVE, "slip": POSITIVE}
+    linear = "stiffness_n"
+    tried: ClassVar = {"slip": (0.05, 0.1, 0.2, 0.4, 0.7)}
+
+    stiffness_n: float = 1.0
+    """Stiffness, N per unit of x."""
+    slip: float = 0.5
+    """Displacement x at which it slips."""
+
+    def sliders(self) -> Float:
+        """float[2, 1]: stiffness and largest force."""
+        return np.array([[self.stiffness_n], [self.stiffness_n * self.slip]])
+
+
+@dataclass(frozen=True, eq=False)
+class Iwan(Joint):
+    """Segalman's four-parameter Iwan joint (J. Appl. Mech. 72, 2005, 752), cut into sliders.
+
+    Stiffness density over the displacement of slip ``R phi^chi`` up to ``slip``, and an end slider with ``beta`` times the
+    stiffness of the density. In micro-slip the energy lost in a cycle grows with the amplitude to the power ``3 + chi``.
+    """
+
+    kind = "iwan"
+    free: ClassVar = {"stiffness_n": POSITIVE, "slip": POSITIVE, "chi": _between(-0.95, 2.0), "beta": POSITIVE}
+    linear = "stiffness_n"
+    tried: ClassVar = {"slip": (0.3, 1.0, 3.0, 10.0), "chi": (-0.5, 0.0, 0.5), "beta": (0.03, 0.3)}
+
+    stiffness_n: float = 1.0
+    """Stiffness while nothing slips, N per unit of x."""
+    slip: float = 1.0
+    """Displacement x at which all slips."""
+    chi: float = 0.0
+    """Exponent of the density."""
+    beta: float = 0.1
+    """Stiffness of the end slider over that of the density."""
+    count: int = 12
+    """Number of sliders of the density."""
+    smallest: float = 0.02
+    """Displacement below which nothing slips, over ``slip``."""
+
+    def sliders(self) -> Float:
+        """float[2, count + 1]: stiffness and largest force; exact in stuck stiffness and force at full slip."""
+        edges = np.concatenate([[0.0], np.geomspace(self.smallest, 1.0, self.count)])
+        share = np.diff(edges ** (self.chi + 1.0))
+        slip = (self.chi + 1.0) / (self.chi + 2.0) * np.diff(edges ** (self.chi + 2.0)) / share
+        stiffness = self.stiffness_n / (1.0 + self.beta) * np.append(share, self.beta)
+        return np.array([stiffness, stiffness * self.slip * np.append(slip, 1.0)])
+
+
+LAWS: dict[str, type[Law]] = {
+    law.kind: law
+    for law in (PolynomialSpring, SplineSpring, Stop, MagnetSpring, UserSpring, PolynomialDamper, Jenkins, Iwan)
+}
+"""All laws by their names."""
+
+
+def law_from_dict(numbers: Mapping[str, Any]) -> Law:
+    """Return the law of `Law.as_dict`; raise `IdentificationError` if there is none like it."""
+    kind = numbers.get("kind")
+    if kind not in LAWS:
+        raise IdentificationError(f"law: kind is {kind!r}, allowed are {', '.join(LAWS)}")
+    given = {name: tuple(v) if isinstance(v, list) else v for name, v in numbers.items() if name != "kind"}
+    try:
+        return LAWS[kind](**given)
+    except TypeError as error:
+        raise IdentificationError(f"law '{kind}': {error}") from None

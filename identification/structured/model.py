@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel
 from identification.errors import IdentificationError
-from identification.structured.elements import NonlinearElement
+from identification.structured.elements import NonlinearElement, tables_of
 from identification.structured.steps import Room, System, run
 from identification.validation import finite_array, positive
 
@@ -16,8 +16,8 @@ __all__ = ["Motion", "StructuredModel", "ends_of_steps", "room_for"]
 
 Float = NDArray[np.float64]
 
-_SOFTEST = -0.5
-"""Least slope of the springs beyond their reach, relative to the static stiffness in their direction, all springs together."""
+_SOFTEST, _STIFFEST = -0.5, 4.0
+"""Slopes of the springs beyond their reach, relative to the static stiffness in their direction, all elements together."""
 _WINDOW = ("kaiser", 8.0)
 
 
@@ -169,14 +169,9 @@ class StructuredModel:
     @property
     def system(self) -> System:
         """Numbers for the kernels."""
-        laws = [element.law for element in self.elements]
-        padded = np.zeros((len(laws), max((law.size for law in laws), default=1)))
-        for row, law in zip(padded, laws, strict=True):
-            row[: law.size] = law
-        phi = np.array([element.phi for element in self.elements]).reshape(len(laws), len(self.omega))
+        phi = np.array([element.phi for element in self.elements]).reshape(len(self.elements), len(self.omega))
         omega = 2.0 / self.step_s * np.tan(0.5 * self.omega * self.step_s)
-        softest = _SOFTEST / max(len(laws), 1) / np.sum((phi / omega) ** 2, axis=1)
-        reach = np.array([element.reach for element in self.elements])
+        static = 1.0 / (max(len(self.elements), 1) * np.sum((phi / omega) ** 2, axis=1))
         return System(
             step_s=self.step_s,
             steps=self.steps,
@@ -184,9 +179,7 @@ class StructuredModel:
             zeta=np.array(self.damping_ratio),
             b=np.array(self.input_shapes),
             phi=phi,
-            laws=padded,
-            sizes=np.array([[e.spring_n.size, e.law.size] for e in self.elements], dtype=np.int64).reshape(-1, 2),
-            limits=np.column_stack([reach, softest]),
+            tables=tables_of(self.elements, _SOFTEST * static, _STIFFEST * static),
             support=np.array(
                 [self.support_n_m, 2.0 * np.pi * self.support_corner_hz, self.support_largest_n],
             ),
@@ -199,14 +192,15 @@ class StructuredModel:
             raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
         system, modes = self.system, len(self.omega)
         states = np.zeros((u.shape[1], 3, modes))
-        run(system, room_for(system), ends_of_steps(u, self.steps), np.zeros(2 * modes + 1), states)
+        room = room_for(system)
+        run(system, room, ends_of_steps(u, self.steps), np.zeros(system.size), states)
         largest = np.max(np.abs(states[:, 0] @ system.phi.T), axis=0, initial=0.0)
         return Motion(
             outputs=outputs_of(self, u, states),
             displacement=states[:, 0].T,
             velocity=states[:, 1].T,
             acceleration=states[:, 2].T,
-            reach_use=np.asarray(largest / system.limits[:, 0]),
+            reach_use=np.asarray(largest / system.tables.limits[:, 0]),
         )
 
     def with_steps(self, steps: int) -> "StructuredModel":
@@ -220,8 +214,8 @@ def outputs_of(model: StructuredModel, u: Float, states: Float) -> Float:
     return np.asarray(np.einsum("kom,om->ok", motions, model.output_shapes) + model.direct @ u)
 
 
-def room_for(system: System) -> Room:
-    """Return room for the steps of a system."""
+def room_for(system: System, columns: int = 0) -> Room:
+    """Return room for the steps of a system, and for derivatives by ``columns`` numbers."""
     n, inputs, elements = len(system.omega), system.b.shape[1], len(system.phi)
     return Room(
         mean=np.zeros(n),
@@ -231,6 +225,8 @@ def room_for(system: System) -> Room:
         forces=np.zeros((elements, 3)),
         coupling=np.zeros((elements, elements)),
         change=np.zeros((elements, 1)),
+        row=np.zeros(columns),
+        unsolved=np.zeros(1, dtype=np.int64),
     )
 
 

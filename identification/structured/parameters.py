@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.structured.elements import NonlinearElement
+from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
+from identification.structured.leading import Lead, led, not_led, own_shapes
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
 from identification.structured.sensitivities import run_with_sensitivities
 
@@ -23,8 +24,8 @@ class Parameters:
     """Which numbers of a model are free, and their order in a vector.
 
     Logarithms of frequencies and damping ratios; input shapes; of each element the direction without its largest component
-    (which sets the scale of x), the spring, and the square roots of the damper; the root of the support's stiffness if
-    ``support``; output shapes of outputs that are not ``tied``; ``direct``.
+    (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move them; the root of the
+    support's stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
 
     Parameters
     ----------
@@ -47,10 +48,9 @@ class Parameters:
         out = [f"frequency {i + 1}" for i in range(modes)] + [f"damping {i + 1}" for i in range(modes)]
         out += [f"shape {i + 1} at {self.start.inputs[j].name}" for i in range(modes) for j in range(inputs)]
         for number, element in enumerate(self.start.elements):
-            kept = self._kept(element)
-            out += [f"element {number + 1} direction {i + 1}" for i in kept]
-            out += [f"element {number + 1} spring x^{k + 2}" for k in range(element.spring_n.size)]
-            out += [f"element {number + 1} damper |x|^{j + 1}" for j in range(element.damper_n_s_m.size)]
+            out += [f"element {number + 1} direction {i + 1}" for i in self._kept(element)]
+        for e, law in laws_in_order(self.start.elements):
+            out += [f"element {e + 1} {name}" for name in self.start.elements[e].laws[law].names]
         out += ["support"] * self.support
         out += [f"shape {i + 1} at {self.start.outputs[o].name}" for o in self._untied for i in range(modes)]
         out += [f"direct {channel.name} {of.name}" for channel in self.start.outputs for of in self.start.inputs]
@@ -68,7 +68,8 @@ class Parameters:
         """Return the free numbers of a model."""
         parts = [np.log(model.frequency_hz), np.log(model.damping_ratio), model.input_shapes.ravel()]
         for element, first in zip(model.elements, self.start.elements, strict=True):
-            parts += [element.direction[self._kept(first)], element.spring_n, np.sqrt(element.damper_n_s_m)]
+            parts.append(element.direction[self._kept(first)])
+        parts += [model.elements[e].laws[law].vector for e, law in laws_in_order(model.elements)]
         if self.support:
             parts.append(np.sqrt([model.support_n_m]))
         parts += [model.output_shapes[self._untied].ravel(), model.direct.ravel()]
@@ -82,6 +83,10 @@ class Parameters:
         highest = np.log(0.45 / self.start.step_s)
         least[:modes], largest[:modes] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
         least[modes : 2 * modes], largest[modes : 2 * modes] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
+        laws = [self.start.elements[e].laws[law].least for e, law in laws_in_order(self.start.elements)]
+        at = modes * (2 + len(self.start.inputs)) + sum(len(self._kept(element)) for element in self.start.elements)
+        bounds = np.concatenate([*laws, np.zeros(0)])
+        least[at : at + bounds.size] = bounds
         return least, largest
 
     def model(self, vector: Float) -> StructuredModel:
@@ -96,13 +101,17 @@ class Parameters:
         modes, inputs = start.input_shapes.shape
         frequency, damping = np.exp(take(modes)), np.exp(take(modes))
         shapes = take(modes * inputs).reshape(modes, inputs)
-        elements = []
-        for element in start.elements:
-            direction = element.direction.copy()
+        directions = [element.direction.copy() for element in start.elements]
+        for element, direction in zip(start.elements, directions, strict=True):
             kept = self._kept(element)
             direction[kept] = take(len(kept))
-            spring, damper = take(element.spring_n.size), take(element.damper_n_s_m.size) ** 2
-            elements.append(replace(element, direction=direction, spring_n=spring, damper_n_s_m=damper))
+        laws = [list(element.laws) for element in start.elements]
+        for e, law in laws_in_order(start.elements):
+            laws[e][law] = laws[e][law].moved(take(laws[e][law].vector.size))
+        elements = tuple(
+            replace(element, direction=direction, laws=tuple(found))
+            for element, direction, found in zip(start.elements, directions, laws, strict=True)
+        )
         stiffness = float(take(1)[0] ** 2) if self.support else start.support_n_m
         outputs = np.empty_like(start.output_shapes)
         outputs[list(self.tied)] = shapes[:, 0]
@@ -112,34 +121,46 @@ class Parameters:
             frequency_hz=frequency,
             damping_ratio=damping,
             input_shapes=shapes,
-            elements=tuple(elements),
+            elements=elements,
             support_n_m=stiffness,
             output_shapes=outputs,
             direct=take(start.direct.size).reshape(start.direct.shape),
         )
 
-    def derivatives(self, model: StructuredModel, u: Float, counted_from: int) -> tuple[Float, Float]:
+    def derivatives(
+        self, model: StructuredModel, u: Float, counted_from: int, lead: Lead | None = None
+    ) -> tuple[Float, Float]:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
         system, modes = model.system, len(model.frequency_hz)
-        inputs, outputs = len(model.inputs), len(model.outputs)
-        laws = int(system.sizes[:, 1].sum())
-        count = 2 * modes + modes * inputs + system.phi.size + laws + 1
+        inputs, ends = len(model.inputs), ends_of_steps(u, model.steps)
+        parts = [system, system]
+        if lead is not None:
+            parts, ends = [led(system, lead.before), led(system, lead.rate)], lead.inputs(ends, model.steps)
+        changes = changes_of(model.elements, system.tables)
+        count = 2 * modes + modes * parts[0].b.shape[1] + system.phi.size + changes.element.size + 1
         states = np.zeros((u.shape[1], 3, modes))
-        raw = np.zeros((u.shape[1] - counted_from, outputs, count))
-        run_with_sensitivities(
-            system,
-            room_for(system),
-            ends_of_steps(u, model.steps),
-            np.zeros(2 * modes + 1),
-            states,
-            np.array(model.output_shapes),
-            model.motions,
-            counted_from,
-            np.zeros((2 * modes + 1, count)),
-            np.zeros((modes + 1, modes)),
-            np.zeros((modes, count)),
-            raw,
-        )
+        raw = np.zeros((u.shape[1] - counted_from, len(model.outputs), count))
+        state, sens = np.zeros(system.size), np.zeros((system.size, count))
+        for part, first, last in zip(parts, (0, counted_from), (counted_from, u.shape[1]), strict=True):
+            run_with_sensitivities(
+                part,
+                room_for(part, count),
+                changes,
+                ends[first * model.steps : last * model.steps + 1],
+                state,
+                states[first:last],
+                np.array(model.output_shapes),
+                model.motions,
+                counted_from - first,
+                sens,
+                np.zeros((modes + 1, modes)),
+                np.zeros((modes, count)),
+                raw,
+            )
+            if lead is not None and first == 0:
+                sens = not_led(sens, system, lead.before)
+        if lead is not None:
+            raw = own_shapes(not_led(raw, system, lead.rate), modes, inputs)
         found = outputs_of(model, u, states)[:, counted_from:].T
         return found, self._by_vector(model, raw, states[counted_from:], u[:, counted_from:])
 
@@ -154,15 +175,10 @@ class Parameters:
             shapes[:, output, ::inputs] += motions[:, output]
         columns.append(shapes)
         at = 2 * modes + modes * inputs
-        law_at = at + len(model.elements) * modes
-        for element in model.elements:
-            kept = np.array(self._kept(element), dtype=int)
-            columns.append(raw[..., at + kept] / element.scale_m)
-            springs, size = element.spring_n.size, element.law.size
-            columns.append(raw[..., law_at : law_at + springs] * element.scale_m)
-            roots = 2.0 * np.sqrt(element.damper_n_s_m) * element.scale_m**2
-            columns.append(raw[..., law_at + springs : law_at + size] * roots)
-            at, law_at = at + modes, law_at + size
+        for element in self.start.elements:
+            columns.append(raw[..., at + np.array(self._kept(element), dtype=int)] / element.scale_m)
+            at += modes
+        columns.append(raw[..., at:-1])
         if self.support:
             columns.append(raw[..., -1:] * 2.0 * np.sqrt(model.support_n_m))
         for output in self._untied:

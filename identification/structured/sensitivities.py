@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from identification.structured.laws import damping_basis, element_basis, spring_basis
+from identification.structured.elements import Changes
+from identification.structured.kernels import damping_at, mean_spring, slide, spring_at
 from identification.structured.steps import (
     Room,
     System,
@@ -56,50 +57,64 @@ def add_direction(system: System, room: Room, e: int, speed: np.ndarray, place: 
 
 @inner_kernel
 def of_acceleration(
-    system: System, room: Room, q: np.ndarray, v: np.ndarray, mean: float, sens: np.ndarray, rhs: np.ndarray
+    system: System,
+    room: Room,
+    changes: Changes,
+    state: np.ndarray,
+    sens: np.ndarray,
+    rhs: np.ndarray,
 ) -> None:
     """Write the derivatives of the accelerations at a sample by the parameters."""
-    n, columns = q.size, sens.shape[1]
+    n, columns, tables = system.omega.size, sens.shape[1], system.tables
+    q, v = state[:n], state[n : 2 * n]
     for i in range(n):
         omega = system.omega[i]
         for c in range(columns):
             rhs[i, c] = -2.0 * system.zeta[i] * omega * sens[n + i, c] - omega * omega * sens[i, c]
-    add_linear(system, room, v, q, mean, sens, rhs)
-    begin = 2 * n + n * room.u.size + system.phi.size
+    add_linear(system, room, v, q, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        law, springs, reach = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0], system.limits[e, 0]
-        z, rate = along(q, system.phi[e]), along(v, system.phi[e])
         for c in range(columns):
             change = 0.0
             for i in range(n):
                 change += system.phi[e, i] * (room.forces[e, 1] * sens[i, c] + room.forces[e, 2] * sens[n + i, c])
+            for s in range(tables.first[e], tables.first[e + 1]):
+                change += sens[2 * n + 1 + s, c]
             for i in range(n):
                 rhs[i, c] -= system.phi[e, i] * change
         add_direction(system, room, e, v, q, rhs)
-        for k in range(law.size):
-            if k < springs:
-                change = spring_basis(z, k, law, springs, reach, system.limits[e, 1])[0]
-            else:
-                change = damping_basis(z, k - springs, reach) * rate
-            for i in range(n):
-                rhs[i, begin + k] -= system.phi[e, i] * change
-        begin += law.size
+    begin, springs, dampers = law_columns(system), changes.springs.shape[0], changes.dampers.shape[0]
+    for k in range(springs + dampers):
+        e = changes.element[k]
+        x = along(q, system.phi[e])
+        if k < springs:
+            change = spring_at(x, changes.springs[k], changes.limits[k])[0]
+        else:
+            change = damping_at(x, changes.dampers[k - springs], tables.limits[e, 0])[0] * along(v, system.phi[e])
+        for i in range(n):
+            rhs[i, begin + k] -= system.phi[e, i] * change
+
+
+@inner_kernel
+def law_columns(system: System) -> int:
+    """Return the first column of the numbers of the laws."""
+    n = system.omega.size
+    return int(2 * n + n * system.b.shape[1] + system.phi.size)
 
 
 @inner_kernel
 def of_step(
     system: System,
     room: Room,
-    q: np.ndarray,
-    v: np.ndarray,
+    changes: Changes,
+    state: np.ndarray,
     half: np.ndarray,
-    mean: float,
     sens: np.ndarray,
     matrix: np.ndarray,
     rhs: np.ndarray,
 ) -> None:
     """Write the derivatives of the mean velocities of a step by the parameters; ``half`` gets the middle of the step."""
-    n, columns, h = q.size, sens.shape[1], system.step_s
+    n, columns, h, tables = system.omega.size, sens.shape[1], system.step_s, system.tables
+    q = state[:n]
     for i in range(n):
         half[i] = q[i] + 0.5 * h * room.mean[i]
         for c in range(columns):
@@ -107,33 +122,90 @@ def of_step(
         for k in range(n):
             matrix[i, k] = 0.0
         matrix[i, i] = rigidity(system, i)
-    add_linear(system, room, room.mean, half, mean, sens, rhs)
-    begin = 2 * n + n * room.u.size + system.phi.size
+    add_linear(system, room, room.mean, half, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
-        z = along(q, system.phi[e])
         for c in range(columns):
             change = 0.0
             for i in range(n):
                 change += system.phi[e, i] * sens[i, c]
-            change *= room.forces[e, 1]
-            for i in range(n):
-                rhs[i, c] -= system.phi[e, i] * change
+            room.row[c] = change * room.forces[e, 1]
+        for s in range(tables.first[e], tables.first[e + 1]):
+            at = 2 * n + 1 + s
+            by_r = slide(state[at], tables.sliders[s, 0], tables.sliders[s, 1], h * room.w[e])[3]
+            for c in range(columns):
+                room.row[c] += by_r * sens[at, c]
+        for i in range(n):
+            for c in range(columns):
+                rhs[i, c] -= system.phi[e, i] * room.row[c]
         add_direction(system, room, e, room.mean, q, rhs)
         for i in range(n):
             for k in range(n):
                 matrix[i, k] += room.forces[e, 2] * system.phi[e, i] * system.phi[e, k]
-        for k in range(law.size):
-            change = element_basis(z, room.w[e], h, k, law, springs, system.limits[e, 0], system.limits[e, 1])
-            for i in range(n):
-                rhs[i, begin + k] -= system.phi[e, i] * change
-        begin += law.size
+    begin = law_columns(system)
+    for k in range(changes.element.size):
+        e = changes.element[k]
+        change = of_law(system, room, changes, state, k)
+        for i in range(n):
+            rhs[i, begin + k] -= system.phi[e, i] * change
     solve(matrix, rhs, n, columns)
 
 
 @inner_kernel
+def of_law(system: System, room: Room, changes: Changes, state: np.ndarray, k: int) -> float:
+    """Return the derivative of an element's mean force over a step by the number ``k`` of the laws."""
+    n, tables, e = system.omega.size, system.tables, changes.element[k]
+    way = system.step_s * room.w[e]
+    springs, dampers = changes.springs.shape[0], changes.dampers.shape[0]
+    if k < springs + dampers:
+        x = along(state[:n], system.phi[e])
+        if k < springs:
+            return float(mean_spring(x, way, changes.springs[k], changes.limits[k])[0])
+        row = changes.dampers[k - springs]
+        return float(damping_at(x + 0.5 * way, row, tables.limits[e, 0])[0] * room.w[e])
+    total, sign = 0.0, math.copysign(1.0, way)
+    for s in range(tables.first[e], tables.first[e + 1]):
+        stiffness, strength = tables.sliders[s, 0], tables.sliders[s, 1]
+        by = changes.sliders[k - springs - dampers, s]
+        share = slide(state[2 * n + 1 + s], stiffness, strength, way)[3]
+        if share == 1.0:
+            total += 0.5 * way * by[0]
+        else:
+            total += sign * (1.0 - share) * by[1] + 0.5 * share * share * way * by[0]
+    return total
+
+
+@inner_kernel
+def end_sliders(
+    system: System, room: Room, changes: Changes, state: np.ndarray, sens: np.ndarray, rhs: np.ndarray
+) -> None:
+    """Take the sensitivities of the sliders to the end of the step."""
+    n, h, tables = system.omega.size, system.step_s, system.tables
+    inputs, begin = system.b.shape[1], law_columns(system)
+    joints = changes.springs.shape[0] + changes.dampers.shape[0]
+    for e in range(system.phi.shape[0]):
+        if tables.first[e] == tables.first[e + 1]:
+            continue
+        way, direction = h * room.w[e], 2 * n + n * inputs + e * n
+        for c in range(sens.shape[1]):
+            change = 0.0
+            for i in range(n):
+                change += system.phi[e, i] * rhs[i, c]
+            room.row[c] = h * change
+        for i in range(n):
+            room.row[direction + i] += h * room.mean[i]
+        for s in range(tables.first[e], tables.first[e + 1]):
+            at, stiffness, strength = 2 * n + 1 + s, tables.sliders[s, 0], tables.sliders[s, 1]
+            sticks = slide(state[at], stiffness, strength, way)[3] == 1.0
+            for c in range(sens.shape[1]):
+                sens[at, c] = sens[at, c] + stiffness * room.row[c] if sticks else 0.0
+            for k in range(changes.sliders.shape[0]):
+                by = changes.sliders[k, s]
+                sens[at, begin + joints + k] += way * by[0] if sticks else math.copysign(1.0, way) * by[1]
+
+
+@inner_kernel
 def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: np.ndarray) -> None:
-    """Take the sensitivities of the state to the end of the step."""
+    """Take the sensitivities of displacements, velocities and support to the end of the step."""
     n, h, inputs = half.size, system.step_s, system.b.shape[1]
     alpha = 0.5 * h * system.support[1]
     for c in range(sens.shape[1]):
@@ -151,6 +223,7 @@ def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: n
 def run_with_sensitivities(
     system: System,
     room: Room,
+    changes: Changes,
     u: np.ndarray,
     state: np.ndarray,
     states: np.ndarray,
@@ -164,20 +237,20 @@ def run_with_sensitivities(
 ) -> None:
     """As `run`, and write the derivatives of ``outputs . motion`` by the parameters from sample ``counted_from``.
 
-    Parameters, in this order: omega, zeta, b (row by row), phi (row by row), the laws, the support's stiffness. ``sens``:
-    [2 n + 1, P], that of the state. ``motions``: 0, 1, 2 for displacement, velocity, acceleration of an output. ``matrix``:
-    room, [n + 1, n]. ``rhs``: room, [n, P]. ``jacobian``: [N - counted_from, n_outputs, P].
+    Parameters, in this order: omega, zeta, b (row by row), phi (row by row), the numbers of the laws as in `Changes`, the
+    support's stiffness. ``sens``: [`System.size`, P], that of the state. ``motions``: 0, 1, 2 for displacement, velocity,
+    acceleration of an output. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P]. ``jacobian``: [N - counted_from, n_outputs, P].
     """
     n = system.omega.size
-    q, v, half = state[:n], state[n : 2 * n], matrix[n]
+    q, v, r, half = state[:n], state[n : 2 * n], state[2 * n + 1 :], matrix[n]
     for sample in range(states.shape[0]):
         first = sample * system.steps
         take_input(system, room, u, first, first, state[2 * n])
-        accelerate(system, room, q, v, states[sample, 2])
+        accelerate(system, room, q, v, r, states[sample, 2])
         for i in range(n):
             states[sample, 0, i], states[sample, 1, i] = q[i], v[i]
         if sample >= counted_from:
-            of_acceleration(system, room, q, v, state[2 * n], sens, rhs)
+            of_acceleration(system, room, changes, state, sens, rhs)
             for o in range(outputs.shape[0]):
                 for c in range(sens.shape[1]):
                     total = 0.0
@@ -186,7 +259,8 @@ def run_with_sensitivities(
                     jacobian[sample - counted_from, o, c] = total
         for row in range(first, first + system.steps):
             take_input(system, room, u, row, row + 1, state[2 * n])
-            take_step(system, room, q, v)
-            of_step(system, room, q, v, half, state[2 * n], sens, matrix, rhs)
+            take_step(system, room, q, v, r)
+            of_step(system, room, changes, state, half, sens, matrix, rhs)
+            end_sliders(system, room, changes, state, sens, rhs)
             end_sensitivities(system, half, sens, rhs)
             end_step(system, room, q, v, state)

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +13,11 @@ from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
+from identification.structured.kernels import slide_along
+from identification.structured.laws import POSITIVE, Damper, Joint, Law, Spring
 from identification.structured.model import StructuredModel
 
-__all__ = ["linear_start", "with_element"]
+__all__ = ["linear_start", "measured_velocity", "with_element"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -63,14 +67,16 @@ def with_element(
     linear: StructuredModel,
     experiments: Sequence[Experiment],
     measured_modes: int,
-    springs: int,
-    dampers: int,
+    laws: Sequence[Law],
     reach: float,
 ) -> StructuredModel:
     """Add an element along the mode that moves most: what is left of its equation of motion, by linear least squares.
 
-    The lines of the equation do not determine the mean position: a shift gives other coefficients with the same forces. It is
-    the one in static balance. ``measured_modes``: number of modes that are not residuals. Only periodic experiments count.
+    The modal coordinates of the periodic experiments come from their spectra. Sensors of acceleration do not show the mean
+    position. A shift of it changes the coefficients of a polynomial, not the forces, so that the lines do not determine it.
+    Static balance does: without a mean input the mean of mode and element is zero. Numbers in which a law is not linear are
+    tried (`Law.tried`); the combination with the least residual is taken. Mean positions in balance beyond the largest RMS are
+    not found. Raises `IdentificationError` if no experiment is periodic.
     """
     periodic = [experiment for experiment in experiments if experiment.period_samples]
     if not periodic:
@@ -85,26 +91,46 @@ def with_element(
     ]
     scale = float(np.max(np.abs(np.concatenate(times)))) * abs(shape)
     parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
-    rms = float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
+    places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
     omega = linear.omega.copy()
-
-    def unbalanced(position: float) -> float:
-        law = _regression(parts, position, springs, dampers)
-        return parts[0].mean_force(position, law, springs, omega[mode])
-
-    law = _regression(parts, _root(unbalanced, _POSITIONS * rms), springs, dampers)
-    omega[mode] = np.sqrt(max(omega[mode] ** 2 + law[-1], 0.25 * omega[mode] ** 2))
-    least = (_SMALLEST_ROOT * 2.0 * linear.damping_ratio[mode] * omega[mode]) / shape**2
+    found = [_regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))]
+    best = min(found, key=lambda one: one.residual)
+    omega[mode] = np.sqrt(max(omega[mode] ** 2 + best.stiffness, 0.25 * omega[mode] ** 2))
     direction = np.zeros(len(omega))
     direction[mode] = shape
+    least = _SMALLEST_ROOT * 2.0 * linear.damping_ratio[mode] * omega[mode] / shape**2
     element = NonlinearElement(
         direction=direction,
         scale_m=scale,
-        spring_n=law[:springs] / scale,
-        damper_n_s_m=np.maximum(law[springs:-1] / scale**2, least),
+        laws=tuple(_started(law, numbers, scale, least) for law, numbers in zip(best.laws, best.numbers, strict=True)),
         reach=reach,
     )
     return replace(linear, frequency_hz=omega / (2.0 * np.pi), elements=(element,))
+
+
+def _started(law: Law, numbers: Float, scale: float, least: float) -> Law:
+    """Return a law with the linear numbers that the regression found in J or J s."""
+    if not law.linear:
+        return law
+    if isinstance(law, Damper):
+        found = np.maximum(numbers / scale**2, least)
+    elif law.free[law.linear] is POSITIVE:
+        found = np.maximum(numbers / scale, 1e-9)
+    else:
+        found = numbers / scale
+    value = getattr(law, law.linear)
+    return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})
+
+
+def measured_velocity(linear: StructuredModel, experiment: Experiment, measured_modes: int) -> Float:
+    """float[n_modes, n]: modal velocities of a periodic experiment in all its samples; zero for the modes above those measured."""
+    q, _, omega = _modal_spectra(linear, experiment, measured_modes)
+    n = experiment.period_samples
+    period = np.fft.irfft(1j * omega * q, n, axis=1) * n
+    samples = (np.arange(experiment.inputs.shape[1]) - experiment.counted_from) % n
+    velocity = np.zeros((len(linear.omega), samples.size))
+    velocity[:measured_modes] = period[:, samples]
+    return velocity
 
 
 def _root(function: Callable[[float], float], places: Float) -> float:
@@ -160,25 +186,57 @@ class _Equation:
         self.left, self.phi, self.q = left[self.lines], phi, q
         self.rate = np.fft.irfft(1j * omega * coordinates[mode], q.size) * q.size
 
-    def mean_force(self, position: float, law: Float, springs: int, omega: float) -> float:
-        """Return the mean restoring force of mode and element at a mean position; zero is static balance."""
+    def forces(self, law: Law, position: float) -> list[Float]:
+        """Forces of a law over the period for each of its linear numbers at 1, per x."""
         x = self.phi * (self.q + position)
-        element = sum(self.phi * float(np.mean(x ** (k + 2))) * law[k] for k in range(springs))
-        return float(element + (omega**2 + law[-1]) * position)
-
-    def columns(self, position: float, springs: int, dampers: int) -> Complex:
-        """complex[n_lines, springs + dampers + 1]: forces of the element per coefficient, and of a linear spring."""
-        x, rate = self.phi * (self.q + position), self.phi * self.rate
-        forces = [self.phi * x ** (k + 2) for k in range(springs)]
-        forces += [self.phi * np.abs(x) ** (j + 1) * rate for j in range(dampers)]
-        spectra = np.fft.rfft([*forces, self.q], axis=1) / self.q.size
-        return np.asarray(spectra[:, self.lines].T)
+        if isinstance(law, Spring):
+            return [one.force(x) for one in law.basis()]
+        if isinstance(law, Damper):
+            return [one.damping(x) * self.phi * self.rate for one in law.basis()]
+        out = np.zeros_like(x)
+        slide_along(np.ascontiguousarray(law.basis()[0].sliders().T), x, out)
+        return [out]
 
 
-def _regression(parts: Sequence[_Equation], position: float, springs: int, dampers: int) -> Float:
-    """Return coefficients of spring and damper, and the change of the squared frequency."""
-    columns = np.concatenate([part.columns(position, springs, dampers) for part in parts])
-    left = np.concatenate([part.left for part in parts])
-    a, y = np.concatenate([columns.real, columns.imag]), np.concatenate([left.real, left.imag])
-    scale = np.linalg.norm(a, axis=0)
-    return np.asarray(np.linalg.lstsq(a / scale, y, rcond=1e-10)[0] / scale)
+class _Found(NamedTuple):
+    laws: list[Law]
+    numbers: list[Float]
+    """Linear numbers of each law, J."""
+    stiffness: float
+    """Change of the squared frequency."""
+    residual: float
+
+
+def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omega: float) -> _Found:
+    """Return the numbers in which ``laws`` are linear, at the mean position of static balance."""
+    linear = [law for law in laws if law.linear]
+    memory = [[part.forces(law, 0.0) if isinstance(law, Joint) else None for law in linear] for part in parts]
+
+    def solved(position: float) -> tuple[Float, float, list[list[list[Float]]]]:
+        forces = [
+            [held if held is not None else part.forces(law, position) for law, held in zip(linear, kept, strict=True)]
+            for part, kept in zip(parts, memory, strict=True)
+        ]
+        rows = [
+            np.fft.rfft([*(part.phi * f for of in by_law for f in of), part.q], axis=1)[:, part.lines].T / part.q.size
+            for part, by_law in zip(parts, forces, strict=True)
+        ]
+        columns, left = np.concatenate(rows), np.concatenate([part.left for part in parts])
+        a, y = np.concatenate([columns.real, columns.imag]), np.concatenate([left.real, left.imag])
+        scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
+        numbers = np.linalg.lstsq(a / scale, y, rcond=1e-10)[0] / scale
+        return numbers, float(np.linalg.norm(a @ numbers - y)), forces
+
+    def unbalanced(position: float) -> float:
+        numbers, _, forces = solved(position)
+        means = [np.mean(f) for of in forces[0] for f in of]
+        return float(parts[0].phi * np.dot(means, numbers[:-1]) + (omega**2 + numbers[-1]) * position)
+
+    still = not any(isinstance(law, Spring) for law in linear)
+    numbers, residual, forces = solved(0.0 if still else _root(unbalanced, places))
+    ends = np.cumsum([0, *(len(of) for of in forces[0])])
+    split = {id(law): numbers[a:b] for law, a, b in zip(linear, ends[:-1], ends[1:], strict=True)}
+    negative = any(isinstance(law, Joint) and np.any(split[id(law)] <= 0.0) for law in linear)
+    return _Found(
+        laws, [split.get(id(law), np.zeros(0)) for law in laws], float(numbers[-1]), np.inf if negative else residual
+    )

@@ -4,10 +4,11 @@ A step of length h from (q, v) has the mean velocity V and the end ``q + h V``, 
 
     ``2 (V - v)/h + C V + K (q + h V/2) + sum_e phi_e F_e = B U``
 
-    ``F_e = (P_e(z + h w) - P_e(z))/(h w) + c_e(z + h w/2) w``,  ``z = phi_e . q``,  ``w = phi_e . V``
+    ``F_e = (P_e(x + h w) - P_e(x))/(h w) + c_e(x + h w/2) w + R_e``,  ``x = phi_e . q``,  ``w = phi_e . V``
 
-with the mean input U, the potential P_e of a spring and its damping c_e. Over a step the mechanical energy then changes by the
-work of U less the work of the dampers, exactly (the discrete gradient of Gonzalez, J. Nonlinear Sci. 6, 1996), whatever h is.
+with the mean input U, the potential P_e of a spring, its damping c_e and the mean force R_e of its sliders along the way. Over a
+step the mechanical energy, with ``r^2/(2 k)`` of each slider, then changes by the work of U less that of dampers and friction,
+exactly (the discrete gradient of Gonzalez, J. Nonlinear Sci. 6, 1996), whatever h is.
 """
 
 import math
@@ -15,12 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.structured.laws import damping_of, element_force, spring_of
+from identification.structured.elements import Tables
+from identification.structured.kernels import damping_at, slide, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 __all__ = ["Room", "System", "accelerate", "along", "end_step", "rigidity", "run", "solve", "take_input", "take_step"]
 
-NEWTON = 40  # iterations at most; one that has not ended then is not told
+NEWTON = 60  # iterations at most; a step that is not solved by then is counted
+CAREFUL = 12  # iterations with whole steps; those after them are halved
 EXACT = 1e-13  # relative change of w that ends Newton's iteration
 
 
@@ -38,14 +41,15 @@ class System(NamedTuple):
     """float[n, n_inputs]."""
     phi: np.ndarray
     """float[n_elements, n]."""
-    laws: np.ndarray
-    """float[n_elements, ...]: coefficients of the spring from the square on, then of the damping from the first power on."""
-    sizes: np.ndarray
-    """int[n_elements, 2]: numbers of coefficients of the spring, and of all."""
-    limits: np.ndarray
-    """float[n_elements, 2]: displacement up to which the laws reach, least slope of the spring beyond it."""
+    tables: Tables
+    """Springs, dampers and sliders of the elements."""
     support: np.ndarray
     """float[3]: stiffness (N/m), corner of its filter (rad/s) and largest force (N) of the unseen support."""
+
+    @property
+    def size(self) -> int:
+        """Size of the state: displacements, velocities, the support's filter, forces of the sliders."""
+        return 2 * len(self.omega) + 1 + len(self.tables.sliders)
 
 
 class Room(NamedTuple):
@@ -58,6 +62,10 @@ class Room(NamedTuple):
     forces: np.ndarray
     coupling: np.ndarray
     change: np.ndarray
+    row: np.ndarray
+    """float[P]: of the sensitivities."""
+    unsolved: np.ndarray
+    """int[1]: steps whose equation was not solved."""
 
 
 @inner_kernel
@@ -106,7 +114,7 @@ def rigidity(system: System, i: int) -> float:
 
 
 @inner_kernel
-def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray) -> None:
+def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.ndarray) -> None:
     """Solve a step under the mean input ``room.u``: write the mean velocity, and what every element does at the solution."""
     h, elements = system.step_s, system.phi.shape[0]
     for i in range(q.size):
@@ -115,31 +123,38 @@ def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray) -> None:
         room.mean[i] = room.free[i]
     for e in range(elements):
         room.w[e] = along(v, system.phi[e])
-    for _ in range(NEWTON if elements else 0):
-        if newton(system, room, q):
+    solved = elements == 0
+    for iteration in range(NEWTON if elements else 0):
+        if newton(system, room, q, r, 1.0 if iteration < CAREFUL else 0.5):
+            solved = True
             break
+    if not solved:
+        room.unsolved[0] += 1
     for e in range(elements):
-        evaluate(system, room, q, e)
+        evaluate(system, room, q, r, e)
         for i in range(q.size):
             room.mean[i] -= system.phi[e, i] * room.forces[e, 0] / rigidity(system, i)
 
 
 @inner_kernel
-def evaluate(system: System, room: Room, q: np.ndarray, e: int) -> None:
-    """Write the mean force of an element over the step, and its derivatives by z and w."""
-    law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
-    found = element_force(
-        along(q, system.phi[e]), room.w[e], system.step_s, law, springs, system.limits[e, 0], system.limits[e, 1]
-    )
-    room.forces[e, 0], room.forces[e, 1], room.forces[e, 2] = found
+def evaluate(system: System, room: Room, q: np.ndarray, r: np.ndarray, e: int) -> None:
+    """Write the mean force of an element over the step, and its derivatives by x and the rate."""
+    h, tables = system.step_s, system.tables
+    x = along(q, system.phi[e])
+    force, by_x, by_w = step_force(x, room.w[e], h, tables.springs[e], tables.dampers[e], tables.limits[e])
+    for s in range(tables.first[e], tables.first[e + 1]):
+        mean, _, by_way, _ = slide(r[s], tables.sliders[s, 0], tables.sliders[s, 1], h * room.w[e])
+        force += mean
+        by_w += h * by_way
+    room.forces[e, 0], room.forces[e, 1], room.forces[e, 2] = force, by_x, by_w
 
 
 @inner_kernel
-def newton(system: System, room: Room, q: np.ndarray) -> bool:
+def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: float) -> bool:
     """Correct the mean velocities of all elements once; return whether they do not change any more."""
     elements = room.w.size
     for e in range(elements):
-        evaluate(system, room, q, e)
+        evaluate(system, room, q, r, e)
     for e in range(elements):
         miss = along(room.free, system.phi[e]) - room.w[e]
         for f in range(elements):
@@ -152,23 +167,25 @@ def newton(system: System, room: Room, q: np.ndarray) -> bool:
     solve(room.coupling, room.change, elements, 1)
     done = True
     for e in range(elements):
-        room.w[e] += room.change[e, 0]
+        room.w[e] += share * room.change[e, 0]
         if abs(room.change[e, 0]) > EXACT * abs(room.w[e]) + 1e-300:
             done = False
     return done
 
 
 @inner_kernel
-def accelerate(system: System, room: Room, q: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
-    """Write the acceleration under ``room.u``, and force of every element with its derivatives by z and its rate."""
+def accelerate(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.ndarray, out: np.ndarray) -> None:
+    """Write the acceleration under ``room.u``, and force of every element with its derivatives by x and its rate."""
+    tables = system.tables
     for i in range(q.size):
         omega = system.omega[i]
         out[i] = along(room.u, system.b[i]) - 2.0 * system.zeta[i] * omega * v[i] - omega * omega * q[i]
     for e in range(system.phi.shape[0]):
-        law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
-        z, rate, reach = along(q, system.phi[e]), along(v, system.phi[e]), system.limits[e, 0]
-        force, slope, _ = spring_of(z, law, springs, reach, system.limits[e, 1])
-        damping, steep = damping_of(z, law, springs, reach)
+        x, rate = along(q, system.phi[e]), along(v, system.phi[e])
+        force, slope, _ = spring_at(x, tables.springs[e], tables.limits[e])
+        damping, steep = damping_at(x, tables.dampers[e], tables.limits[e, 0])
+        for s in range(tables.first[e], tables.first[e + 1]):
+            force += r[s]
         room.forces[e, 0] = force + damping * rate
         room.forces[e, 1], room.forces[e, 2] = slope + steep * rate, damping
         for i in range(q.size):
@@ -191,8 +208,13 @@ def take_input(system: System, room: Room, u: np.ndarray, row: int, other: int, 
 
 @inner_kernel
 def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np.ndarray) -> None:
-    """Go to the end of the step; the support's filter follows the displacement of the first input."""
+    """Go to the end of the step; sliders slide, and the support's filter follows the displacement of the first input."""
     alpha, there = 0.5 * system.step_s * system.support[1], 0.0
+    tables, n = system.tables, q.size
+    for e in range(system.phi.shape[0]):
+        for s in range(tables.first[e], tables.first[e + 1]):
+            at = 2 * n + 1 + s
+            state[at] = slide(state[at], tables.sliders[s, 0], tables.sliders[s, 1], system.step_s * room.w[e])[1]
     for i in range(q.size):
         there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * room.mean[i])
         q[i] += system.step_s * room.mean[i]
@@ -202,19 +224,19 @@ def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np
 
 @unlocked_kernel
 def run(system: System, room: Room, u: np.ndarray, state: np.ndarray, states: np.ndarray) -> None:
-    """Simulate from ``state`` [2 n + 1] and write displacement, velocity and acceleration at every sample, [N, 3, n].
+    """Simulate from ``state`` [`System.size`] and write displacement, velocity and acceleration at every sample, [N, 3, n].
 
     ``u``: [N steps + 1, n_inputs], inputs at the ends of all steps.
     """
     n = system.omega.size
-    q, v = state[:n], state[n : 2 * n]
+    q, v, r = state[:n], state[n : 2 * n], state[2 * n + 1 :]
     for sample in range(states.shape[0]):
         first = sample * system.steps
         take_input(system, room, u, first, first, state[2 * n])
-        accelerate(system, room, q, v, states[sample, 2])
+        accelerate(system, room, q, v, r, states[sample, 2])
         for i in range(n):
             states[sample, 0, i], states[sample, 1, i] = q[i], v[i]
         for row in range(first, first + system.steps):
             take_input(system, room, u, row, row + 1, state[2 * n])
-            take_step(system, room, q, v)
+            take_step(system, room, q, v, r)
             end_step(system, room, q, v, state)

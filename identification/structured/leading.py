@@ -1,0 +1,62 @@
+"""Simulations that the measured motion leads, so that a fit from a poor start does not end at a far minimum.
+
+A lightly damped model with wrong numbers soon moves in another phase, or on another branch, than the measurement, and the sum of
+squares has many minima. With a force ``rate (measured velocity - velocity)`` on every mode it cannot: its memory is as short as
+``1 / rate``. A fit begins with a fast rate and ends without any.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.structured.model import ends_of_steps
+from identification.structured.steps import System
+
+__all__ = ["Lead", "led", "not_led", "own_shapes"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lead:
+    """Forces that lead the modes.
+
+    Parameters
+    ----------
+    before, rate
+        float[n_modes], rates before the counted samples and in them, rad/s; 0 for a mode that is not led.
+    velocity
+        float[n_modes, n], measured modal velocities at the samples.
+    """
+
+    before: Float
+    rate: Float
+    velocity: Float
+
+    def inputs(self, ends: Float, steps: int) -> Float:
+        """Return inputs at the ends of steps with one more for each mode."""
+        return np.ascontiguousarray(np.hstack([ends, ends_of_steps(self.velocity, steps)]))
+
+
+def led(system: System, rate: Float) -> System:
+    """Return the system with more damping, and with one more input for each mode."""
+    return system._replace(zeta=system.zeta + 0.5 * rate / system.omega, b=np.hstack([system.b, np.diag(rate)]))
+
+
+def not_led(derivatives: Float, system: System, rate: Float) -> Float:
+    """Return derivatives ``[..., P]`` by omega at the damping ratios of the system that is not led.
+
+    At a given damping ratio of its own, the damping ratio of the led mode falls with its frequency.
+    """
+    n, own = len(rate), derivatives.copy()
+    own[..., :n] -= derivatives[..., n : 2 * n] * (0.5 * rate / system.omega**2)
+    return np.asarray(own)
+
+
+def own_shapes(derivatives: Float, n: int, inputs: int) -> Float:
+    """Return derivatives ``[..., P]`` without those by the shapes at the added inputs."""
+    kept = [i * (inputs + n) + j for i in range(n) for j in range(inputs)]
+    end = 2 * n + n * (inputs + n)
+    shapes = derivatives[..., 2 * n : end][..., kept]
+    return np.concatenate([derivatives[..., : 2 * n], shapes, derivatives[..., end:]], axis=-1)
