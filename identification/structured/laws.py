@@ -18,13 +18,16 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 
 __all__ = [
+    "FROM_ZERO",
     "LAWS",
+    "POSITIVE",
     "Damper",
     "Iwan",
     "Jenkins",
     "Joint",
     "Law",
     "MagnetSpring",
+    "Masing",
     "PolynomialDamper",
     "PolynomialSpring",
     "SplineSpring",
@@ -48,6 +51,8 @@ class Way(NamedTuple):
     allowed: str
     least: float = -np.inf
     """Least value of what the fit moves."""
+    span: float = np.inf
+    """Largest distance of what the fit moves from its initial value."""
 
 
 def _between(low: float, high: float) -> Way:
@@ -56,11 +61,12 @@ def _between(low: float, high: float) -> Way:
         lambda y: np.arctanh((y - middle) / half),
         lambda v: middle + half * np.tanh(np.clip(v, -8.0, 8.0)),
         f"between {low:g} and {high:g}",
+        span=4.0,
     )
 
 
 PLAIN = Way(lambda y: y, lambda v: v, "finite numbers")
-POSITIVE = Way(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0")
+POSITIVE = Way(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0", span=np.log(1e3))
 FROM_ZERO = Way(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 0.0)
 
 
@@ -103,10 +109,11 @@ class Law:
         return np.concatenate(parts)
 
     @property
-    def least(self) -> Float:
-        """float[P], least values of `vector`."""
+    def bounds(self) -> Float:
+        """float[2, P], least and largest values of `vector` in a fit that begins at these numbers."""
         sizes = [np.size(getattr(self, name)) for name in self.free]
-        return np.repeat([way.least for way in self.free.values()], sizes)
+        least, span = (np.repeat([getattr(way, of) for way in self.free.values()], sizes) for of in ("least", "span"))
+        return np.array([np.maximum(self.vector - span, least), self.vector + span])
 
     def moved(self, vector: Float) -> Self:
         """Invert `vector`."""
@@ -318,6 +325,27 @@ class Jenkins(Joint):
 
 
 @dataclass(frozen=True, eq=False)
+class Masing(Joint):
+    """Sliders that slip at given displacements, with free stiffnesses: any joint that follows Masing's rule, in steps.
+
+    What slips beyond the training data is not seen there. Such a joint stays stuck in the model.
+    """
+
+    kind = "masing"
+    free: ClassVar = {"stiffness_n": FROM_ZERO}
+    linear = "stiffness_n"
+
+    stiffness_n: tuple[float, ...] = (1.0,) * 8
+    """Stiffness of each slider, N per unit of x, none below zero."""
+    slips: tuple[float, ...] = tuple(np.geomspace(0.02, 0.9, 8).round(4).tolist())
+    """Displacements x at which they slip."""
+
+    def sliders(self) -> Float:
+        """float[2, n]: stiffness and largest force."""
+        return np.array(self.stiffness_n) * np.array([np.ones(len(self.slips)), self.slips])
+
+
+@dataclass(frozen=True, eq=False)
 class Iwan(Joint):
     """Segalman's four-parameter Iwan joint (J. Appl. Mech. 72, 2005, 752), cut into sliders.
 
@@ -328,7 +356,7 @@ class Iwan(Joint):
     kind = "iwan"
     free: ClassVar = {"stiffness_n": POSITIVE, "slip": POSITIVE, "chi": _between(-0.95, 2.0), "beta": POSITIVE}
     linear = "stiffness_n"
-    tried: ClassVar = {"slip": (0.3, 1.0, 3.0, 10.0), "chi": (-0.5, 0.0, 0.5), "beta": (0.03, 0.3)}
+    tried: ClassVar = {"slip": (0.3, 1.0, 3.0), "chi": (-0.5, 0.0, 0.5), "beta": (0.03, 0.3)}
 
     stiffness_n: float = 1.0
     """Stiffness while nothing slips, N per unit of x."""
@@ -354,7 +382,7 @@ class Iwan(Joint):
 
 LAWS: dict[str, type[Law]] = {
     law.kind: law
-    for law in (PolynomialSpring, SplineSpring, Stop, MagnetSpring, UserSpring, PolynomialDamper, Jenkins, Iwan)
+    for law in (PolynomialSpring, SplineSpring, Stop, MagnetSpring, UserSpring, PolynomialDamper, Jenkins, Iwan, Masing)
 }
 """All laws by their names."""
 

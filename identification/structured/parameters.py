@@ -83,10 +83,11 @@ class Parameters:
         highest = np.log(0.45 / self.start.step_s)
         least[:modes], largest[:modes] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
         least[modes : 2 * modes], largest[modes : 2 * modes] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
-        laws = [self.start.elements[e].laws[law].least for e, law in laws_in_order(self.start.elements)]
+        laws = [self.start.elements[e].laws[law].bounds for e, law in laws_in_order(self.start.elements)]
         at = modes * (2 + len(self.start.inputs)) + sum(len(self._kept(element)) for element in self.start.elements)
-        bounds = np.concatenate([*laws, np.zeros(0)])
-        least[at : at + bounds.size] = bounds
+        for bounds in laws:
+            least[at : at + bounds.shape[1]], largest[at : at + bounds.shape[1]] = bounds
+            at += bounds.shape[1]
         return least, largest
 
     def model(self, vector: Float) -> StructuredModel:

@@ -14,7 +14,7 @@ from identification.linear.modes import LinearModes
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
 from identification.structured.kernels import slide_along
-from identification.structured.laws import POSITIVE, Damper, Joint, Law, Spring
+from identification.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, Law, Spring
 from identification.structured.model import StructuredModel
 
 __all__ = ["linear_start", "measured_velocity", "with_element"]
@@ -27,8 +27,10 @@ _LOWEST, _HIGHEST = 0.2, 6.0
 _POSITIONS = np.linspace(-1.0, 1.0, 21)
 """Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
 _RESIDUAL_DAMPING = 0.02
-_SMALLEST_ROOT = 1e-3
-"""Least initial damping of the element relative to the mode's, so that its derivative is not zero."""
+_LEAST_STIFFNESS, _LEAST_DAMPING = 0.25, 0.2
+"""What the initial element leaves of stiffness and damping of its mode."""
+_TINY = 1e-6
+"""Initial value (N) of a positive number that the regression finds to be zero."""
 
 
 def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> StructuredModel:
@@ -95,29 +97,28 @@ def with_element(
     omega = linear.omega.copy()
     found = [_regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))]
     best = min(found, key=lambda one: one.residual)
-    omega[mode] = np.sqrt(max(omega[mode] ** 2 + best.stiffness, 0.25 * omega[mode] ** 2))
+    own = omega[mode]
+    omega[mode] = np.sqrt(max(own**2 + best.stiffness, _LEAST_STIFFNESS * own**2))
+    damping = linear.damping_ratio.copy()
+    damping[mode] = max(damping[mode] * own + 0.5 * best.damping, _LEAST_DAMPING * damping[mode] * own) / omega[mode]
     direction = np.zeros(len(omega))
     direction[mode] = shape
-    least = _SMALLEST_ROOT * 2.0 * linear.damping_ratio[mode] * omega[mode] / shape**2
     element = NonlinearElement(
         direction=direction,
         scale_m=scale,
-        laws=tuple(_started(law, numbers, scale, least) for law, numbers in zip(best.laws, best.numbers, strict=True)),
+        laws=tuple(_started(law, numbers, scale) for law, numbers in zip(best.laws, best.numbers, strict=True)),
         reach=reach,
     )
-    return replace(linear, frequency_hz=omega / (2.0 * np.pi), elements=(element,))
+    return replace(linear, frequency_hz=omega / (2.0 * np.pi), damping_ratio=damping, elements=(element,))
 
 
-def _started(law: Law, numbers: Float, scale: float, least: float) -> Law:
+def _started(law: Law, numbers: Float, scale: float) -> Law:
     """Return a law with the linear numbers that the regression found in J or J s."""
     if not law.linear:
         return law
-    if isinstance(law, Damper):
-        found = np.maximum(numbers / scale**2, least)
-    elif law.free[law.linear] is POSITIVE:
-        found = np.maximum(numbers / scale, 1e-9)
-    else:
-        found = numbers / scale
+    found = numbers / (scale**2 if isinstance(law, Damper) else scale)
+    if law.free[law.linear] is POSITIVE:
+        found = np.maximum(found, _TINY)
     value = getattr(law, law.linear)
     return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})
 
@@ -193,9 +194,10 @@ class _Equation:
             return [one.force(x) for one in law.basis()]
         if isinstance(law, Damper):
             return [one.damping(x) * self.phi * self.rate for one in law.basis()]
-        out = np.zeros_like(x)
-        slide_along(np.ascontiguousarray(law.basis()[0].sliders().T), x, out)
-        return [out]
+        found = [np.zeros_like(x) for _ in law.basis()]
+        for one, out in zip(law.basis(), found, strict=True):
+            slide_along(np.ascontiguousarray(one.sliders().T), x, out)
+        return found
 
 
 class _Found(NamedTuple):
@@ -204,13 +206,21 @@ class _Found(NamedTuple):
     """Linear numbers of each law, J."""
     stiffness: float
     """Change of the squared frequency."""
+    damping: float
+    """Change of twice the damping ratio times the frequency, rad/s."""
     residual: float
 
 
 def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omega: float) -> _Found:
     """Return the numbers in which ``laws`` are linear, at the mean position of static balance."""
+    from scipy.optimize import lsq_linear  # only on use: it takes long to load
+
     linear = [law for law in laws if law.linear]
     memory = [[part.forces(law, 0.0) if isinstance(law, Joint) else None for law in linear] for part in parts]
+    sizes = [np.size(getattr(law, law.linear)) for law in linear]
+    ways = [law.free[law.linear] for law in linear]
+    least = np.repeat([0.0 if way in (POSITIVE, FROM_ZERO) else -np.inf for way in ways], sizes)
+    bounds = np.append(least, [-np.inf, -np.inf]), np.full(least.size + 2, np.inf)
 
     def solved(position: float) -> tuple[Float, float, list[list[list[Float]]]]:
         forces = [
@@ -218,25 +228,23 @@ def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omeg
             for part, kept in zip(parts, memory, strict=True)
         ]
         rows = [
-            np.fft.rfft([*(part.phi * f for of in by_law for f in of), part.q], axis=1)[:, part.lines].T / part.q.size
+            np.fft.rfft([*(part.phi * f for of in by_law for f in of), part.q, part.rate], axis=1)[:, part.lines].T
+            / part.q.size
             for part, by_law in zip(parts, forces, strict=True)
         ]
         columns, left = np.concatenate(rows), np.concatenate([part.left for part in parts])
         a, y = np.concatenate([columns.real, columns.imag]), np.concatenate([left.real, left.imag])
         scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
-        numbers = np.linalg.lstsq(a / scale, y, rcond=1e-10)[0] / scale
+        numbers = lsq_linear(a / scale, y, bounds=bounds, method="bvls").x / scale
         return numbers, float(np.linalg.norm(a @ numbers - y)), forces
 
     def unbalanced(position: float) -> float:
         numbers, _, forces = solved(position)
         means = [np.mean(f) for of in forces[0] for f in of]
-        return float(parts[0].phi * np.dot(means, numbers[:-1]) + (omega**2 + numbers[-1]) * position)
+        return float(parts[0].phi * np.dot(means, numbers[:-2]) + (omega**2 + numbers[-2]) * position)
 
     still = not any(isinstance(law, Spring) for law in linear)
-    numbers, residual, forces = solved(0.0 if still else _root(unbalanced, places))
-    ends = np.cumsum([0, *(len(of) for of in forces[0])])
-    split = {id(law): numbers[a:b] for law, a, b in zip(linear, ends[:-1], ends[1:], strict=True)}
-    negative = any(isinstance(law, Joint) and np.any(split[id(law)] <= 0.0) for law in linear)
-    return _Found(
-        laws, [split.get(id(law), np.zeros(0)) for law in laws], float(numbers[-1]), np.inf if negative else residual
-    )
+    numbers, residual, _ = solved(0.0 if still else _root(unbalanced, places))
+    split = iter(np.split(numbers[:-2], np.cumsum(sizes)[:-1]))
+    found = [next(split) if law.linear else np.zeros(0) for law in laws]
+    return _Found(laws, found, float(numbers[-2]), float(numbers[-1]), residual)

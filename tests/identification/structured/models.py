@@ -4,6 +4,7 @@ import numpy as np
 
 from identification import Channel, LinearModes
 from identification.structured.elements import NonlinearElement
+from identification.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring
 from identification.structured.model import StructuredModel
 
 FORCE = Channel("force", "force", "N")
@@ -12,7 +13,7 @@ RATE_HZ = 1000.0
 
 
 def beam(**changes) -> StructuredModel:
-    """Two modes and two elements of different kinds, the second one a one-sided spring that softens beyond its reach."""
+    """Two modes and two elements of different kinds with sliders, the second one softening beyond its reach."""
     numbers = {
         "frequency_hz": [25.0, 140.0],
         "damping_ratio": [0.01, 0.02],
@@ -21,9 +22,16 @@ def beam(**changes) -> StructuredModel:
         "direct": [[0.01], [0.0], [0.0]],
         "elements": (
             NonlinearElement(
-                direction=[0.9, -0.1], scale_m=1e-3, spring_n=[3.0, 1.5, 0.5, 0.2], damper_n_s_m=[0.4, 0.1]
+                direction=[0.9, -0.1],
+                scale_m=1e-3,
+                laws=(PolynomialSpring((3.0, 1.5, 0.5, 0.2)), PolynomialDamper((0.4, 0.1)), Jenkins(2.0, 0.3)),
             ),
-            NonlinearElement(direction=[1.4, 0.7], scale_m=2e-3, spring_n=[-1.0, -2.0], damper_n_s_m=[], reach=1.0),
+            NonlinearElement(
+                direction=[1.4, 0.7],
+                scale_m=2e-3,
+                laws=(PolynomialSpring((-1.0, -2.0)), Iwan(stiffness_n=3.0, slip=2.0, count=3)),
+                reach=1.0,
+            ),
         ),
         "sample_rate_hz": RATE_HZ,
         "inputs": (FORCE,),

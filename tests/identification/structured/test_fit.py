@@ -8,11 +8,13 @@ import pytest
 from identification import Channel, IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
+from identification.structured.laws import PolynomialDamper, PolynomialSpring
 from identification.structured.fit import fit_structured
 from identification.structured.parameters import Parameters
 from tests.identification.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
 
-ELEMENT = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, spring_n=[3.0, 1.5, 0.5, 0.2], damper_n_s_m=[0.4])
+LAWS = (PolynomialSpring((3.0, 1.5, 0.5, 0.2)), PolynomialDamper((0.4,)))
+ELEMENT = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, laws=LAWS)
 TRUE = beam(elements=(ELEMENT,), support_n_m=0.0)
 
 
@@ -37,7 +39,7 @@ def law_at(model, z):
     """Force of the whole spring in the direction of the element at the first mode's displacement, N."""
     element = model.elements[0]
     x = z / element.scale_m
-    return sum(a * x ** (k + 2) for k, a in enumerate(element.spring_n)) * element.direction[0]
+    return element.laws[0].force(x) * element.direction[0]
 
 
 def test_a_known_model_comes_back():
@@ -110,7 +112,7 @@ def test_standard_errors_hold_white_noise():
         ),
         ({"initial_state": "estimated"}, {}, r"experiments\[0\].initial_state: is 'estimated', allowed is zero"),
         ({"period_samples": 0}, {}, r"experiments: none is periodic, needs one at least"),
-        ({}, {"springs": 0}, r"springs, dampers: are 0 and 1, allowed are from 1 and from 0"),
+        ({}, {"laws": ()}, r"laws: is empty, needs one at least"),
         ({}, {"steps": 0}, r"steps: is 0, allowed is 1 or above"),
         ({}, {"reach": 0.0}, r"reach: is 0, must be finite and above zero"),
         (

@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 
 from identification import IdentificationError
 from identification.structured.elements import NonlinearElement
-from identification.structured.laws import damping_of, spring_of
+from identification.structured.kernels import damping_at, spring_at
+from identification.structured.laws import PolynomialDamper, PolynomialSpring
 from identification.structured.model import ends_of_steps, room_for
 from identification.structured.parameters import Parameters
 from identification.structured.steps import end_step, run, take_input, take_step
@@ -19,14 +20,14 @@ from tests.identification.structured.models import RATE_HZ, beam, multisine
 
 def spring(system, e, x):
     """Force, slope and potential of an element (J)."""
-    springs, size = system.sizes[e]
-    return spring_of(x, system.laws[e, :size], springs, *system.limits[e])
+    return spring_at(x, system.tables.springs[e], system.tables.limits[e])
 
 
 def energy(system, state):
     n = system.omega.size
     q, v = state[:n], state[n : 2 * n]
     stored = 0.5 * v @ v + 0.5 * np.sum((system.omega * q) ** 2)
+    stored += np.sum(0.5 * state[2 * n + 1 :] ** 2 / system.tables.sliders[:, 0])
     return stored + sum(spring(system, e, float(phi @ q))[2] for e, phi in enumerate(system.phi))
 
 
@@ -34,30 +35,40 @@ def energy(system, state):
 def test_over_every_step_the_energy_changes_by_work_less_damping(rms_n):
     model = beam(support_n_m=0.0)
     system, u = model.system, multisine(rms_n, 1)[:, :400]
-    room, ends, state = room_for(system), ends_of_steps(u, model.steps), np.zeros(5)
-    q, v = state[:2], state[2:4]
+    room, ends, state = room_for(system), ends_of_steps(u, model.steps), np.zeros(system.size)
+    q, v, r = state[:2], state[2:4], state[5:]
     used = []
     for row in range(len(ends) - 1):
-        before, z = energy(system, state), system.phi @ q
+        before, x, sliding = energy(system, state), system.phi @ q, r.copy()
         take_input(system, room, ends, row, row + 1, 0.0)
-        take_step(system, room, q, v)
+        take_step(system, room, q, v, r)
         work = room.mean @ (system.b @ room.u)
         lost = np.sum(2.0 * system.zeta * system.omega * room.mean**2)
         for e, w in enumerate(system.phi @ room.mean):
-            law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
-            lost += damping_of(z[e] + 0.5 * system.step_s * w, law, springs, system.limits[e, 0])[0] * w**2
+            h, tables = system.step_s, system.tables
+            lost += damping_at(x[e] + 0.5 * h * w, tables.dampers[e], tables.limits[e, 0])[0] * w**2
+            for s in range(tables.first[e], tables.first[e + 1]):
+                # friction takes the largest force times the way that the slider slips
+                stiffness, strength = tables.sliders[s]
+                slipped = max(abs(sliding[s] + stiffness * h * w) - strength, 0.0) / stiffness
+                lost += strength * slipped / h
         end_step(system, room, q, v, state)
         assert lost >= 0.0
-        used.append(np.abs(system.phi @ q) / system.limits[:, 0])
+        used.append(np.abs(system.phi @ q) / system.tables.limits[:, 0])
         size = max(before, energy(system, state), system.step_s * abs(work))
         assert energy(system, state) - before == pytest.approx(system.step_s * (work - lost), abs=1e-9 * size)
     assert (np.max(used) > 1.0) == (rms_n > 100.0)
 
 
+def smooth(**changes):
+    """The beam without its joints."""
+    first, second = beam().elements
+    return beam(elements=(replace(first, laws=first.laws[:2]), replace(second, laws=second.laws[:1])), **changes)
+
+
 def continuous(model, u, times):
     """Right-hand side of the equation of motion, written anew, with the support's filter."""
     omega, zeta, b = model.omega, model.damping_ratio, model.input_shapes[:, 0]
-    system = model.system
 
     def rates(t, x):
         q, v = x[:2], x[2:4]
@@ -66,8 +77,10 @@ def continuous(model, u, times):
         a = b * force - 2.0 * zeta * omega * v - omega**2 * q
         for e, element in enumerate(model.elements):
             z, rate = element.direction @ q, element.direction @ v
-            damper = sum(c * abs(z / element.scale_m) ** (j + 1) for j, c in enumerate(element.damper_n_s_m))
-            a -= element.direction * (spring(system, e, z / element.scale_m)[0] / element.scale_m + damper * rate)
+            force = element.laws[0].force(z / element.scale_m)
+            if e == 0:
+                force = force + element.laws[1].damping(z / element.scale_m) * rate
+            a -= element.direction * force
         return np.concatenate([v, a, [2.0 * np.pi * model.support_corner_hz * (b @ q - x[4])]])
 
     return rates
@@ -77,7 +90,7 @@ def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_st
     u = multisine(1.0, 2)[:, :300]
     errors = []
     for steps in (4, 8):
-        model = beam(steps=steps)
+        model = smooth(steps=steps)
         ends = ends_of_steps(u, steps)[:, 0]
         times = np.arange(ends.size) / (RATE_HZ * steps)
         # steps no longer than the kinks of the linearly interpolated force are apart
@@ -153,12 +166,17 @@ def test_derivatives_are_those_of_finite_differences(force_n):
 
 
 def _with_limits(model, start, u):
-    """Outputs of a model with the least slopes of another."""
+    """Outputs of a model that has the slopes beyond the reach of another where that one's are limited."""
     from identification.structured.model import outputs_of
 
-    system = model.system._replace(limits=start.system.limits)
+    system, limits = model.system, model.system.tables.limits.copy()
+    frozen = start.system.tables
+    ends = frozen.springs[:, 1, [0, -1]] * (frozen.springs.shape[2] - 1) / (2.0 * frozen.limits[:, :1])
+    limited = ~np.isclose(ends, frozen.limits[:, 1:], rtol=1e-9)
+    limits[:, 1:][limited] = frozen.limits[:, 1:][limited]
+    system = system._replace(tables=system.tables._replace(limits=limits))
     states = np.zeros((u.shape[1], 3, 2))
-    run(system, room_for(system), ends_of_steps(u, model.steps), np.zeros(5), states)
+    run(system, room_for(system), ends_of_steps(u, model.steps), np.zeros(system.size), states)
     return outputs_of(model, u, states)
 
 
@@ -180,7 +198,9 @@ def test_model_and_vector_are_each_other_s_inverse():
     st.floats(-1.0, 1.0),
 )
 def test_whatever_the_coefficients_the_potential_energy_rises_far_away(springs, across, reach, one, other):
-    element = NonlinearElement(direction=[1.0, across], scale_m=1e-3, spring_n=springs, damper_n_s_m=[], reach=reach)
+    element = NonlinearElement(
+        direction=[1.0, across], scale_m=1e-3, laws=(PolynomialSpring(tuple(springs)),), reach=reach
+    )
     system = beam(elements=(element, element)).system
     direction = np.array([one, other]) / max(np.hypot(one, other), 1e-3)
 
@@ -197,7 +217,7 @@ def test_whatever_the_coefficients_the_potential_energy_rises_far_away(springs, 
 @pytest.mark.parametrize("seed", range(6))
 def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
     rng = np.random.default_rng(seed)
-    model = beam(support_n_m=0.0)
+    model = smooth(support_n_m=0.0)
     samples = 4000
     forces = {
         0: multisine(300.0, seed, samples)[0],
@@ -238,8 +258,8 @@ def test_a_model_that_cannot_be_is_refused(changes, message):
 
 
 def test_an_element_that_would_do_work_is_refused():
-    with pytest.raises(IdentificationError, match=r"damper_n_s_m is \[-1.0\], allowed are numbers from 0"):
-        replace(beam().elements[0], damper_n_s_m=[-1.0])
+    with pytest.raises(IdentificationError, match=r"coefficients_n_s_m is \[-1.0\], allowed are numbers from 0"):
+        PolynomialDamper((-1.0,))
     with pytest.raises(IdentificationError, match=r"elements\[0\].direction: shape \(1,\), needs \(2,\)"):
         beam(elements=(replace(beam().elements[0], direction=[1.0]),))
     with pytest.raises(IdentificationError, match=r"inputs: shape \(2, 9\), needs 1 rows"):
