@@ -29,6 +29,8 @@ _ROUGH, _FINE = 1e-3, 1e-6
 _EVALUATIONS = 100
 _LEADS = (0.05, 0.01)
 """Damping ratios of the forces that lead the measured modes in the first fits."""
+_MISFIT = 0.01
+"""Relative misfit of the samples against which the errors of the modal test are weighed."""
 _SUPPORT = 0.03
 """Initial stiffness of the support relative to the first mode's at the drive point."""
 
@@ -124,12 +126,14 @@ def fit_structured(
     start = replace(start, support_n_m=stiffness)
     parameters, evaluations = Parameters(start, tied, support), 0
     vector = parameters.vector(start)
+    moves = int(np.argmax(np.abs(start.elements[0].direction)))
+    expected = parameters.expected(modes, moves)
     velocities = [measured_velocity(linear, e, len(modes.frequency_hz)) if e.period_samples else None for e in experiments]
     before = 2.0 * _LEADS[0] * linear.omega * (np.arange(len(linear.omega)) < len(modes.frequency_hz))
     for ratio in (*_LEADS, 0.0):
         rate = before * ratio / _LEADS[0]
         leads = [None if velocity is None else Lead(before, rate, velocity) for velocity in velocities]
-        problem = _Problem(parameters, experiments, leads)
+        problem = _Problem(parameters, experiments, leads, expected)
         vector, more = problem.solve(vector, _ROUGH if ratio else _FINE)
         evaluations += more
     triangle = problem.triangle(vector)
@@ -142,7 +146,7 @@ def fit_structured(
         names=problem.parameters.names,
         values=vector,
         covariance=covariance,
-        training_error=float(np.linalg.norm(residual) / np.sqrt(problem.count)),
+        training_error=problem.error,
         evaluations=evaluations,
         seconds=time.perf_counter() - began,
         stopped=problem.stopped,
@@ -157,10 +161,16 @@ class _Problem:
     """
 
     def __init__(
-        self, parameters: Parameters, experiments: Sequence[Experiment], leads: Sequence[Lead | None] | None = None
+        self,
+        parameters: Parameters,
+        experiments: Sequence[Experiment],
+        leads: Sequence[Lead | None],
+        expected: tuple[Float, Float],
     ) -> None:
         self.parameters, self.experiments, self.stopped = parameters, experiments, ""
-        self.leads = leads or [None] * len(experiments)
+        self._expected, std = expected
+        self._trust = _MISFIT / std
+        self.leads = leads
         outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
         self.count = outputs.size
         self._scale = np.sqrt(np.mean(outputs**2, axis=1))
@@ -170,14 +180,18 @@ class _Problem:
                     f"output '{channel.name}': is zero throughout the training data; leave it out"
                 )
         self._known: tuple[bytes, Float] | None = None
+        self.error = np.nan
+        """RMS of the residual of the last vector over that of the outputs."""
 
     def triangle(self, vector: Float) -> Float:
-        """float[P + 1, P + 1]: the triangle of derivatives and residuals of all experiments, kept for the last vector."""
+        """float[P + 1, P + 1]: triangle of derivatives and residuals of all experiments and of what is expected, kept for the last."""
         if self._known is None or self._known[0] != vector.tobytes():
             model = self.parameters.model(vector)
             with threads() as count, ThreadPoolExecutor(count) as pool:
                 parts = list(pool.map(partial(self._of_one, model), self.experiments, self.leads))
-            self._known = vector.tobytes(), _triangle(np.concatenate(parts))
+            prior = np.column_stack([np.diag(self._trust), self._trust * (vector - self._expected)])
+            self._known = vector.tobytes(), _triangle(np.concatenate([*parts, prior]))
+            self.error = float(np.sqrt(sum(part[:, -1] @ part[:, -1] for part in parts) / self.count))
         return self._known[1]
 
     def _of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:

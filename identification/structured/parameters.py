@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.linear.modes import LinearModes
 from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
 from identification.structured.leading import Lead, led, not_led, own_shapes
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
@@ -16,6 +17,8 @@ Float = NDArray[np.float64]
 
 _NEAR = float(np.log(2.0))
 """Logarithm of the factor within which a frequency stays."""
+_FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
+"""What a modal test is trusted to: relative errors that are added to its own, and those of the residual mode."""
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 
 
@@ -74,6 +77,31 @@ class Parameters:
             parts.append(np.sqrt([model.support_n_m]))
         parts += [model.output_shapes[self._untied].ravel(), model.direct.ravel()]
         return np.concatenate(parts)
+
+    def expected(self, modes: LinearModes, mode: int) -> tuple[Float, Float]:
+        """Return what a modal test says of the numbers, and its standard deviations; infinite where it says nothing.
+
+        Frequency and damping of ``mode``, that of the element, are left to the data: a joint changes them. The last mode is the
+        residual of the modes above, of which little is known.
+        """
+        count, measured = len(self.start.frequency_hz), len(modes.frequency_hz)
+        inputs, at = len(self.start.inputs), self.names.index
+        vector = self.vector(self.start)
+        std = np.full(vector.size, np.inf)
+        known = np.arange(count) < measured
+        frequency = np.full(count, _RESIDUAL_STD)
+        damping = np.ones(count)
+        frequency[:measured] = np.hypot(modes.frequency_std_hz / modes.frequency_hz, _FREQUENCY_STD)
+        damping[:measured] = np.hypot(modes.damping_ratio_std / modes.damping_ratio, _DAMPING_STD)
+        frequency[mode] = damping[mode] = np.inf
+        std[:count], std[count : 2 * count] = frequency, damping
+        largest = np.max(np.abs(self.start.output_shapes), axis=0)
+        shapes = np.where(known, _SHAPE_STD, _RESIDUAL_STD) * largest
+        std[2 * count : 2 * count + count * inputs] = np.repeat(shapes, inputs)
+        if self._untied:
+            first = at(f"shape 1 at {self.start.outputs[self._untied[0]].name}")
+            std[first : first + len(self._untied) * count] = np.tile(shapes, len(self._untied))
+        return vector, std
 
     def bounds(self, vector: Float) -> tuple[Float, Float]:
         """Return least and largest values, so that modes that the data hardly show stay modes."""
