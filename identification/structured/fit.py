@@ -24,14 +24,21 @@ __all__ = ["StructuredFit", "fit_structured"]
 
 Float = NDArray[np.float64]
 
-_ROUGH, _FINE = 1e-3, 1e-6
-"""Relative gains of a step below which the fit before the last one, and the last one, end."""
+_ROUGH, _FINE = 1e-3, 1e-5
+"""Relative gains of a step below which the fits before the last one, and the last one, end."""
 _EVALUATIONS = 100
-_LEADS = (0.05, 0.01)
-"""Damping ratios of the forces that lead the measured modes in the first fits."""
+_LEAD = 0.05
+"""Damping ratio of the forces that lead the measured modes before the samples that count."""
+_STAGES = {
+    False: ((0.05, False), (0.01, False), (0.0, False)),
+    True: ((0.05, False), (0.01, False), (0.01, True), (0.0, True)),
+}
+"""Damping ratio of the leading forces in each fit, and whether the support is free; by whether it is asked for."""
+_SETTLED, _LONGEST = 1e-2, 8
+"""Share of the led motion's error that is left when a simulation counts, and most periods that this may take."""
 _MISFIT = 0.01
 """Relative misfit of the samples against which the errors of the modal test are weighed."""
-_SUPPORT = 0.03
+_SUPPORT = 0.01
 """Initial stiffness of the support relative to the first mode's at the drive point."""
 
 
@@ -122,20 +129,32 @@ def fit_structured(
     start = with_element(linear, experiments, len(modes.frequency_hz), laws, reach)
     start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     tied = (find_role(first.output_channels, "drive"),)
-    stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2 if support else 0.0
-    start = replace(start, support_n_m=stiffness)
-    parameters, evaluations = Parameters(start, tied, support), 0
-    vector = parameters.vector(start)
+    stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     moves = int(np.argmax(np.abs(start.elements[0].direction)))
-    expected = parameters.expected(modes, moves)
-    velocities = [measured_velocity(linear, e, len(modes.frequency_hz)) if e.period_samples else None for e in experiments]
-    before = 2.0 * _LEADS[0] * linear.omega * (np.arange(len(linear.omega)) < len(modes.frequency_hz))
-    for ratio in (*_LEADS, 0.0):
-        rate = before * ratio / _LEADS[0]
-        leads = [None if velocity is None else Lead(before, rate, velocity) for velocity in velocities]
-        problem = _Problem(parameters, experiments, leads, expected)
-        vector, more = problem.solve(vector, _ROUGH if ratio else _FINE)
-        evaluations += more
+    found, evaluations = start, 0
+    measured = np.arange(len(linear.omega)) < len(modes.frequency_hz)
+    slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
+    for ratio, free in _STAGES[support]:
+        if free and not found.support_n_m:
+            found = replace(found, support_n_m=stiffness)
+        # the last fit is free for so long before it counts that nothing is left of the lead
+        lengths = [0 if ratio or not e.period_samples else _settling_periods(e, slowest) for e in experiments]
+        settled = [_prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
+        leads = [
+            Lead(
+                2.0 * _LEAD * linear.omega * measured,
+                2.0 * ratio * linear.omega * measured,
+                measured_velocity(linear, e, int(measured.sum())),
+                e.counted_from - count * e.period_samples,
+            )
+            if e.period_samples
+            else None
+            for e, count in zip(settled, lengths, strict=True)
+        ]
+        parameters = Parameters(start, tied, free)
+        problem = _Problem(parameters, settled, leads, parameters.expected(modes, moves))
+        vector, more = problem.solve(parameters.vector(found), _ROUGH if ratio else _FINE)
+        found, evaluations = parameters.model(vector), evaluations + more
     triangle = problem.triangle(vector)
     jacobian, residual = triangle[:, :-1], triangle[:, -1]
     freedom = max(problem.count - vector.size, 1)
@@ -151,6 +170,27 @@ def fit_structured(
         seconds=time.perf_counter() - began,
         stopped=problem.stopped,
     )
+
+
+def _settling_periods(experiment: Experiment, rate: float) -> int:
+    """Periods in which a motion that decays with ``rate`` (rad/s) falls to `_SETTLED`."""
+    seconds = experiment.period_samples / experiment.sample_rate_hz
+    return min(int(np.ceil(np.log(1.0 / _SETTLED) / (rate * seconds))), _LONGEST)
+
+
+def _prolonged(experiment: Experiment, periods: int) -> Experiment:
+    """Return an experiment with more periods before those that count."""
+    if not periods:
+        return experiment
+    inputs, outputs = (
+        np.concatenate([values[:, : experiment.counted_from], np.tile(one, periods), values[:, experiment.counted_from :]], axis=1)
+        for values, one in (
+            (experiment.inputs, experiment.counted_inputs[:, : experiment.period_samples]),
+            (experiment.outputs, experiment.counted_outputs[:, : experiment.period_samples]),
+        )
+    )
+    begins = experiment.counted_from + periods * experiment.period_samples
+    return replace(experiment, inputs=inputs, outputs=outputs, counted_from=begins)
 
 
 class _Problem:

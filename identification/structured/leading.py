@@ -25,14 +25,17 @@ class Lead:
     Parameters
     ----------
     before, rate
-        float[n_modes], rates before the counted samples and in them, rad/s; 0 for a mode that is not led.
+        float[n_modes], rates up to sample ``until`` and from there on, rad/s; 0 for a mode that is not led.
     velocity
         float[n_modes, n], measured modal velocities at the samples.
+    until
+        Number of samples that are led at the rate ``before``.
     """
 
     before: Float
     rate: Float
     velocity: Float
+    until: int
 
     def inputs(self, ends: Float, steps: int) -> Float:
         """Return inputs at the ends of steps with one more for each mode."""

@@ -27,8 +27,8 @@ class Parameters:
     """Which numbers of a model are free, and their order in a vector.
 
     Logarithms of frequencies and damping ratios; input shapes; of each element the direction without its largest component
-    (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move them; the root of the
-    support's stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
+    (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move them; the support's
+    stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Parameters:
             parts.append(element.direction[self._kept(first)])
         parts += [model.elements[e].laws[law].vector for e, law in laws_in_order(model.elements)]
         if self.support:
-            parts.append(np.sqrt([model.support_n_m]))
+            parts.append(np.array([model.support_n_m]))
         parts += [model.output_shapes[self._untied].ravel(), model.direct.ravel()]
         return np.concatenate(parts)
 
@@ -116,6 +116,8 @@ class Parameters:
         for bounds in laws:
             least[at : at + bounds.shape[1]], largest[at : at + bounds.shape[1]] = bounds
             at += bounds.shape[1]
+        if self.support:
+            least[at] = 0.0
         return least, largest
 
     def model(self, vector: Float) -> StructuredModel:
@@ -141,7 +143,7 @@ class Parameters:
             replace(element, direction=direction, laws=tuple(found))
             for element, direction, found in zip(start.elements, directions, laws, strict=True)
         )
-        stiffness = float(take(1)[0] ** 2) if self.support else start.support_n_m
+        stiffness = max(float(take(1)[0]), 0.0) if self.support else start.support_n_m
         outputs = np.empty_like(start.output_shapes)
         outputs[list(self.tied)] = shapes[:, 0]
         outputs[self._untied] = take(len(self._untied) * modes).reshape(-1, modes)
@@ -162,15 +164,16 @@ class Parameters:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
         system, modes = model.system, len(model.frequency_hz)
         inputs, ends = len(model.inputs), ends_of_steps(u, model.steps)
-        parts = [system, system]
+        parts, until = [system, system], counted_from
         if lead is not None:
+            until = lead.until
             parts, ends = [led(system, lead.before), led(system, lead.rate)], lead.inputs(ends, model.steps)
         changes = changes_of(model.elements, system.tables)
         count = 2 * modes + modes * parts[0].b.shape[1] + system.phi.size + changes.element.size + 1
         states = np.zeros((u.shape[1], 3, modes))
         raw = np.zeros((u.shape[1] - counted_from, len(model.outputs), count))
         state, sens = np.zeros(system.size), np.zeros((system.size, count))
-        for part, first, last in zip(parts, (0, counted_from), (counted_from, u.shape[1]), strict=True):
+        for part, first, last in zip(parts, (0, until), (until, u.shape[1]), strict=True):
             run_with_sensitivities(
                 part,
                 room_for(part, count),
@@ -209,7 +212,7 @@ class Parameters:
             at += modes
         columns.append(raw[..., at:-1])
         if self.support:
-            columns.append(raw[..., -1:] * 2.0 * np.sqrt(model.support_n_m))
+            columns.append(raw[..., -1:])
         for output in self._untied:
             part = np.zeros((*raw.shape[:2], modes))
             part[:, output] = motions[:, output]

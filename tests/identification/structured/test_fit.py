@@ -19,9 +19,9 @@ TRUE = beam(elements=(ELEMENT,), support_n_m=0.0)
 
 
 def experiment(model=TRUE, rms_n=2.0, seed=1, noise=0.0) -> Experiment:
-    """One period after another one for the transient to decay."""
-    inputs = np.tile(multisine(rms_n, seed), 2)
-    outputs = model.simulate(inputs).outputs
+    """A steady period after another one."""
+    inputs = np.tile(multisine(rms_n, seed), 8)
+    inputs, outputs = inputs[:, -4000:], model.simulate(inputs).outputs[:, -4000:]
     scatter = np.random.default_rng(100 + seed).standard_normal(outputs.shape)
     outputs = outputs + noise * np.std(outputs, axis=1, keepdims=True) * scatter
     return Experiment(
@@ -52,9 +52,9 @@ def test_a_known_model_comes_back():
     z = np.linspace(-1e-3, 1e-3, 9)
     ratio = found.model.elements[0].direction[0] / ELEMENT.direction[0]
     np.testing.assert_allclose(law_at(found.model, ratio * z), law_at(TRUE, z), rtol=1e-2, atol=2e-3)
-    fresh = experiment(seed=9, rms_n=3.0)
-    outputs = found.model.simulate(fresh.inputs).outputs
-    assert np.linalg.norm(outputs - fresh.outputs) < 1e-3 * np.linalg.norm(fresh.outputs)
+    fresh = multisine(3.0, 9, 8000)
+    outputs, true = (model.simulate(fresh).outputs for model in (found.model, TRUE))
+    assert np.linalg.norm(outputs - true) < 1e-3 * np.linalg.norm(true)
 
 
 def test_the_static_force_that_no_sensor_shows_is_found():
@@ -133,17 +133,19 @@ def test_an_output_that_is_zero_is_refused():
         fit_structured(linear_modes(TRUE, 1), [silent])
 
 
-def test_at_the_minimum_the_residual_is_orthogonal_to_all_derivatives():
-    data = [experiment(noise=0.01, seed=1), experiment(noise=0.01, seed=2, rms_n=1.0)]
+def test_the_motion_before_the_counted_samples_does_not_matter_and_the_minimum_is_one():
+    """Led by the measured motion, a simulation begins in the steady state, as a long run from rest does."""
+    data = [experiment(noise=0.002, seed=1), experiment(noise=0.002, seed=2, rms_n=1.0)]
     found = fit_structured(linear_modes(TRUE, 1), data, support=False)
     parameters = Parameters(found.start, (0,), False)
     scale = np.sqrt(np.mean(np.concatenate([one.counted_outputs for one in data], axis=1) ** 2, axis=1))
     rows, residuals = [], []
     for one in data:
-        outputs, derivatives = parameters.derivatives(found.model, one.inputs, one.counted_from)
+        inputs = np.tile(one.inputs, 4)
+        outputs, derivatives = parameters.derivatives(found.model, inputs, inputs.shape[1] - 2000)
         rows.append((derivatives / scale[:, None]).reshape(-1, found.values.size))
         residuals.append(((outputs - one.counted_outputs.T) / scale).ravel())
     jacobian, residual = np.concatenate(rows), np.concatenate(residuals)
-    assert found.training_error == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-9)
+    assert found.training_error == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-2)
     cosines = jacobian.T @ residual / (np.linalg.norm(jacobian, axis=0) * np.linalg.norm(residual))
-    assert np.max(np.abs(cosines)) < 0.01
+    assert np.max(np.abs(cosines)) < 0.05
