@@ -29,7 +29,7 @@ class NonlinearElement:
 
     With the element's displacement ``z = direction . q`` relative to its scale, ``x = z / scale_m``, the forces of all laws add
     up (`identification.structured.laws`). Beyond ``|x| = reach`` dampers stay constant, and springs go on as straight lines with
-    the slope that they have there, within limits that `StructuredModel` states.
+    the mean slope of both ends, within limits that `StructuredModel` states.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Fl
     springs = np.array([element.spring(element.laws) for element in elements]).reshape(-1, 3, NODES)
     sliders = [element.sliders(element.laws) for element in elements]
     limits = [
-        [element.reach, *np.clip(_end_slopes(element, table), least, most)]
+        [element.reach, *np.repeat(np.clip(_end_slope(element, table), least, most), 2)]
         for element, table, least, most in zip(elements, springs, softest, stiffest, strict=True)
     ]
     return Tables(
@@ -147,8 +147,9 @@ def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Fl
     )
 
 
-def _end_slopes(element: NonlinearElement, table: Float) -> Float:
-    return np.asarray(table[1, [0, -1]] * (NODES - 1) / (2.0 * element.reach))
+def _end_slope(element: NonlinearElement, table: Float) -> float:
+    """Mean slope of a spring at both ends of its table."""
+    return float(np.mean(table[1, [0, -1]]) * (NODES - 1) / (2.0 * element.reach))
 
 
 def laws_in_order(elements: Sequence[NonlinearElement]) -> list[tuple[int, int]]:
@@ -173,9 +174,9 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
             owner.append(e)
             if isinstance(law, Spring):
                 change = (element.spring([more]) - element.spring([less])) / (2.0 * _NUDGE)
-                inside = np.isclose(_end_slopes(element, tables.springs[e]), tables.limits[e, 1:], rtol=1e-12, atol=0.0)
+                inside = np.isclose(_end_slope(element, tables.springs[e]), tables.limits[e, 1], rtol=1e-12, atol=0.0)
                 springs.append(change)
-                limits.append([element.reach, *(_end_slopes(element, change) * inside)])
+                limits.append([element.reach, *np.repeat(_end_slope(element, change) * inside, 2)])
             elif isinstance(law, Damper):
                 dampers.append((element.damper([more]) - element.damper([law])) / _NUDGE)  # linear; less may be below zero
             else:

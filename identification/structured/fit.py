@@ -38,6 +38,8 @@ _SETTLED, _LONGEST = 1e-2, 8
 """Share of the led motion's error that is left when a simulation counts, and most periods that this may take."""
 _MISFIT = 0.01
 """Relative misfit of the samples against which the errors of the modal test are weighed."""
+_LARGEST_STATIC = 10.0
+"""Largest static force relative to the largest RMS of the training forces."""
 _SUPPORT = 0.01
 """Initial stiffness of the support relative to the first mode's at the drive point."""
 
@@ -127,6 +129,8 @@ def fit_structured(
         raise IdentificationError("laws: is empty, needs one at least")
     linear = linear_start(modes, first, steps)
     start = with_element(linear, experiments, len(modes.frequency_hz), laws, reach)
+    largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
+    start = replace(start, support_largest_n=largest)
     start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     tied = (find_role(first.output_channels, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2

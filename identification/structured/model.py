@@ -33,6 +33,8 @@ class Motion:
         float[n_modes, n], modal coordinates (kg^1/2 m) and their derivatives by time.
     reach_use
         float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
+    unsolved_steps
+        Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold.
     """
 
     outputs: Float
@@ -40,6 +42,7 @@ class Motion:
     velocity: Float
     acceleration: Float
     reach_use: Float
+    unsolved_steps: int = 0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -201,6 +204,7 @@ class StructuredModel:
             velocity=states[:, 1].T,
             acceleration=states[:, 2].T,
             reach_use=np.asarray(largest / system.tables.limits[:, 0]),
+            unsolved_steps=int(room.unsolved[0]),
         )
 
     def with_steps(self, steps: int) -> "StructuredModel":

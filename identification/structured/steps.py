@@ -24,7 +24,8 @@ __all__ = ["Room", "System", "accelerate", "along", "end_step", "rigidity", "run
 
 NEWTON = 60  # iterations at most; a step that is not solved by then is counted
 CAREFUL = 12  # iterations with whole steps; those after them are halved
-EXACT = 1e-13  # relative change of w that ends Newton's iteration
+EXACT = 1e-13  # change of w that ends Newton's iteration, relative to the velocities that it is made of
+SMALL = 0.01  # weight of displacement over step among them
 
 
 class System(NamedTuple):
@@ -168,7 +169,10 @@ def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: floa
     done = True
     for e in range(elements):
         room.w[e] += share * room.change[e, 0]
-        if abs(room.change[e, 0]) > EXACT * abs(room.w[e]) + 1e-300:
+        size = abs(room.w[e])
+        for i in range(q.size):
+            size += abs(system.phi[e, i]) * (abs(room.free[i]) + SMALL * abs(q[i]) / system.step_s)
+        if abs(room.change[e, 0]) > EXACT * size + 1e-300:
             done = False
     return done
 

@@ -171,9 +171,9 @@ def _with_limits(model, start, u):
 
     system, limits = model.system, model.system.tables.limits.copy()
     frozen = start.system.tables
-    ends = frozen.springs[:, 1, [0, -1]] * (frozen.springs.shape[2] - 1) / (2.0 * frozen.limits[:, :1])
-    limited = ~np.isclose(ends, frozen.limits[:, 1:], rtol=1e-9)
-    limits[:, 1:][limited] = frozen.limits[:, 1:][limited]
+    ends = frozen.springs[:, 1, [0, -1]].mean(axis=1) * (frozen.springs.shape[2] - 1) / (2.0 * frozen.limits[:, 0])
+    limited = ~np.isclose(ends, frozen.limits[:, 1], rtol=1e-9)
+    limits[limited] = frozen.limits[limited]
     system = system._replace(tables=system.tables._replace(limits=limits))
     states = np.zeros((u.shape[1], 3, 2))
     run(system, room_for(system), ends_of_steps(u, model.steps), np.zeros(system.size), states)
