@@ -105,6 +105,7 @@ def identify(
 ) -> None:
     """Turn recordings into a model."""
     from rig.models.files.files import save
+    from rig.models.identify.data_request import DataOptions
     from rig.models.identify.identify import Request, identify_model
     from rig.models.identify.pnlss_request import PnlssOptions
     from rig.show.progress import FitLines
@@ -123,16 +124,18 @@ def identify(
         pnlss=PnlssOptions(
             states=states,
             degrees=degrees,
-            rate_hz=rate_hz,
-            input=input,
-            outputs=outputs,
             output_polynomials=False if no_output_polynomials else None,
             saturating=saturating,
             iterations=iterations,
+            resume=output if resume else None,
+        ),
+        data=DataOptions(
+            rate_hz=rate_hz,
+            input=input,
+            outputs=outputs,
             validation=tuple(validation or ()),
             hold_out=hold_out,
             relative=True if relative else None,
-            resume=output if resume else None,
         ),
     )
     with insisting() as signals:

@@ -66,7 +66,7 @@ def identify_model(
     if request.kind == "pnlss":
         from rig.models.identify.pnlss import identified_pnlss  # a second, which the other models need not wait for
 
-        return identified_pnlss(paths, request.pnlss, progress)
+        return identified_pnlss(paths, request.pnlss, request.data, progress)
     return _MODELS[request.kind](paths, request)
 
 

@@ -7,6 +7,7 @@ from typing import get_args
 
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
+from rig.models.identify.data_request import DataOptions
 from rig.models.identify.pnlss_request import PnlssOptions
 
 __all__ = ["Request"]
@@ -16,8 +17,10 @@ _OPTIONS: dict[str, tuple[str, ...]] = {
     "linear": ("estimator", "band_hz", "count"),
     "force-surface": (),
     "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
-    "pnlss": tuple(PnlssOptions().given()),
+    "pnlss": (*PnlssOptions().given(), *DataOptions().given()),
 }
+_OF_THE_FIT = ("states", "degrees", "output_polynomials", "saturating", "rate_hz", "input", "outputs")
+"""Options that a fit which goes on has already."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +45,8 @@ class Request:
     """Number of modes of a linear model; determined automatically if None."""
     pnlss: PnlssOptions = field(default_factory=PnlssOptions)
     """Options for a nonlinear state-space model."""
+    data: DataOptions = field(default_factory=DataOptions)
+    """Data of a nonlinear state-space model."""
 
     def __post_init__(self) -> None:
         if self.kind not in _OPTIONS:
@@ -67,6 +72,7 @@ class Request:
             "estimator": self.estimator != "instrument",
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
+            **self.data.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
             if name not in _OPTIONS[self.kind]:
@@ -74,3 +80,6 @@ class Request:
                 raise ConfigurationError(f"`{name}`: means nothing to `kind` {self.kind}, which takes {allowed}")
         if self.amplifier_gain is not None and self.resistance_ohm is None:
             raise ConfigurationError("`amplifier_gain`: is for the resistance; add `resistance_ohm`, or leave it out")
+        for name in _OF_THE_FIT if self.pnlss.resume is not None else ():
+            if given[name]:
+                raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")
