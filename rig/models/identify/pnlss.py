@@ -3,18 +3,13 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import compress
 from pathlib import Path
-
-import numpy as np
 
 from identification import (
     FitProgress,
     FitSettings,
-    PnlssFit,
     fit_pnlss,
     identify_pnlss,
-    simulated_run,
 )
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording
@@ -67,7 +62,15 @@ def identified_pnlss(
             settings=settings,
             progress=progress,
         )
-    return _with_errors(fit, data, time.perf_counter() - begun)
+    found = IdentifiedPnlss(
+        model=fit.model,
+        fit=fit,
+        seconds=time.perf_counter() - begun,
+        notes=data.notes,
+        data=data.fingerprint,
+        uses=uses_of(data.training, data.validation),
+    )
+    return found.judged(data.training, data.validation, fit.initial_states)
 
 
 def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
@@ -110,34 +113,3 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: FitDat
     done = 0 if earlier.fit is None else earlier.fit.history.iterations
     if options.iterations is not None and options.iterations <= done:
         raise ConfigurationError(f"`iterations` = {options.iterations}: {done} are done; allowed is more")
-
-
-def _with_errors(fit: PnlssFit, data: FitData, seconds: float) -> IdentifiedPnlss:
-    """Add to a fit its errors on all data, and what is drawn of the data."""
-    every = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
-    begins = iter(fit.initial_states)
-    states = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every]
-    moved = [bool(np.all(np.any(one.counted_outputs != 0.0, axis=1))) for one, _ in every]
-    both, known = list(compress(every, moved)), list(compress(states, moved))
-    still = [
-        f"{one.name}: an output is zero throughout, so that it has no errors"
-        for (one, _), is_moved in zip(every, moved, strict=True)
-        if not is_moved
-    ]
-    runs = tuple(
-        simulated_run(fit.model, one, initial_state=begin, use=use)
-        for (one, use), begin in zip(both, known, strict=True)
-    )
-    linear = fit.linear
-    linear_runs = () if linear is None else tuple(simulated_run(linear, one, use=use) for one, use in both)
-    found = IdentifiedPnlss(
-        model=fit.model,
-        fit=fit,
-        runs=runs,
-        linear_runs=linear_runs,
-        seconds=seconds,
-        notes=(*data.notes, *still),
-        data=data.fingerprint,
-        uses=uses_of(data.training, data.validation),
-    )
-    return found.on(data.training, data.validation)
