@@ -41,6 +41,8 @@ class NonlinearElement:
         Springs, dampers and joints.
     reach
         Largest ``|x|`` of springs and dampers.
+    largest
+        Largest ``|x|`` in the training data; None if unknown.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class NonlinearElement:
     scale_m: float
     laws: tuple[Law, ...]
     reach: float = 3.0
+    largest: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", finite_array("element: direction", self.direction, np.float64, 1))
@@ -177,7 +180,9 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
                 springs.append(change)
                 limits.append([element.reach, *(_end_slopes(element, change) * inside)])
             elif isinstance(law, Damper):
-                dampers.append((element.damper([more]) - element.damper([law])) / _NUDGE)  # linear; less may be below zero
+                dampers.append(
+                    (element.damper([more]) - element.damper([law])) / _NUDGE
+                )  # linear; less may be below zero
             else:
                 change = np.zeros_like(tables.sliders)
                 moved = (element.sliders([more]) - element.sliders([less])) / (2.0 * _NUDGE)

@@ -160,7 +160,7 @@ def fit_structured(
     freedom = max(problem.count - vector.size, 1)
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom
     return StructuredFit(
-        model=problem.parameters.model(vector),
+        model=problem.parameters.model(vector).trained_with([experiment.inputs for experiment in experiments]),
         start=start,
         names=problem.parameters.names,
         values=vector,

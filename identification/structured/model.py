@@ -33,6 +33,8 @@ class Motion:
         float[n_modes, n], modal coordinates (kg^1/2 m) and their derivatives by time.
     reach_use
         float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
+    range_use
+        Largest displacement of any element over its largest in the training data; NaN if that is unknown.
     """
 
     outputs: Float
@@ -40,6 +42,13 @@ class Motion:
     velocity: Float
     acceleration: Float
     reach_use: Float
+    range_use: float = float("nan")
+
+    @property
+    def unbounded_at(self) -> int | None:
+        """First sample at which an output is not finite; None if there is none."""
+        wrong = ~np.all(np.isfinite(self.outputs), axis=0)
+        return int(np.argmax(wrong)) if wrong.any() else None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -201,7 +210,17 @@ class StructuredModel:
             velocity=states[:, 1].T,
             acceleration=states[:, 2].T,
             reach_use=np.asarray(largest / system.tables.limits[:, 0]),
+            range_use=max(
+                (float(x / e.largest) for x, e in zip(largest, self.elements, strict=True) if e.largest),
+                default=float("nan"),
+            ),
         )
+
+    def trained_with(self, runs: Sequence[ArrayLike]) -> "StructuredModel":
+        """Return the model with the largest displacements of its elements under ``runs``, float[n_inputs, n] each."""
+        use = np.max([self.simulate(inputs).reach_use for inputs in runs], axis=0)
+        known = zip(self.elements, use.tolist(), strict=True)
+        return replace(self, elements=tuple(replace(e, largest=share * e.reach) for e, share in known))
 
     def with_steps(self, steps: int) -> "StructuredModel":
         """Return the model with another number of steps in a sample."""

@@ -95,7 +95,9 @@ def with_element(
     parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
     places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
     omega = linear.omega.copy()
-    found = [_regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))]
+    found = [
+        _regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))
+    ]
     best = min(found, key=lambda one: one.residual)
     own = omega[mode]
     omega[mode] = np.sqrt(max(own**2 + best.stiffness, _LEAST_STIFFNESS * own**2))

@@ -9,6 +9,7 @@ from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.models.identify.data_request import DataOptions
 from rig.models.identify.pnlss_request import PnlssOptions
+from rig.models.identify.structured_request import StructuredOptions
 
 __all__ = ["Request"]
 
@@ -18,6 +19,7 @@ _OPTIONS: dict[str, tuple[str, ...]] = {
     "force-surface": (),
     "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
     "pnlss": (*PnlssOptions().given(), *DataOptions().given()),
+    "structured": ("modes", *StructuredOptions().given(), *(name for name in DataOptions().given() if name != "input")),
 }
 _OF_THE_FIT = ("states", "degrees", "output_polynomials", "saturating", "rate_hz", "input", "outputs")
 """Options that a fit which goes on has already."""
@@ -28,9 +30,9 @@ class Request:
     """What to identify, and how."""
 
     kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter`` or ``pnlss``."""
+    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter``, ``pnlss`` or ``structured``."""
     modes: Path | None = None
-    """Linear model whose mode shapes are used for a nonlinear mode."""
+    """Linear model whose mode shapes are used for a nonlinear mode, or with which a structured model begins."""
     estimator: str = "instrument"
     """Estimator of the responses for a linear model: ``instrument``, ``H1`` or ``H2``."""
     band_hz: tuple[float, float] | None = None
@@ -45,8 +47,10 @@ class Request:
     """Number of modes of a linear model; determined automatically if None."""
     pnlss: PnlssOptions = field(default_factory=PnlssOptions)
     """Options for a nonlinear state-space model."""
+    structured: StructuredOptions = field(default_factory=StructuredOptions)
+    """Options for a structured model."""
     data: DataOptions = field(default_factory=DataOptions)
-    """Data of a nonlinear state-space model."""
+    """Data of a nonlinear state-space model or a structured model."""
 
     def __post_init__(self) -> None:
         if self.kind not in _OPTIONS:
@@ -72,6 +76,7 @@ class Request:
             "estimator": self.estimator != "instrument",
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
+            **self.structured.given(),
             **self.data.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
@@ -80,6 +85,11 @@ class Request:
                 raise ConfigurationError(f"`{name}`: means nothing to `kind` {self.kind}, which takes {allowed}")
         if self.amplifier_gain is not None and self.resistance_ohm is None:
             raise ConfigurationError("`amplifier_gain`: is for the resistance; add `resistance_ohm`, or leave it out")
+        if self.kind == "structured" and self.modes is None:
+            raise ConfigurationError(
+                "`modes`: is missing, with which a structured model begins; make it from a test at a low level with "
+                "`rig identify RECORDING --model linear -o MODES.h5`"
+            )
         for name in _OF_THE_FIT if self.pnlss.resume is not None else ():
             if given[name]:
                 raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")
