@@ -11,7 +11,7 @@ __all__ = ["predict"]
 
 
 def predict(
-    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model or force surface.")],
+    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model, structured model or force surface.")],
     output: Output,
     forces_n: Annotated[
         list[float] | None,
@@ -44,7 +44,8 @@ def predict(
     multisines: Annotated[
         list[Path] | None,
         typer.Option(
-            "--multisine", help="Simulate the realisations of this recording with a PNLSS model; may be repeated."
+            "--multisine",
+            help="Simulate the realisations of this recording with a PNLSS or structured model; may be repeated.",
         ),
     ] = None,
     planned: Annotated[

@@ -29,7 +29,7 @@ class PredictionRequest:
     sweeps: tuple[Path, ...] = ()
     """Recordings whose sweeps are predicted."""
     multisines: tuple[Path, ...] = ()
-    """Recordings whose realisations a PNLSS model simulates."""
+    """Recordings whose realisations a PNLSS or structured model simulates."""
     planned: tuple[str, ...] = ()
     """Plans of future sweeps, by name or file."""
     zero_crossings: str | None = None
