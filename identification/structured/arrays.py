@@ -12,6 +12,7 @@ from identification.errors import IdentificationError
 from identification.packing import pack
 from identification.structured.elements import NonlinearElement
 from identification.structured.fit import StructuredFit
+from identification.structured.laws import law_from_dict
 from identification.structured.model import StructuredModel
 
 __all__ = ["fit_arrays", "fit_from", "model_arrays", "model_from"]
@@ -32,7 +33,7 @@ def model_from(arrays: Arrays, attributes: Attributes) -> StructuredModel:
     """Invert `model_arrays`; raise `IdentificationError` if something is missing or unknown."""
     try:
         values: dict[str, Any] = {**{name: np.asarray(array) for name, array in arrays.items()}, **attributes}
-        values["elements"] = tuple(NonlinearElement(**element) for element in values["elements"])
+        values["elements"] = tuple(_element_from(element) for element in values["elements"])
         for name in ("inputs", "outputs"):
             values[name] = tuple(Channel(**channel) for channel in values[name])
         return StructuredModel(**values)
@@ -77,6 +78,11 @@ def fit_from(arrays: Arrays, attributes: Attributes) -> StructuredFit:
 
 
 def _as_dict(element: NonlinearElement) -> dict[str, Any]:
-    """Return the fields of an element as numbers, texts and lists."""
+    """Return the fields of an element as numbers, texts, lists and, for the laws, dictionaries."""
     values = {field.name: getattr(element, field.name) for field in fields(element)}
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()}
+    return values | {"direction": element.direction.tolist(), "laws": [law.as_dict() for law in element.laws]}
+
+
+def _element_from(values: Mapping[str, Any]) -> NonlinearElement:
+    """Invert `_as_dict`."""
+    return NonlinearElement(**{**values, "laws": tuple(law_from_dict(law) for law in values["laws"])})

@@ -180,9 +180,7 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
                 springs.append(change)
                 limits.append([element.reach, *(_end_slopes(element, change) * inside)])
             elif isinstance(law, Damper):
-                dampers.append(
-                    (element.damper([more]) - element.damper([law])) / _NUDGE
-                )  # linear; less may be below zero
+                dampers.append((element.damper([more]) - element.damper([law])) / _NUDGE)  # linear; less may be below zero
             else:
                 change = np.zeros_like(tables.sliders)
                 moved = (element.sliders([more]) - element.sliders([less])) / (2.0 * _NUDGE)

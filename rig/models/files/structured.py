@@ -92,8 +92,7 @@ def _element(element: NonlinearElement) -> dict[str, Any]:
         "scale_m": element.scale_m,
         "reach_m": element.reach * element.scale_m,
         "largest_m": None if element.largest is None else element.largest * element.scale_m,
-        "spring_n": element.spring_n.tolist(),
-        "damper_n_s_m": element.damper_n_s_m.tolist(),
+        "laws": [law.as_dict() for law in element.laws],
     }
 
 
@@ -140,19 +139,20 @@ def _say(summary: dict[str, Any]) -> None:
             (
                 str(index),
                 number(mode["frequency_hz"], ".4f"),
-                number(mode["frequency_std_hz"], ".4f", 1.96),
+                number(mode["frequency_std_hz"], ".2g", 1.96),
                 number(mode["damping_ratio"], ".4f", 100.0),
-                number(mode["damping_ratio_std"], ".4f", 196.0),
+                number(mode["damping_ratio_std"], ".2g", 196.0),
             )
             for index, mode in enumerate(summary["modes"], 1)
         ],
     )
     print("elements")
     print_table(
-        ("element", "largest mm", "reach mm", *(f"direction {i + 1}" for i in range(len(summary["modes"])))),
+        ("element", "laws", "largest mm", "reach mm", *(f"direction {i + 1}" for i in range(len(summary["modes"])))),
         [
             (
                 str(index),
+                ", ".join(law["kind"] for law in element["laws"]),
                 number(element["largest_m"], ".4f", 1e3),
                 number(element["reach_m"], ".4f", 1e3),
                 *(number(value, ".4f") for value in element["direction"]),

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.drawing.style import MAIN, REJECTED, SECOND
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD
 from rig.models.files.simulated_figure import channels_of, draw_simulated
 
 if TYPE_CHECKING:
@@ -38,19 +38,40 @@ def draw_structured(page: "Figure", found: "IdentifiedStructured") -> None:
 
 
 def _laws(axis: "Axes", element: "NonlinearElement", number: int) -> None:
-    """Draw force and damping of an element over its displacement, and mark the range of the training data."""
+    """Draw forces and damping of an element over its displacement, and mark the range of the training data.
+
+    Of joints it is the loop between the ends of that range.
+    """
+    from identification.structured.laws import Damper, Joint, Spring
+
     largest = element.largest or 1.0
+    to_mm = 1e3 * element.scale_m
     x = np.linspace(-_BEYOND, _BEYOND, _POINTS) * largest
-    z_mm = 1e3 * element.scale_m * x
-    force = sum((a * x ** (k + 2) for k, a in enumerate(element.spring_n)), np.zeros(_POINTS))
-    damping = sum((g * np.abs(x) ** (j + 1) for j, g in enumerate(element.damper_n_s_m)), np.zeros(_POINTS))
-    axis.plot(z_mm, force, color=MAIN, label="spring")
-    axis.set(xlabel=f"displacement of element {number}, mm", ylabel="force, N", xlim=(z_mm[0], z_mm[-1]))
+    springs = [law for law in element.laws if isinstance(law, Spring)]
+    dampers = [law for law in element.laws if isinstance(law, Damper)]
+    joints = [law for law in element.laws if isinstance(law, Joint)]
+    if springs:
+        axis.plot(to_mm * x, sum((law.force(x) for law in springs), np.zeros_like(x)), color=MAIN, label="spring")
+    if joints:
+        sliders = np.concatenate([law.sliders() for law in joints], axis=1)
+        axis.plot(*_loop(sliders, largest, to_mm), color=THIRD, label="joint")
+    axis.set(xlabel=f"displacement of element {number}, mm", ylabel="force, N", xlim=(to_mm * x[0], to_mm * x[-1]))
     if element.largest is not None:
-        edge = 1e3 * element.scale_m * largest
-        axis.axvspan(-edge, edge, color=REJECTED, alpha=0.15, lw=0.0, label="training data")
-    beside = axis.twinx()
-    beside.plot(z_mm, damping, color=SECOND, ls="--", label="damper")
-    beside.set(ylabel="damping, N s/m", ylim=(0.0, None))
-    handles = [one for each in (axis, beside) for one in each.get_legend_handles_labels()[0]]
-    axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+        axis.axvspan(-to_mm * largest, to_mm * largest, color=REJECTED, alpha=0.15, lw=0.0, label="training data")
+    axes = [axis]
+    if dampers:
+        axes.append(axis.twinx())
+        damping = sum((law.damping(x) for law in dampers), np.zeros_like(x))
+        axes[1].plot(to_mm * x, damping, color=SECOND, ls="--", label="damper")
+        axes[1].set(ylabel="damping, N s/m", ylim=(0.0, None))
+    handles = [one for each in axes for one in each.get_legend_handles_labels()[0]]
+    axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
+
+
+def _loop(sliders: np.ndarray, largest: float, to_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return displacement (mm) and force (N) of parallel Jenkins sliders over a cycle, by the rules of Masing."""
+    down = np.linspace(largest, -largest, _POINTS)
+    stiffness, strength = sliders[:, :, None]
+    turned = np.minimum(stiffness * largest, strength) - np.minimum(stiffness * (largest - down), 2.0 * strength)
+    force = turned.sum(axis=0)
+    return to_mm * np.concatenate([down, -down]), np.concatenate([force, -force])

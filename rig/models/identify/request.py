@@ -9,7 +9,7 @@ from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.models.identify.data_request import DataOptions
 from rig.models.identify.pnlss_request import PnlssOptions
-from rig.models.identify.structured_request import StructuredOptions
+from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 
 __all__ = ["Request"]
 
@@ -86,10 +86,7 @@ class Request:
         if self.amplifier_gain is not None and self.resistance_ohm is None:
             raise ConfigurationError("`amplifier_gain`: is for the resistance; add `resistance_ohm`, or leave it out")
         if self.kind == "structured" and self.modes is None:
-            raise ConfigurationError(
-                "`modes`: is missing, with which a structured model begins; make it from a test at a low level with "
-                "`rig identify RECORDING --model linear -o MODES.h5`"
-            )
+            raise ConfigurationError(f"`modes`: is missing, {MODES_OF_A_STRUCTURE}")
         for name in _OF_THE_FIT if self.pnlss.resume is not None else ():
             if given[name]:
                 raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")

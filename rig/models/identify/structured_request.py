@@ -1,14 +1,21 @@
 """Options for the identification of a structured model."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.errors import ConfigurationError
 from rig.models.identify.data_request import Options
 
-__all__ = ["StructuredOptions"]
+if TYPE_CHECKING:
+    from identification.structured.laws import Law
 
-_LAWS = {"polynomial-spring": "springs", "polynomial-damper": "dampers"}
+__all__ = ["MODES_OF_A_STRUCTURE", "StructuredOptions"]
+
+MODES_OF_A_STRUCTURE = (
+    "the modes with which a structured model begins; make them from a test at a low level with "
+    "`rig identify RECORDING --model linear -o MODES.h5`"
+)
+"""End of messages about a missing file of modes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,17 +26,19 @@ class StructuredOptions(Options):
     """
 
     laws: str | None = None
-    """Kinds of the laws of the element, separated by commas, such as ``polynomial-spring,polynomial-damper``."""
+    """Kinds of the laws of the element, separated by commas; ``polynomial-spring,polynomial-damper`` if None."""
 
     def __post_init__(self) -> None:
-        self.laws_to_fit  # noqa: B018 refused here, not when it is asked for
+        self.for_fit()  # refused here, not when it is asked for
 
-    @property
-    def laws_to_fit(self) -> dict[str, Any]:
-        """Laws in the form that `identification.fit_structured` takes."""
+    def for_fit(self) -> dict[str, Any]:
+        """Return what `identification.fit_structured` takes."""
         if self.laws is None:
             return {}
+        from identification.structured.laws import LAWS
+
         names = [name.strip() for name in self.laws.split(",")]
-        if any(name not in _LAWS for name in names) or len(set(names)) < len(names):
-            raise ConfigurationError(f"`laws` = {self.laws!r}: allowed are {', '.join(_LAWS)} with commas, each once")
-        return {"dampers": 0} if "polynomial-damper" not in names else {}
+        ready: dict[str, type[Law]] = {name: law for name, law in LAWS.items() if name != "user-spring"}
+        if any(name not in ready for name in names) or len(set(names)) < len(names):
+            raise ConfigurationError(f"`laws` = {self.laws!r}: allowed are {', '.join(ready)}, each once, with commas")
+        return {"laws": tuple(ready[name]() for name in names)}
