@@ -7,8 +7,8 @@ from rig.cli.app import app
 from rig.cli.flags import flags, with_flags
 from rig.models.identify.data_request import DataOptions
 from rig.models.identify.pnlss_request import PnlssOptions
-from rig.models.identify.structured_request import StructuredOptions
 from rig.models.identify.request import Request
+from rig.models.identify.structured_request import StructuredOptions
 from rig.models.predict.request import PredictionRequest
 from rig.reproduce.options import Options
 from rig.tuning import TuningRequest
