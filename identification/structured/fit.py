@@ -19,6 +19,7 @@ from identification.structured.leading import Lead
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
 from identification.structured.start import linear_start, measured_velocity, with_element
+from vibrolock.results import Result
 
 __all__ = ["StructuredFit", "fit_structured"]
 
@@ -43,7 +44,7 @@ _SUPPORT = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StructuredFit:
+class StructuredFit(Result):
     """A fitted model.
 
     Parameters

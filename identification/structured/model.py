@@ -11,6 +11,7 @@ from identification.errors import IdentificationError
 from identification.structured.elements import NonlinearElement, tables_of
 from identification.structured.steps import Room, System, run
 from identification.validation import finite_array, positive
+from vibrolock.results import Result
 
 __all__ = ["Motion", "StructuredModel", "ends_of_steps", "room_for"]
 
@@ -52,7 +53,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StructuredModel:
+class StructuredModel(Result):
     """Modes, nonlinear elements along directions in their space, and what a force sensor does not see.
 
     ``q'' + 2 Z W q' + W^2 q + sum_e direction_e f_e(direction_e . q, direction_e . q') = B (u + s)``

@@ -111,6 +111,14 @@ def test_elements_of_all_laws_come_back_from_a_model_alone(tmp_path):
     assert np.array_equal(found.model.simulate(u).outputs, sent.simulate(u).outputs)
 
 
+def test_models_and_fits_draw_and_show_themselves(recordings):
+    fit = load(recordings / "S.h5").fit
+    for one in (fit, fit.model):
+        (axis,) = one.plot()
+        assert axis.get_xlabel() == "displacement of element 1, mm"
+        assert "polynomial-spring" in one._repr_html_()
+
+
 def drawn(found):
     page = Figure(figsize=(12.0, 7.5), layout="constrained")
     draw_structured(page, found)
