@@ -7,6 +7,7 @@ import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
 from identification.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
+from identification.structured.laws import Joint
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.models.files.simulated import SimulatedModel, errors_in, packed_errors, say_errors, unpacked_errors
 from rig.text.console import number, print_table
@@ -106,6 +107,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
         "steps": model.steps,
         "modes": _modes(model, fit),
         "elements": [_element(element) for element in model.elements],
+        "joints": any(isinstance(law, Joint) for element in model.elements for law in element.laws),
         "support_n_m": model.support_n_m,
         "fit": None
         if fit is None
@@ -132,7 +134,7 @@ def _say(summary: dict[str, Any]) -> None:
             f"{fit['numbers']} numbers fitted, error {number(fit['training_error'], '.3f', 100.0)} % in training, "
             f"{fit['evaluations']} simulations; {number(summary['seconds'], '.1f')} s in all; {fit['stopped']}"
         )
-    print("linear part")
+    print("linear part, all joints slipping" if summary["joints"] else "linear part")
     print_table(
         ("mode", "frequency Hz", "+-", "damping %", "+-"),
         [
