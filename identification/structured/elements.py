@@ -61,6 +61,8 @@ class NonlinearElement:
         object.__setattr__(self, "laws", tuple(self.laws))
         for name in ("scale_m", "reach"):
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
+        if self.largest is not None:
+            object.__setattr__(self, "largest", float(self.largest))
         if not self.laws:
             raise IdentificationError("element: laws is empty, needs one at least")
 

@@ -99,11 +99,7 @@ class Law:
         out: list[str] = []
         for name in self.free:
             value = getattr(self, name)
-            out += (
-                [f"{self.kind} {name}[{k}]" for k in range(len(value))]
-                if isinstance(value, tuple)
-                else [f"{self.kind} {name}"]
-            )
+            out += [f"{self.kind} {name}[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [f"{self.kind} {name}"]
         return tuple(out)
 
     @property
