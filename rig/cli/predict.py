@@ -85,6 +85,9 @@ def predict(
     allow_extrapolation: Annotated[
         bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
     ] = False,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the functions that a structured model names.")
+    ] = False,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -108,6 +111,7 @@ def predict(
         references=tuple(references or ()),
         over=over,
         allow_extrapolation=allow_extrapolation,
+        trust_code=trust_code,
     )
     save(predict_vibrations(model, request), output)
     show_file(output, json)

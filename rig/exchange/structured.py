@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import StructuredModel
 from identification.structured.arrays import model_arrays, model_from
-from identification.structured.laws import Damper, Joint, Spring
+from identification.structured.laws import Damper, Joint, Spring, UserSpring
 from rig.text.contents import Contents
 
 __all__ = ["structured_from", "structured_parts"]
@@ -33,8 +33,9 @@ def structured_parts(model: StructuredModel) -> Contents:
     """Convert a model to its modal matrices, and to tables of the elements' forces for readers.
 
     For each element, in rows: ``directions`` [element, mode], ``displacement_m``, ``spring_n``, ``damper_n_s_m`` [element,
-    point]; the sliders of all joints in ``slider_element`` (from 1), ``slider_stiffness_n_m``, ``slider_strength_n``. The
-    laws themselves, from which a file is read back, are in the attributes.
+    point]; ``spring_n`` is NaN with functions of the user, which are not imported. The sliders of all joints are in
+    ``slider_element`` (from 1), ``slider_stiffness_n_m``, ``slider_strength_n``. The laws themselves, from which a file is
+    read back, are in the attributes.
     """
     arrays, attributes = model_arrays(model)
     out: dict[str, Any] = {**arrays, "fs": np.array([model.sample_rate_hz])}
@@ -42,7 +43,11 @@ def structured_parts(model: StructuredModel) -> Contents:
     springs, dampers, sliders = [], [], [np.zeros((3, 0))]
     for number, element in enumerate(model.elements, 1):
         x = element.reach * unit
-        springs.append(sum((law.force(x) for law in element.laws if isinstance(law, Spring)), np.zeros_like(x)))
+        of_springs = [law for law in element.laws if isinstance(law, Spring)]
+        if any(isinstance(law, UserSpring) for law in of_springs):
+            springs.append(np.full_like(x, np.nan))
+        else:
+            springs.append(sum((law.force(x) for law in of_springs), np.zeros_like(x)))
         dampers.append(sum((law.damping(x) for law in element.laws if isinstance(law, Damper)), np.zeros_like(x)))
         for law in element.laws:
             if isinstance(law, Joint):

@@ -7,12 +7,12 @@ import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
 from identification.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
-from identification.structured.laws import Joint
+from identification.structured.laws import Joint, UserSpring
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.models.files.simulated import SimulatedModel, errors_in, packed_errors, say_errors, unpacked_errors
 from rig.text.console import number, print_table
 
-__all__ = ["STRUCTURED", "IdentifiedStructured"]
+__all__ = ["STRUCTURED", "IdentifiedStructured", "functions_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -97,6 +97,12 @@ def _element(element: NonlinearElement) -> dict[str, Any]:
     }
 
 
+def functions_of(model: StructuredModel) -> list[str]:
+    """Return the functions of the user, ``module:name``, that a model names. To simulate it, they are imported."""
+    named = [law.function for element in model.elements for law in element.laws if isinstance(law, UserSpring)]
+    return list(dict.fromkeys(named))
+
+
 def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
     model, fit = found.model, found.fit
     return {
@@ -121,7 +127,10 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
         **errors_in(found),
         "training": list(model.training),
         "seconds": found.seconds,
-        "notes": list(found.notes),
+        "notes": [
+            *found.notes,
+            *(f"names a function, {one}: simulations import it" for one in functions_of(model)),
+        ],
     }
 
 

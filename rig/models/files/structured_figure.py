@@ -40,14 +40,15 @@ def draw_structured(page: "Figure", found: "IdentifiedStructured") -> None:
 def _laws(axis: "Axes", element: "NonlinearElement", number: int) -> None:
     """Draw forces and damping of an element over its displacement, and mark the range of the training data.
 
-    Of joints it is the loop between the ends of that range.
+    Of joints it is the loop between the ends of that range. Functions of the user are not imported and therefore not drawn.
     """
-    from identification.structured.laws import Damper, Joint, Spring
+    from identification.structured.laws import Damper, Joint, Spring, UserSpring
 
     largest = element.largest or 1.0
     to_mm = 1e3 * element.scale_m
     x = np.linspace(-_BEYOND, _BEYOND, _POINTS) * largest
-    springs = [law for law in element.laws if isinstance(law, Spring)]
+    springs = [law for law in element.laws if isinstance(law, Spring) and not isinstance(law, UserSpring)]
+    functions = [law.function for law in element.laws if isinstance(law, UserSpring)]
     dampers = [law for law in element.laws if isinstance(law, Damper)]
     joints = [law for law in element.laws if isinstance(law, Joint)]
     if springs:
@@ -65,6 +66,8 @@ def _laws(axis: "Axes", element: "NonlinearElement", number: int) -> None:
         axes[1].plot(to_mm * x, damping, color=SECOND, ls="--", label="damper")
         axes[1].set(ylabel="damping, N s/m", ylim=(0.0, None))
     handles = [one for each in axes for one in each.get_legend_handles_labels()[0]]
+    if functions:
+        axis.text(0.5, 0.03, f"without {', '.join(functions)}", ha="center", transform=axis.transAxes)
     axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
 
 

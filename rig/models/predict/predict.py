@@ -66,6 +66,8 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
         raise RecordingError(f"{model}: is a file of kind {kind}; predictions are made with a {', '.join(known)}")
     if kind == STRUCTURED.name:
         return structured_predictions(model, request)
+    if request.trust_code:
+        raise ConfigurationError(f"`trust_code`: means nothing to a {kind}, which names no code; leave it out")
     if kind == PNLSS.name:
         return pnlss_predictions(
             model, request, [one for path in request.references for one in _references(path, request)]

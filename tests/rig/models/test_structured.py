@@ -1,6 +1,7 @@
 """Structured models from the command line: identified, kept in a file, shown, drawn, and asked for predictions."""
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 
 import rig
 from identification import NonlinearElement
-from identification.structured.laws import Iwan, Jenkins
+from identification.structured.laws import Iwan, Jenkins, PolynomialSpring, UserSpring
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.models.files.files import load, save
@@ -158,6 +159,34 @@ def test_the_loop_of_a_joint_is_that_of_its_sliders_moved_slowly():
     np.testing.assert_allclose(force, moved[-z.size :], rtol=1e-9, atol=1e-12)
 
 
+def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_them_alone(
+    there, recordings, monkeypatch
+):
+    (recordings / "own_law_of_a_test.py").write_text("def cubic(x, numbers):\n    return numbers[0] * x**3\n")
+    monkeypatch.syspath_prepend(recordings)
+    found = load(recordings / "S.h5")
+    (element,) = found.model.elements
+    law = UserSpring("own_law_of_a_test:cubic", (element.laws[0].coefficients_n[1],))
+    own = replace(found.model, elements=(replace(element, laws=(law,)),))
+    save(own, recordings / "own.h5")
+    shown = there("show own.h5")
+    assert "names a function, own_law_of_a_test:cubic: simulations import it" in shown.out
+    for line in ("plot own.h5 -o own.png", "export own.h5 -o own.mat"):
+        assert there(line).status == 0
+    refused = there("predict own.h5 --multisine lines.h5 -o O.h5")
+    assert "own.h5: function = 'own_law_of_a_test:cubic': is code that the model names" in refused.err
+    assert refused.err.endswith("--trust-code\n")
+    assert "own_law_of_a_test" not in sys.modules
+    done = there("predict own.h5 --multisine lines.h5 --trust-code -o O.h5 --overwrite --json")
+    assert done.status == 0, done.err
+    assert "own_law_of_a_test" in sys.modules
+    cubic = PolynomialSpring((0.0, element.laws[0].coefficients_n[1]))
+    save(replace(own, elements=(replace(element, laws=(cubic,)),)), recordings / "same.h5")
+    same = json.loads(there("predict same.h5 --multisine lines.h5 -o O.h5 --overwrite --json").out)
+    for one, other in zip(json.loads(done.out)["multisines"], same["multisines"], strict=True):
+        assert one["errors"]["drive"] == pytest.approx(other["errors"]["drive"], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -232,6 +261,7 @@ def test_a_file_that_lacks_an_array_is_named(tmp_path):
         ),
         ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to a structured model"),
         ("predict S.h5 --multisine modes.h5", "modes.h5: "),
+        ("predict modes.h5 --multisine lines.h5", "predictions are made with a nonlinear-mode, pnlss, structured, "),
     ],
 )
 def test_mistakes_are_named_in_one_line(there, line, said):
