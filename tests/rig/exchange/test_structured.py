@@ -42,21 +42,14 @@ def test_the_tables_hold_the_forces_at_rest_and_at_the_reach(tmp_path):
     assert fields["slider_strength_n"][0] == pytest.approx(0.5 * 0.3)
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"elements": [{"scale_m": 1.0}]}, "does not fit together|missing or unknown"),
-        ({"wrong": 1}, "missing or unknown"),
-    ],
-)
-def test_a_damaged_file_is_named(change, said, tmp_path):
+def test_a_damaged_file_is_named(tmp_path):
     save(structure(), tmp_path / "sent.h5")
     export_file(tmp_path / "sent.h5", tmp_path / "m.mat", "mat")
     fields = loadmat(tmp_path / "m.mat", simplify_cells=True)["structured"]
     told = json.loads(fields["attributes_json"])
-    fields["attributes_json"] = json.dumps(told | {"attributes": told["attributes"] | change})
+    fields["attributes_json"] = json.dumps(told | {"attributes": told["attributes"] | {"wrong": 1}})
     savemat(tmp_path / "damaged.mat", {"structured": fields})
-    with pytest.raises(ImportFailed, match=said):
+    with pytest.raises(ImportFailed, match="missing or unknown"):
         import_file(tmp_path / "damaged.mat")
 
 
