@@ -88,14 +88,7 @@ if TYPE_CHECKING:
     from identification.pnlss.best_linear import best_linear_responses
     from identification.pnlss.coupled.run import CoupledRun, pnlss_coupled_run
     from identification.pnlss.error_table import ErrorTable
-    from identification.pnlss.errors import (
-        PnlssErrors,
-        error_spectra,
-        estimated_initial_state,
-        output_stretch,
-        pnlss_errors,
-        simulated_run,
-    )
+    from identification.pnlss.errors import PnlssErrors, estimated_initial_state, pnlss_errors
     from identification.pnlss.experiment import Experiment
     from identification.pnlss.features import Features
     from identification.pnlss.fitting.fit import fit_pnlss
@@ -105,6 +98,7 @@ if TYPE_CHECKING:
     from identification.pnlss.linear_model import linear_pnlss
     from identification.pnlss.many import IdentifiedModel, ModelJob, identify_many, realisation_combinations
     from identification.pnlss.model import PnlssModel
+    from identification.pnlss.runs import error_spectra, output_stretch, simulated_run
     from identification.pnlss.simulation import Simulation
     from identification.pnlss.steady.response import pnlss_frequency_response, pnlss_response, pnlss_steady_state
     from identification.pnlss.steady.states import PnlssResponse, SteadyStates
@@ -212,7 +206,7 @@ else:
             "decimated": "signals.decimation",
             "demodulate": "signals.transients",
             "distortion_levels": "multisine.distortion",
-            "error_spectra": "pnlss.errors",
+            "error_spectra": "pnlss.runs",
             "error_table": "prediction.comparison",
             "estimated_initial_state": "pnlss.errors",
             "extrapolated_to_zero": "linear.extrapolation",
@@ -236,7 +230,7 @@ else:
             "map_pnlss": "mapping.pnlss",
             "map_response_matrix": "mapping.response_matrix",
             "nonlinear_mode": "nonlinear.phase_resonance",
-            "output_stretch": "pnlss.errors",
+            "output_stretch": "pnlss.runs",
             "pack_frequency_responses": "frequency_responses",
             "periodic_spectra": "multisine.spectra",
             "periodic_vibration": "signals.fourier",
@@ -251,7 +245,7 @@ else:
             "repeatability": "nonlinear.repeatability",
             "response_band": "prediction.uncertainty",
             "short_point": "slow_flows.short_points",
-            "simulated_run": "pnlss.errors",
+            "simulated_run": "pnlss.runs",
             "single_point_mode": "nonlinear.single_points",
             "slow_flow": "slow_flows.slow_flow",
             "stabilisation": "linear.stabilisation",

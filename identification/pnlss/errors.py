@@ -1,4 +1,4 @@
-"""Errors of a model simulated with the inputs of experiments, its use of the trained range, and estimated initial states."""
+"""Errors of a PNLSS model simulated with the inputs of experiments, and estimated initial states."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,11 +13,9 @@ from identification.pnlss.fitting.initial_states import SAMPLES, fitted_initial_
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.simulation import Simulation
-from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 from identification.validation import read_only
 
-__all__ = ["PnlssErrors", "error_spectra", "estimated_initial_state", "output_stretch", "pnlss_errors", "simulated_run"]
+__all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
 
 Float = NDArray[np.float64]
 
@@ -105,117 +103,6 @@ def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, sample
         names=tuple(e.name or f"experiment {index + 1}" for index, e in enumerate(experiments)),
         levels=np.array([e.level for e in experiments]),
     )
-
-
-def simulated_run(
-    model: PnlssModel, experiment: Experiment, *, initial_state: Float | None = None, use: str = "test"
-) -> SimulatedRun:
-    """Simulate an experiment from rest or from ``initial_state``, which is estimated if the experiment requires it.
-
-    Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
-    counts.
-    """
-    check_channels(model, experiment)
-    check_not_zero(experiment, f"experiment '{experiment.name}'")
-    run = _simulated(model, experiment, initial_state)
-    measured = experiment.counted_outputs
-    size = np.linalg.norm(measured, axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        error = np.linalg.norm(run.outputs[:, experiment.counted_from :] - measured, axis=1) / size
-    at = run.unbounded_at
-    return SimulatedRun(
-        name=experiment.name,
-        level=experiment.level,
-        outputs=tuple(channel.name for channel in experiment.output_channels),
-        error=error if at is None else np.full(error.size, np.inf),
-        range_use=run.range_use,
-        unbounded_at_s=None if at is None else at / experiment.sample_rate_hz,
-        use=use,
-    )
-
-
-def error_spectra(model: PnlssModel, linear: PnlssModel | None, experiment: Experiment) -> ErrorSpectra:
-    """Return amplitudes by line of a periodic experiment: measurement, noise, model, errors of the model and its linear start.
-
-    Raises `IdentificationError` for an experiment that is not periodic.
-    """
-    period = experiment.period_samples
-    if not period:
-        raise IdentificationError(f"experiment '{experiment.name}': is not periodic and has no lines")
-
-    def lines(values: Float) -> Float:
-        mean = values.reshape(values.shape[0], -1, period).mean(axis=1)
-        return np.abs(np.fft.rfft(mean, axis=1))[:, 1 : (period + 1) // 2] * (2.0 / period)
-
-    def output(one: PnlssModel | None) -> Float:
-        run = None if one is None else _simulated(one, experiment, None)
-        if run is None or not run.bounded:
-            return np.full(experiment.counted_outputs.shape, np.nan)
-        return run.outputs[:, experiment.counted_from :]
-
-    measured, simulated = lines(experiment.counted_outputs), output(model)
-    return ErrorSpectra(
-        name=experiment.name,
-        outputs=tuple(channel.name for channel in experiment.output_channels),
-        frequency_hz=np.arange(1, measured.shape[1] + 1) * experiment.sample_rate_hz / period,
-        measured=measured,
-        linear_error=lines(output(linear) - experiment.counted_outputs),
-        error=lines(simulated - experiment.counted_outputs),
-        model=lines(simulated),
-        noise=np.full(measured.shape, np.nan) if experiment.output_noise is None else experiment.output_noise,
-    )
-
-
-def output_stretch(
-    model: PnlssModel, experiment: Experiment, *, samples: int = 400, initial_state: Float | None = None
-) -> OutputStretch:
-    """Return at most ``samples`` samples around the largest measured value of the first output, and the model's outputs there.
-
-    The run begins from rest or from ``initial_state``, which is estimated if the experiment requires it. Raises
-    `IdentificationError` if channels or sample rates of model and experiment differ.
-    """
-    check_channels(model, experiment)
-    run = _simulated(model, experiment, initial_state)
-    largest = experiment.counted_from + int(np.argmax(np.abs(experiment.counted_outputs[0])))
-    last = experiment.outputs.shape[1]
-    first = max(min(largest - samples // 2, last - samples), experiment.counted_from)
-    stop = min(first + samples, last)
-    simulated = np.where(np.isfinite(run.outputs), run.outputs, np.nan)
-    if run.unbounded_at is not None:
-        simulated[:, run.unbounded_at :] = np.nan
-    return OutputStretch(
-        name=experiment.name,
-        outputs=tuple(channel.name for channel in experiment.output_channels),
-        time_s=np.arange(first, stop) / experiment.sample_rate_hz,
-        measured=experiment.outputs[:, first:stop],
-        simulated=simulated[:, first:stop],
-    )
-
-
-def _simulated(model: PnlssModel, experiment: Experiment, initial_state: Float | None) -> Simulation:
-    check_channels(model, experiment)
-    if initial_state is None and experiment.initial_state == "estimated":
-        initial_state = estimated_initial_state(model, experiment)
-    return model.simulate(experiment.inputs, initial_state=initial_state)
-
-
-def check_channels(model: PnlssModel, experiment: Experiment) -> None:
-    """Raise `IdentificationError` unless the experiment has the model's channels and rate."""
-    for what, mine, theirs in (
-        ("inputs", model.inputs, experiment.input_channels),
-        ("outputs", model.outputs, experiment.output_channels),
-    ):
-        names: Sequence[str] = [channel.name for channel in mine]
-        others = [channel.name for channel in theirs]
-        if names != others:
-            raise IdentificationError(
-                f"experiment '{experiment.name}': {what} are {', '.join(others)}, the model's {', '.join(names)}"
-            )
-    if abs(model.sample_rate_hz / experiment.sample_rate_hz - 1.0) > 1e-9:
-        raise IdentificationError(
-            f"experiment '{experiment.name}': sampled at {experiment.sample_rate_hz:g} Hz, the model at "
-            f"{model.sample_rate_hz:g} Hz"
-        )
 
 
 def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, samples: int = SAMPLES) -> Float:

@@ -41,6 +41,8 @@ class NonlinearElement:
         Springs, dampers and joints.
     reach
         Largest ``|x|`` of springs and dampers.
+    largest
+        Largest ``|x|`` in the training data; None if unknown.
 
     Raises
     ------
@@ -52,12 +54,15 @@ class NonlinearElement:
     scale_m: float
     laws: tuple[Law, ...]
     reach: float = 3.0
+    largest: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", finite_array("element: direction", self.direction, np.float64, 1))
         object.__setattr__(self, "laws", tuple(self.laws))
         for name in ("scale_m", "reach"):
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
+        if self.largest is not None:
+            object.__setattr__(self, "largest", float(self.largest))
         if not self.laws:
             raise IdentificationError("element: laws is empty, needs one at least")
 

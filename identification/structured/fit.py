@@ -19,6 +19,7 @@ from identification.structured.leading import Lead
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
 from identification.structured.start import linear_start, measured_velocity, with_element
+from vibrolock.results import Result
 
 __all__ = ["StructuredFit", "fit_structured"]
 
@@ -45,7 +46,7 @@ _SUPPORT = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StructuredFit:
+class StructuredFit(Result):
     """A fitted model.
 
     Parameters
@@ -164,7 +165,7 @@ def fit_structured(
     freedom = max(problem.count - vector.size, 1)
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom
     return StructuredFit(
-        model=problem.parameters.model(vector),
+        model=problem.parameters.model(vector).trained_with([experiment.inputs for experiment in experiments]),
         start=start,
         names=problem.parameters.names,
         values=vector,

@@ -11,6 +11,7 @@ from identification.errors import IdentificationError
 from identification.structured.elements import NonlinearElement, tables_of
 from identification.structured.steps import Room, System, run
 from identification.validation import finite_array, positive
+from vibrolock.results import Result
 
 __all__ = ["Motion", "StructuredModel", "ends_of_steps", "room_for"]
 
@@ -35,6 +36,8 @@ class Motion:
         float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
     unsolved_steps
         Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold.
+    range_use
+        Largest displacement of any element over its largest in the training data; NaN if that is unknown.
     """
 
     outputs: Float
@@ -43,10 +46,17 @@ class Motion:
     acceleration: Float
     reach_use: Float
     unsolved_steps: int = 0
+    range_use: float = float("nan")
+
+    @property
+    def unbounded_at(self) -> int | None:
+        """First sample at which an output is not finite; None if there is none."""
+        wrong = ~np.all(np.isfinite(self.outputs), axis=0)
+        return int(np.argmax(wrong)) if wrong.any() else None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StructuredModel:
+class StructuredModel(Result):
     """Modes, nonlinear elements along directions in their space, and what a force sensor does not see.
 
     ``q'' + 2 Z W q' + W^2 q + sum_e direction_e f_e(direction_e . q, direction_e . q') = B (u + s)``
@@ -205,7 +215,17 @@ class StructuredModel:
             acceleration=states[:, 2].T,
             reach_use=np.asarray(largest / system.tables.limits[:, 0]),
             unsolved_steps=int(room.unsolved[0]),
+            range_use=max(
+                (float(x / e.largest) for x, e in zip(largest, self.elements, strict=True) if e.largest),
+                default=float("nan"),
+            ),
         )
+
+    def trained_with(self, runs: Sequence[ArrayLike]) -> "StructuredModel":
+        """Return the model with the largest displacements of its elements under ``runs``, float[n_inputs, n] each."""
+        use = np.max([self.simulate(inputs).reach_use for inputs in runs], axis=0)
+        known = zip(self.elements, use.tolist(), strict=True)
+        return replace(self, elements=tuple(replace(e, largest=share * e.reach) for e, share in known))
 
     def with_steps(self, steps: int) -> "StructuredModel":
         """Return the model with another number of steps in a sample."""

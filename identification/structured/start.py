@@ -31,12 +31,15 @@ _LEAST_STIFFNESS, _LEAST_DAMPING = 0.25, 0.2
 """What the initial element leaves of stiffness and damping of its mode."""
 _TINY = 1e-6
 """Initial value (N) of a positive number that the regression finds to be zero."""
+_HIGHEST_RESIDUAL = 0.35
+"""Highest frequency of the residual's mode, relative to the rate of the steps: modes far above the band may have none."""
 
 
 def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> StructuredModel:
     """Return the linear model with the channels of ``experiment``.
 
-    The residual of the modes above the band becomes one more mode, at the frequency that `LinearModes` gives for it.
+    The residual of the modes above the band becomes one more mode, at the frequency that `LinearModes` gives for it,
+    unless the steps are too long for that.
     Raises `IdentificationError` if an output is not among the channels of the modes.
     """
     rows = [find_name(modes.channels, channel.name) for channel in experiment.output_channels]
@@ -45,9 +48,10 @@ def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> Stru
     frequency, damping = np.asarray(modes.frequency_hz), np.asarray(modes.damping_ratio)
     inputs, outputs = shapes[drive], shapes[rows]
     if upper[drive] > 0.0:  # receptance upper = b c / w^2
-        omega = 2.0 * np.pi * float(modes.upper_hz)
+        upper_hz = min(float(modes.upper_hz), _HIGHEST_RESIDUAL * experiment.sample_rate_hz * steps)
+        omega = 2.0 * np.pi * upper_hz
         at_drive = omega * np.sqrt(upper[drive])
-        frequency, damping = np.append(frequency, modes.upper_hz), np.append(damping, _RESIDUAL_DAMPING)
+        frequency, damping = np.append(frequency, upper_hz), np.append(damping, _RESIDUAL_DAMPING)
         inputs = np.append(inputs, at_drive)
         outputs = np.column_stack([outputs, upper[rows] * omega**2 / at_drive])
     return StructuredModel(
@@ -95,7 +99,9 @@ def with_element(
     parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
     places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
     omega = linear.omega.copy()
-    found = [_regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))]
+    found = [
+        _regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))
+    ]
     best = min(found, key=lambda one: one.residual)
     own = omega[mode]
     omega[mode] = np.sqrt(max(own**2 + best.stiffness, _LEAST_STIFFNESS * own**2))

@@ -17,9 +17,15 @@ def identify(
     ],
     output: Output,
     kind: Annotated[
-        str, typer.Option("--model", help="Kind of model: nonlinear-mode, linear, force-surface, exciter or pnlss.")
+        str,
+        typer.Option(
+            "--model", help="Kind of model: nonlinear-mode, linear, force-surface, exciter, pnlss or structured."
+        ),
     ] = "nonlinear-mode",
-    modes: Annotated[Path | None, typer.Option(help="Linear model whose mode shapes the nonlinear mode uses.")] = None,
+    modes: Annotated[
+        Path | None,
+        typer.Option(help="Linear model: shapes of a nonlinear mode, start of a structured model."),
+    ] = None,
     estimator: Annotated[
         str, typer.Option(help="Of the responses: instrument (by the drive voltage), H1 or H2.")
     ] = "instrument",
@@ -55,14 +61,17 @@ def identify(
     rate_hz: Annotated[
         float | None,
         typer.Option(
-            "--rate", metavar="HZ", help="Sample rate of a PNLSS model; about 25 per period of the highest frequency."
+            "--rate",
+            metavar="HZ",
+            help="Sample rate of a PNLSS or structured model; by default 25 per period of the highest frequency.",
         ),
     ] = None,
     input: Annotated[
         str | None, typer.Option("--input", help="Of a PNLSS model: force or voltage.", show_default="force")
     ] = None,
     outputs: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Output channels of a PNLSS model; all motions if left out.")
+        str | None,
+        typer.Option(metavar="LIST", help="Outputs of a PNLSS or structured model; all motions if left out."),
     ] = None,
     no_output_polynomials: Annotated[
         bool,
@@ -80,13 +89,15 @@ def identify(
     ] = None,
     validation: Annotated[
         list[Path] | None,
-        typer.Option(help="Recording by which a PNLSS model's iterate is chosen; may be repeated."),
+        typer.Option(
+            help="Recording that chooses a PNLSS model's iterate, or judges a structured model; may be repeated."
+        ),
     ] = None,
     hold_out: Annotated[
         int | None,
         typer.Option(
             "--hold-out",
-            help="Realisations of each level, the last ones, that choose a PNLSS model's iterate in place of --validation; of "
+            help="Realisations of each level, the last ones, that do so in place of --validation; of "
             "five settled points and more every fourth does too. 0: none.",
             show_default="1",
         ),
@@ -94,9 +105,18 @@ def identify(
     relative: Annotated[
         bool,
         typer.Option(
-            "--relative-errors", help="Of a PNLSS model: small levels count as much as large ones in the fit."
+            "--relative-errors",
+            help="Of a PNLSS or structured model: small levels count as much as large ones in the fit.",
         ),
     ] = False,
+    laws: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="Laws of a structured model's element.",
+            show_default="polynomial-spring,polynomial-damper",
+        ),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the PNLSS model in OUTPUT, from the same files.")
     ] = False,
@@ -105,8 +125,10 @@ def identify(
 ) -> None:
     """Turn recordings into a model."""
     from rig.models.files.files import save
+    from rig.models.identify.data_request import DataOptions
     from rig.models.identify.identify import Request, identify_model
     from rig.models.identify.pnlss_request import PnlssOptions
+    from rig.models.identify.structured_request import StructuredOptions
     from rig.show.progress import FitLines
     from rig.system.stop_signals import insisting
 
@@ -123,16 +145,19 @@ def identify(
         pnlss=PnlssOptions(
             states=states,
             degrees=degrees,
-            rate_hz=rate_hz,
-            input=input,
-            outputs=outputs,
             output_polynomials=False if no_output_polynomials else None,
             saturating=saturating,
             iterations=iterations,
+            resume=output if resume else None,
+        ),
+        structured=StructuredOptions(laws=laws),
+        data=DataOptions(
+            rate_hz=rate_hz,
+            input=input,
+            outputs=outputs,
             validation=tuple(validation or ()),
             hold_out=hold_out,
             relative=True if relative else None,
-            resume=output if resume else None,
         ),
     )
     with insisting() as signals:

@@ -11,7 +11,7 @@ __all__ = ["predict"]
 
 
 def predict(
-    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model or force surface.")],
+    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model, structured model or force surface.")],
     output: Output,
     forces_n: Annotated[
         list[float] | None,
@@ -44,7 +44,8 @@ def predict(
     multisines: Annotated[
         list[Path] | None,
         typer.Option(
-            "--multisine", help="Simulate the realisations of this recording with a PNLSS model; may be repeated."
+            "--multisine",
+            help="Simulate the realisations of this recording with a PNLSS or structured model; may be repeated.",
         ),
     ] = None,
     planned: Annotated[
@@ -84,6 +85,9 @@ def predict(
     allow_extrapolation: Annotated[
         bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
     ] = False,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the functions that a structured model names.")
+    ] = False,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
@@ -107,6 +111,7 @@ def predict(
         references=tuple(references or ()),
         over=over,
         allow_extrapolation=allow_extrapolation,
+        trust_code=trust_code,
     )
     save(predict_vibrations(model, request), output)
     show_file(output, json)

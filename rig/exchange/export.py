@@ -21,7 +21,7 @@ from rig.exchange.uff.writing import write_uff
 from rig.measurements import bench_of_recording, point_rows
 from rig.models.files.files import load
 from rig.models.files.force_surface import MeasuredSurface
-from rig.models.files.pnlss import IdentifiedPnlss
+from rig.models.files.simulated import SimulatedModel
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.system.whole_file import whole_file
@@ -64,7 +64,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     found = load(path)
     if isinstance(found, MeasuredSurface):
         return [found.responses]
-    if isinstance(found, IdentifiedPnlss):
+    if isinstance(found, SimulatedModel):
         return [found.model]
     if isinstance(found, ModalAnalysis):
         return [found.modes] if found.responses is None else [found.modes, found.responses]

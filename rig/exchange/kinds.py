@@ -14,6 +14,7 @@ from identification import (
     LinearModes,
     NonlinearMode,
     PnlssModel,
+    StructuredModel,
     Transient,
     pack_frequency_responses,
     unpack_frequency_responses,
@@ -21,6 +22,7 @@ from identification import (
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
 from rig.exchange.pnlss import pnlss_from, pnlss_parts
+from rig.exchange.structured import structured_from, structured_parts
 from rig.exchange.time_data import TimeData, time_data_from, time_data_parts, transient_from, transient_parts
 from rig.measurements.backbone_table import backbone_from, backbone_parts
 from rig.text.contents import Contents, Labels, unit_of
@@ -100,6 +102,7 @@ KINDS = (
     ExchangeKind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays),
     ExchangeKind("time-data", TimeData, time_data_parts, time_data_from),
     ExchangeKind("pnlss", PnlssModel, pnlss_parts, pnlss_from),
+    ExchangeKind("structured", StructuredModel, structured_parts, structured_from),
     ExchangeKind("sweep", Transient, transient_parts, transient_from),
 )
 

@@ -96,7 +96,13 @@ SLOW = (
     "docs/explanation/structured-models.md",
     *(
         f"docs/how-to/{name}.md"
-        for name in ("tune-a-rig", "rehearse-a-plan", "protect-a-fragile-specimen", "predict-with-a-pnlss-model")
+        for name in (
+            "tune-a-rig",
+            "rehearse-a-plan",
+            "protect-a-fragile-specimen",
+            "predict-with-a-pnlss-model",
+            "identify-a-structured-model",
+        )
     ),
 )
 

@@ -13,6 +13,7 @@ _DECLARED = {
     "linear-modes": ("linear_modes:LINEAR_MODES", ("ModalAnalysis", "LinearModes")),
     "exciter": ("exciter:EXCITER", ("Exciter",)),
     "pnlss": ("pnlss:PNLSS", ("IdentifiedPnlss", "PnlssFit", "PnlssModel")),
+    "structured": ("structured:STRUCTURED", ("IdentifiedStructured", "StructuredFit", "StructuredModel")),
     "force-surface": ("force_surface:FORCE_SURFACE", ("MeasuredSurface",)),
     "frequency-responses": ("frequency_responses:FREQUENCY_RESPONSES", ("tuple",)),
     "frequency-response-matrix": ("response_matrix:RESPONSE_MATRIX", ("FrequencyResponseMatrix",)),

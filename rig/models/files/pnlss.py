@@ -1,34 +1,26 @@
 """Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one experiment."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from identification import (
-    ErrorSpectra,
-    Experiment,
     Features,
     IdentificationError,
-    OutputStretch,
     PnlssFit,
     PnlssModel,
-    SimulatedRun,
-    error_spectra,
-    output_stretch,
 )
-from identification.packing import pack_all, unpack_all
 from rig.models.files.kind import Arrays, Attributes, FileKind
-from rig.text.console import number, print_table
-from vibrolock.results import Result
+from rig.models.files.simulated import SimulatedModel, errors_in, packed_errors, say_errors, unpacked_errors
+from rig.text.console import number
 
 __all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class IdentifiedPnlss(Result):
+class IdentifiedPnlss(SimulatedModel):
     """A nonlinear state-space model and its origin.
 
     Parameters
@@ -37,40 +29,15 @@ class IdentifiedPnlss(Result):
         The model.
     fit
         The fit of which the model is the best iterate; None for a model from another source.
-    runs, linear_runs
-        Every experiment as simulated by the model, and by the linear start; the latter may be empty.
-    spectra
-        Spectra of one periodic experiment, of validation data if there is any; None if there is no periodic experiment.
-    stretch
-        A short stretch of one experiment over time, of validation data if there is any; None if it was not kept.
-    seconds
-        Wall time of the identification; NaN if unknown.
-    notes
-        Remarks on the data for the user, one line each.
-    data
-        Fingerprint that identifies the data of the fit; empty if unknown.
-    uses
-        ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
     """
 
     model: PnlssModel
     fit: PnlssFit | None = None
-    runs: tuple[SimulatedRun, ...] = ()
-    linear_runs: tuple[SimulatedRun, ...] = ()
-    spectra: ErrorSpectra | None = None
-    stretch: OutputStretch | None = None
-    seconds: float = float("nan")
-    notes: tuple[str, ...] = ()
-    data: str = ""
-    uses: Mapping[str, str] = field(default_factory=dict)
 
-    def on(self, training: Sequence[Experiment], validation: Sequence[Experiment]) -> "IdentifiedPnlss":
-        """Return it with spectra and a stretch over time of the last experiment, preferably periodic and of validation data."""
-        every = [*training, *validation]
-        periodic = [one for one in validation if one.period_samples] or [one for one in training if one.period_samples]
-        linear = None if self.fit is None else self.fit.linear
-        spectra = error_spectra(self.model, linear, periodic[-1]) if periodic else None
-        return replace(self, spectra=spectra, stretch=output_stretch(self.model, (periodic or every)[-1]))
+    @property
+    def linear(self) -> PnlssModel | None:
+        """Linear start of the fit; None if unknown."""
+        return None if self.fit is None else self.fit.linear
 
 
 def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attributes]:
@@ -82,19 +49,8 @@ def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attri
     arrays, attributes = kept.to_arrays()
     head = "model" if found.fit is None else "fit"
     arrays = {f"{head}/{name}": array for name, array in arrays.items()}
-    out: dict[str, Any] = {
-        head: attributes,
-        "seconds": found.seconds,
-        "notes": list(found.notes),
-        "data": found.data,
-        "uses": dict(found.uses),
-    }
-    kept_runs = {"runs": found.runs, "linear_runs": found.linear_runs}
-    ones = {"spectra": found.spectra, "stretch": found.stretch}
-    for name, things in (kept_runs | {name: () if one is None else (one,) for name, one in ones.items()}).items():
-        inside, of_things = pack_all(name, things)
-        arrays, out = arrays | inside, out | of_things
-    return arrays, out
+    errors, out = packed_errors(found)
+    return arrays | errors, {head: attributes} | out
 
 
 def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
@@ -103,20 +59,10 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
         raise IdentificationError("PNLSS file: holds neither a fit nor a model")
     inside = {name.removeprefix(f"{head}/"): array for name, array in arrays.items() if name.startswith(f"{head}/")}
     fit = PnlssFit.from_arrays(inside, attributes[head]) if head == "fit" else None
-    kinds: dict[str, type] = {"runs": SimulatedRun, "linear_runs": SimulatedRun, "spectra": ErrorSpectra}
-    parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in kinds.items()}
-    spectra = parts.pop("spectra")
-    stretch = unpack_all(OutputStretch, "stretch", arrays, attributes) if "stretch" in attributes else ()
     return IdentifiedPnlss(
         model=PnlssModel.from_arrays(inside, attributes[head]) if fit is None else fit.model,
         fit=fit,
-        **parts,
-        spectra=spectra[0] if spectra else None,
-        stretch=stretch[0] if stretch else None,
-        seconds=float(attributes["seconds"]),
-        notes=tuple(attributes["notes"]),
-        data=str(attributes.get("data", "")),
-        uses={str(name): str(use) for name, use in attributes.get("uses", {}).items()},
+        **unpacked_errors(arrays, attributes),
     )
 
 
@@ -163,8 +109,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
             "interrupted": fit.interrupted,
             "seconds": float(fit.history.seconds[-1]),
         },
-        "errors": [run.row() for run in found.runs],
-        "linear_errors": [run.row() for run in found.linear_runs],
+        **errors_in(found),
         "training": list(model.training),
         "state_range": model.state_range.tolist(),
         "input_range": model.input_range.tolist(),
@@ -197,27 +142,7 @@ def _say(summary: dict[str, Any]) -> None:
             f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; {fit['stopped']}; "
             f"{number(summary['seconds'], '.1f')} s in all"
         )
-    if summary["errors"]:
-        print("relative errors of the model, in brackets those of its linear start, %")
-        linear = summary["linear_errors"] or [None] * len(summary["errors"])
-        print_table(
-            ("experiment", "use", *summary["outputs"], "range use"),
-            [
-                (
-                    run["name"],
-                    run["use"],
-                    *(_error(run, before, name) for name in summary["outputs"]),
-                    "unbounded" if run["unbounded"] else number(run["range_use"], ".2f"),
-                )
-                for run, before in zip(summary["errors"], linear, strict=True)
-            ],
-        )
-
-
-def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str:
-    """Return one error of the model, with the error of the linear start in brackets."""
-    own = "unbounded" if run["unbounded"] else number(run["errors"][name], ".3f", 100.0)
-    return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"
+    say_errors(summary)
 
 
 PNLSS = FileKind(

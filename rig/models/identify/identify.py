@@ -66,7 +66,11 @@ def identify_model(
     if request.kind == "pnlss":
         from rig.models.identify.pnlss import identified_pnlss  # a second, which the other models need not wait for
 
-        return identified_pnlss(paths, request.pnlss, progress)
+        return identified_pnlss(paths, request.pnlss, request.data, progress)
+    if request.kind == "structured" and request.modes is not None:
+        from rig.models.identify.structured import identified_structured  # as above
+
+        return identified_structured(paths, request.modes, request.structured, request.data)
     return _MODELS[request.kind](paths, request)
 
 

@@ -2,32 +2,33 @@
 
 import time
 from collections.abc import Callable, Sequence
-from itertools import compress
+from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from identification import (
     FitProgress,
     FitSettings,
-    PnlssFit,
     fit_pnlss,
     identify_pnlss,
-    simulated_run,
 )
 from rig.errors import ConfigurationError, RecordingError
+from rig.measurements import bench_of_recording
 from rig.models.files.files import load_as
 from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.identify.data_fingerprints import uses_of
-from rig.models.identify.pnlss_data import PnlssData, pnlss_data
+from rig.models.identify.data_request import DataOptions
+from rig.models.identify.fit_data import FitData, fit_data
 from rig.models.identify.pnlss_request import PnlssOptions
+from rig.recording.reader import Recording
 
 __all__ = ["identified_pnlss"]
 
 Progress = Callable[[FitProgress], None]
 
 
-def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Progress | None = None) -> IdentifiedPnlss:
+def identified_pnlss(
+    paths: Sequence[Path], options: PnlssOptions, of_data: DataOptions, progress: Progress | None = None
+) -> IdentifiedPnlss:
     """Identify one model from all recordings together.
 
     After Ctrl-C, return the state reached; `PnlssOptions.resume` continues from it. Raises `RecordingError` for files with
@@ -35,7 +36,8 @@ def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Pro
     """
     begun = time.perf_counter()
     earlier = None if options.resume is None else _earlier(options.resume)
-    data = pnlss_data(paths, options, earlier)
+    data = fit_data(paths, of_data, "PNLSS", like=None if earlier is None else earlier.model)
+    data = replace(data, notes=(*data.notes, *_remarks(data, paths)))
     if earlier is not None and earlier.fit is not None:
         _check_resumed(options, earlier, data)
     settings = FitSettings() if options.iterations is None else FitSettings(iterations=options.iterations)
@@ -60,7 +62,33 @@ def identified_pnlss(paths: Sequence[Path], options: PnlssOptions, progress: Pro
             settings=settings,
             progress=progress,
         )
-    return _with_errors(fit, data, time.perf_counter() - begun)
+    found = IdentifiedPnlss(
+        model=fit.model,
+        fit=fit,
+        seconds=time.perf_counter() - begun,
+        notes=data.notes,
+        data=data.fingerprint,
+        uses=uses_of(data.training, data.validation),
+    )
+    return found.judged(data.training, data.validation, fit.initial_states)
+
+
+def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
+    """Return what the data mean for the model."""
+    first, said = data.training[0], []
+    if not data.validation:
+        said.append("no data to choose the iterate by: the last one is taken, however it does on other data")
+    if "force" not in [channel.role for channel in (*first.input_channels, *first.output_channels)]:
+        said.append("the force is neither input nor output: the model predicts multisines alone; add it to the outputs")
+    if "voltage" in [channel.name for channel in first.input_channels]:
+        benches = " and ".join(dict.fromkeys(_bench(path) for path in paths))
+        said.append(f"the input is the voltage: the model holds for the exciter of {benches} alone")
+    return said
+
+
+def _bench(path: Path) -> str:
+    with Recording(path) as recording:
+        return bench_of_recording(recording).name
 
 
 def _earlier(path: Path) -> IdentifiedPnlss:
@@ -73,7 +101,7 @@ def _earlier(path: Path) -> IdentifiedPnlss:
     return found
 
 
-def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssData) -> None:
+def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: FitData) -> None:
     """Refuse to continue with other data: validation data, which chose the iterate, might become training data."""
     if earlier.data and earlier.data != data.fingerprint:
         uses = [run.use for run in earlier.runs]
@@ -85,34 +113,3 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: PnlssD
     done = 0 if earlier.fit is None else earlier.fit.history.iterations
     if options.iterations is not None and options.iterations <= done:
         raise ConfigurationError(f"`iterations` = {options.iterations}: {done} are done; allowed is more")
-
-
-def _with_errors(fit: PnlssFit, data: PnlssData, seconds: float) -> IdentifiedPnlss:
-    """Add to a fit its errors on all data, and what is drawn of the data."""
-    every = [(one, "training") for one in data.training] + [(one, "validation") for one in data.validation]
-    begins = iter(fit.initial_states)
-    states = [next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every]
-    moved = [bool(np.all(np.any(one.counted_outputs != 0.0, axis=1))) for one, _ in every]
-    both, known = list(compress(every, moved)), list(compress(states, moved))
-    still = [
-        f"{one.name}: an output is zero throughout, so that it has no errors"
-        for (one, _), is_moved in zip(every, moved, strict=True)
-        if not is_moved
-    ]
-    runs = tuple(
-        simulated_run(fit.model, one, initial_state=begin, use=use)
-        for (one, use), begin in zip(both, known, strict=True)
-    )
-    linear = fit.linear
-    linear_runs = () if linear is None else tuple(simulated_run(linear, one, use=use) for one, use in both)
-    found = IdentifiedPnlss(
-        model=fit.model,
-        fit=fit,
-        runs=runs,
-        linear_runs=linear_runs,
-        seconds=seconds,
-        notes=(*data.notes, *still),
-        data=data.fingerprint,
-        uses=uses_of(data.training, data.validation),
-    )
-    return found.on(data.training, data.validation)

@@ -7,7 +7,9 @@ from typing import get_args
 
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
+from rig.models.identify.data_request import DataOptions
 from rig.models.identify.pnlss_request import PnlssOptions
+from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 
 __all__ = ["Request"]
 
@@ -16,8 +18,11 @@ _OPTIONS: dict[str, tuple[str, ...]] = {
     "linear": ("estimator", "band_hz", "count"),
     "force-surface": (),
     "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
-    "pnlss": tuple(PnlssOptions().given()),
+    "pnlss": (*PnlssOptions().given(), *DataOptions().given()),
+    "structured": ("modes", *StructuredOptions().given(), *(name for name in DataOptions().given() if name != "input")),
 }
+_OF_THE_FIT = ("states", "degrees", "output_polynomials", "saturating", "rate_hz", "input", "outputs")
+"""Options that a fit which goes on has already."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,9 +30,9 @@ class Request:
     """What to identify, and how."""
 
     kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter`` or ``pnlss``."""
+    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter``, ``pnlss`` or ``structured``."""
     modes: Path | None = None
-    """Linear model whose mode shapes are used for a nonlinear mode."""
+    """Linear model whose mode shapes are used for a nonlinear mode, or with which a structured model begins."""
     estimator: str = "instrument"
     """Estimator of the responses for a linear model: ``instrument``, ``H1`` or ``H2``."""
     band_hz: tuple[float, float] | None = None
@@ -42,6 +47,10 @@ class Request:
     """Number of modes of a linear model; determined automatically if None."""
     pnlss: PnlssOptions = field(default_factory=PnlssOptions)
     """Options for a nonlinear state-space model."""
+    structured: StructuredOptions = field(default_factory=StructuredOptions)
+    """Options for a structured model."""
+    data: DataOptions = field(default_factory=DataOptions)
+    """Data of a nonlinear state-space model or a structured model."""
 
     def __post_init__(self) -> None:
         if self.kind not in _OPTIONS:
@@ -67,6 +76,8 @@ class Request:
             "estimator": self.estimator != "instrument",
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
+            **self.structured.given(),
+            **self.data.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
             if name not in _OPTIONS[self.kind]:
@@ -74,3 +85,8 @@ class Request:
                 raise ConfigurationError(f"`{name}`: means nothing to `kind` {self.kind}, which takes {allowed}")
         if self.amplifier_gain is not None and self.resistance_ohm is None:
             raise ConfigurationError("`amplifier_gain`: is for the resistance; add `resistance_ohm`, or leave it out")
+        if self.kind == "structured" and self.modes is None:
+            raise ConfigurationError(f"`modes`: is missing, {MODES_OF_A_STRUCTURE}")
+        for name in _OF_THE_FIT if self.pnlss.resume is not None else ():
+            if given[name]:
+                raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")

@@ -8,30 +8,21 @@ from typing import cast
 from identification import (
     Exciter,
     FrequencyResponse,
-    PeriodicSpectra,
     PnlssModel,
     PredictionError,
     Predictions,
-    SimulatedRun,
     SteadyPrediction,
     pnlss_frequency_response,
-    simulated_run,
 )
-from rig.campaigns.kinds import kinds_that_yield
-from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import bench_of_recording
-from rig.measurements.experiments import experiments
-from rig.measurements.points_left_out import points_left_out
+from rig.errors import ConfigurationError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.files import load_as
 from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
-from rig.models.identify.data_fingerprints import fingerprint
+from rig.models.predict.multisines import simulated_multisines
 from rig.models.predict.pnlss_steady import Held, Reference, compared, default_held
 from rig.models.predict.pnlss_sweep_models import PnlssSweepModels
 from rig.models.predict.pnlss_sweeps import planned_pnlss_sweeps, recorded_pnlss_sweeps
 from rig.models.predict.request import PredictionRequest
-from rig.models.predict.sweeps import strangers
-from rig.recording.reader import Recording
 
 __all__ = ["pnlss_predictions"]
 
@@ -58,12 +49,8 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
     models = PnlssSweepModels(model, exciter)
     swept = [one for recording in request.sweeps for one in recorded_pnlss_sweeps(recording, models)]
     swept += [one for plan in request.planned for one in planned_pnlss_sweeps(plan, models)]
-    runs: list[SimulatedRun] = []
-    notes = list(_default(request, held) if request.forces_n else ())
-    for recording in request.multisines:
-        more, said = _multisine(recording, found)
-        runs += more
-        notes += said
+    runs, said = simulated_multisines(request.multisines, found, model.specimen)
+    notes = [*(_default(request, held) if request.forces_n else ()), *said]
     notes += _strangers(model, [reference.measured for reference in references])
     notes += [note for one in swept for note in one.notes]
     return Predictions(
@@ -73,7 +60,7 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
         sweeps=tuple(one.prediction for one in swept),
         sweep_references=tuple(one.recorded for one in swept),
         sweep_errors=tuple(one.error for one in swept),
-        runs=tuple(runs),
+        runs=runs,
         specimen=model.specimen,
         notes=tuple(dict.fromkeys(notes)),
     )
@@ -131,30 +118,6 @@ def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
         "constant is a force without harmonics, for nothing in the model makes any: an exciter model gives the "
         "fundamental or the RMS of a force that a shaker makes",
     )
-
-
-def _multisine(path: Path, identified: IdentifiedPnlss) -> tuple[list[SimulatedRun], tuple[str, ...]]:
-    """Simulate every realisation of a recording; return the runs with their use in the identification, and notes."""
-    model = identified.model
-    with Recording(path) as recording:
-        if recording.kind not in kinds_that_yield(PeriodicSpectra):
-            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
-        found = experiments(
-            recording,
-            inputs=[channel.name for channel in model.inputs],
-            outputs=[channel.name for channel in model.outputs],
-            rate_hz=model.sample_rate_hz,
-        )
-        notes = (
-            *strangers(bench_of_recording(recording), model.specimen, None, str(path)),
-            *points_left_out(recording),
-        )
-    uses = identified.uses
-    other = "test" if uses else "unknown"
-    runs = [simulated_run(model, one, use=uses.get(fingerprint(one), other)) for one in found]
-    if not uses:
-        notes = (*notes, "the model does not say what it was identified with: these may be its training data")
-    return runs, notes
 
 
 def _strangers(model: PnlssModel, references: Sequence[FrequencyResponse]) -> list[str]:

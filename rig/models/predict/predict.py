@@ -35,10 +35,12 @@ from rig.models.files.force_surface import FORCE_SURFACE
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.files.nonlinear_mode import NONLINEAR_MODE
 from rig.models.files.pnlss import PNLSS
+from rig.models.files.structured import STRUCTURED
 from rig.models.identify.identify import modes_in
 from rig.models.predict.pnlss import pnlss_predictions
 from rig.models.predict.pnlss_steady import Reference
 from rig.models.predict.request import PredictionRequest
+from rig.models.predict.structured import structured_predictions
 from rig.models.predict.surface import surface_predictions
 from rig.models.predict.sweeps import SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
@@ -53,18 +55,19 @@ _DRAWS = 40
 
 
 def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
-    """Predict with a nonlinear mode, a PNLSS model or a force surface, with errors where there is a reference.
+    """Predict with a nonlinear mode, a PNLSS or structured model or a force surface, with errors where there is a reference.
 
     Raises `RecordingError` for files with other contents, `ConfigurationError` for plans that cannot be predicted,
     `identification.IdentificationError` if the model cannot answer, in particular beyond twice the largest amplitude with which
     it was identified.
     """
     kind = kind_of(model)
-    if kind not in (NONLINEAR_MODE.name, PNLSS.name, FORCE_SURFACE.name):
-        raise RecordingError(
-            f"{model}: is a file of kind {kind}; predictions are made with a {NONLINEAR_MODE.name}, a {PNLSS.name} model or a "
-            f"{FORCE_SURFACE.name}"
-        )
+    if kind not in (known := (NONLINEAR_MODE.name, PNLSS.name, STRUCTURED.name, FORCE_SURFACE.name)):
+        raise RecordingError(f"{model}: is a file of kind {kind}; predictions are made with a {', '.join(known)}")
+    if kind == STRUCTURED.name:
+        return structured_predictions(model, request)
+    if request.trust_code:
+        raise ConfigurationError(f"`trust_code`: means nothing to a {kind}, which names no code; leave it out")
     if kind == PNLSS.name:
         return pnlss_predictions(
             model, request, [one for path in request.references for one in _references(path, request)]
@@ -107,7 +110,9 @@ def _check_mode(request: PredictionRequest) -> None:
             "`exciter`: is for sweeps, and none is given; add `sweeps` or `planned`, or leave it out"
         )
     if request.multisines:
-        raise ConfigurationError("`multisines`: means nothing to a nonlinear mode; a PNLSS model simulates multisines")
+        raise ConfigurationError(
+            "`multisines`: means nothing to a nonlinear mode; a PNLSS or structured model simulates multisines"
+        )
 
 
 def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:

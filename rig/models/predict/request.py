@@ -29,7 +29,7 @@ class PredictionRequest:
     sweeps: tuple[Path, ...] = ()
     """Recordings whose sweeps are predicted."""
     multisines: tuple[Path, ...] = ()
-    """Recordings whose realisations a PNLSS model simulates."""
+    """Recordings whose realisations a PNLSS or structured model simulates."""
     planned: tuple[str, ...] = ()
     """Plans of future sweeps, by name or file."""
     zero_crossings: str | None = None
@@ -46,6 +46,8 @@ class PredictionRequest:
     back."""
     allow_extrapolation: bool = False
     """Whether to predict beyond twice the largest identified modal amplitude."""
+    trust_code: bool = False
+    """Whether to import the functions that a structured model names."""
 
     def __post_init__(self) -> None:
         if not (self.forces_n or self.voltages_v or self.sweeps or self.multisines or self.planned or self.references):

@@ -13,6 +13,7 @@ from rig.report.report import write_report
 from rig.show.summary import summarise
 from rig.text.console import PrintedTable, collected
 from tests.rig.exchange.conftest import matrix, modes, responses  # noqa: F401 (fixtures)
+from tests.rig.exchange.structured_models import structure
 from tests.rig.report.page import read
 
 PLAN = """
@@ -85,6 +86,11 @@ def test_a_model_of_every_kind_has_what_rig_show_says_and_its_figure(kind, shelf
 @pytest.mark.parametrize("name", ["modes", "matrix", "responses"])
 def test_modes_and_imported_measurements_too(name, request, tmp_path):
     save(request.getfixturevalue(name), tmp_path / "thing.h5")
+    check_against_show(tmp_path / "thing.h5", tmp_path / "report.html")
+
+
+def test_a_structured_model_too(tmp_path):
+    save(structure(), tmp_path / "thing.h5")
     check_against_show(tmp_path / "thing.h5", tmp_path / "report.html")
 
 

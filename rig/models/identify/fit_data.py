@@ -1,4 +1,4 @@
-"""Training and validation data of nonlinear state-space models: experiments of all files at one sample rate."""
+"""Training and validation data of models that are fitted over time: experiments of all files at one sample rate."""
 
 import hashlib
 from collections.abc import Sequence
@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from identification import Experiment
+from identification.pnlss.runs import Simulator
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording
 from rig.measurements.experiments import default_rate_hz, experiments
 from rig.measurements.experiments.build import KINDS
 from rig.measurements.points_left_out import points_left_out
-from rig.models.files.pnlss import IdentifiedPnlss
 from rig.models.identify.data_fingerprints import features_of
-from rig.models.identify.pnlss_request import PnlssOptions
+from rig.models.identify.data_request import DataOptions
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
-__all__ = ["PnlssData", "pnlss_data"]
+__all__ = ["FitData", "fit_data"]
 
 _EVERY = 4
 """Every how many settled points one is used as validation data."""
@@ -30,13 +30,13 @@ _FEWEST_POINTS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class PnlssData:
+class FitData:
     """Data of a fit."""
 
     training: tuple[Experiment, ...]
     """Experiments to which the model is fitted."""
     validation: tuple[Experiment, ...]
-    """Experiments by which the iterate is chosen."""
+    """Experiments by which the model is judged."""
     notes: tuple[str, ...]
     """Remarks on the data for the user, one line each."""
 
@@ -50,20 +50,45 @@ class PnlssData:
         return digest.hexdigest()
 
 
-def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: IdentifiedPnlss | None) -> PnlssData:
+def fit_data(
+    paths: Sequence[Path],
+    options: DataOptions,
+    what: str,
+    *,
+    like: Simulator | None = None,
+    kinds: Sequence[str] = KINDS,
+) -> FitData:
     """Return the experiments of all files at one sample rate, split into training and validation data.
 
-    If there is an ``earlier`` model, its sample rate and channels are used. Raises `RecordingError` for files with other
-    contents, `ConfigurationError` for files and options that do not fit together, `identification.IdentificationError` if the
-    data does not allow the identification.
+    Parameters
+    ----------
+    paths
+        Recordings.
+    options
+        Which of their data to take.
+    what
+        Kind of model, for messages.
+    like
+        Earlier model whose sample rate and channels are used.
+    kinds
+        Kinds of recordings that such a model is fitted to.
+
+    Raises
+    ------
+    RecordingError
+        For files with other contents.
+    ConfigurationError
+        For files and options that do not fit together.
+    identification.IdentificationError
+        If the data does not allow the identification.
     """
-    _check_files(paths, options.validation, needs_lines=earlier is None)
+    _check_files(paths, options.validation, what, kinds, needs_lines=like is None)
     channels = options.channels
-    if earlier is not None:
-        rate_hz = earlier.model.sample_rate_hz
+    if like is not None:
+        rate_hz = like.sample_rate_hz
         channels = {
-            "inputs": tuple(channel.name for channel in earlier.model.inputs),
-            "outputs": [channel.name for channel in earlier.model.outputs],
+            "inputs": tuple(channel.name for channel in like.inputs),
+            "outputs": [channel.name for channel in like.outputs],
         }
     else:
         rate_hz = options.rate_hz or _common_rate_hz(paths)
@@ -88,17 +113,9 @@ def pnlss_data(paths: Sequence[Path], options: PnlssOptions, earlier: Identified
         with Recording(path) as recording:
             validation += experiments(recording, rate_hz=rate_hz, **channels)
     _check_alive([*training, *validation])
-    if not validation:
-        notes.append("no data to choose the iterate by: the last one is taken, however it does on other data")
-    if "force" not in [channel.role for channel in (*training[0].input_channels, *training[0].output_channels)]:
-        notes.append(
-            "the force is neither input nor output: the model predicts multisines alone; add it to the outputs"
-        )
-    if "voltage" in [channel.name for channel in training[0].input_channels]:
-        notes.append(f"the input is the voltage: the model holds for the exciter of {_benches(paths)} alone")
     if options.relative:
         training, validation = list(_relative(training)), list(_relative(validation) if validation else ())
-    return PnlssData(tuple(training), tuple(validation), tuple(notes))
+    return FitData(tuple(training), tuple(validation), tuple(notes))
 
 
 def _check_alive(experiments: Sequence[Experiment]) -> None:
@@ -111,13 +128,15 @@ def _check_alive(experiments: Sequence[Experiment]) -> None:
                 )
 
 
-def _check_files(paths: Sequence[Path], validation: Sequence[Path], *, needs_lines: bool) -> None:
+def _check_files(
+    paths: Sequence[Path], validation: Sequence[Path], what: str, wanted: Sequence[str], *, needs_lines: bool
+) -> None:
     """Refuse files of other kinds, of other specimens, and validation files that are also used for training."""
     kinds = {path: kind_of(path) for path in (*paths, *validation)}
     for path, kind in kinds.items():
-        if kind not in KINDS:
+        if kind not in wanted:
             raise RecordingError(
-                f"{path}: is a file of kind {kind}; a PNLSS model comes from recordings: {', '.join(KINDS)}"
+                f"{path}: is a file of kind {kind}; a {what} model comes from recordings: {', '.join(wanted)}"
             )
     for path in validation:
         if any(path.samefile(other) for other in paths):
@@ -129,20 +148,15 @@ def _check_files(paths: Sequence[Path], validation: Sequence[Path], *, needs_lin
         raise ConfigurationError(f"`validation` = {twice}: is given twice; each file once")
     if needs_lines and "multisine" not in [kinds[path] for path in paths]:
         raise ConfigurationError(
-            f"{', '.join(f'{path} ({kinds[path]})' for path in paths)}: no multisine among them, from which the linear model "
-            "that a fit begins with comes; add one"
+            f"{', '.join(f'{path} ({kinds[path]})' for path in paths)}: no multisine among them, which a fit begins with; "
+            "add one"
         )
-    one_specimen(**{str(path): _bench_and_specimen(path)[1] for path in kinds})
+    one_specimen(**{str(path): _specimen(path) for path in kinds})
 
 
-def _bench_and_specimen(path: Path) -> tuple[str, str]:
+def _specimen(path: Path) -> str:
     with Recording(path) as recording:
-        bench = bench_of_recording(recording)
-        return bench.name, bench.specimen.name
-
-
-def _benches(paths: Sequence[Path]) -> str:
-    return " and ".join(dict.fromkeys(_bench_and_specimen(path)[0] for path in paths))
+        return bench_of_recording(recording).specimen.name
 
 
 def _common_rate_hz(paths: Sequence[Path]) -> float:

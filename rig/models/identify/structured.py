@@ -1,0 +1,58 @@
+"""Identify structured models from recordings: modes, data, fit and errors."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from identification import LinearModes, ModalAnalysis, fit_structured
+from identification.structured.start import linear_start
+from identification.validation import one_specimen
+from rig.errors import RecordingError
+from rig.models.files.files import load_as
+from rig.models.files.linear_modes import LINEAR_MODES
+from rig.models.files.structured import IdentifiedStructured
+from rig.models.identify.data_fingerprints import uses_of
+from rig.models.identify.data_request import DataOptions
+from rig.models.identify.fit_data import fit_data
+from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
+from rig.recording.arrays import kind_of
+
+__all__ = ["identified_structured"]
+
+_KINDS = ("multisine", "sweep")
+"""Recordings that begin at rest."""
+_STEPS = 2
+
+
+def identified_structured(
+    paths: Sequence[Path], modes: Path, options: StructuredOptions, of_data: DataOptions
+) -> IdentifiedStructured:
+    """Identify one model from all recordings together, beginning with the modes in a file.
+
+    Raises `RecordingError` for files with other contents, `identification.IdentificationError` if the data does not allow the
+    identification.
+    """
+    begun = time.perf_counter()
+    found = _modes_in(modes)
+    data = fit_data(paths, of_data, "structured", kinds=_KINDS)
+    one_specimen(**{str(modes): found.specimen, str(paths[0]): data.training[0].specimen})
+    fit = fit_structured(found, data.training, steps=_STEPS, **options.for_fit())
+    identified = IdentifiedStructured(
+        model=fit.model,
+        fit=fit,
+        linear=linear_start(found, data.training[0], _STEPS),
+        seconds=time.perf_counter() - begun,
+        notes=data.notes,
+        data=data.fingerprint,
+        uses=uses_of(data.training, data.validation),
+    )
+    return identified.judged(data.training, data.validation)
+
+
+def _modes_in(path: Path) -> LinearModes:
+    """Load linear modes; if there are none, say how to make them."""
+    if not path.exists() or (kind := kind_of(path)) != LINEAR_MODES.name:
+        what = f"is a file of kind {kind}" if path.exists() else "does not exist"
+        raise RecordingError(f"{path}: {what}, wanted are {MODES_OF_A_STRUCTURE}")
+    return cast(ModalAnalysis, load_as(LINEAR_MODES, path)).modes

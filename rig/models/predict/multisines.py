@@ -1,0 +1,56 @@
+"""Recorded multisines as a model simulates them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from identification import PeriodicSpectra, SimulatedRun, simulated_run
+from rig.campaigns.kinds import kinds_that_yield
+from rig.errors import RecordingError
+from rig.measurements import bench_of_recording
+from rig.measurements.experiments import experiments
+from rig.measurements.points_left_out import points_left_out
+from rig.models.files.simulated import SimulatedModel
+from rig.models.identify.data_fingerprints import fingerprint
+from rig.models.predict.sweeps import strangers
+from rig.recording.reader import Recording
+
+__all__ = ["simulated_multisines"]
+
+
+def simulated_multisines(
+    paths: Sequence[Path], identified: SimulatedModel, specimen: str
+) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
+    """Simulate every realisation of recordings; return the runs with their use in the identification, and notes.
+
+    ``specimen``: that of the model. Raises `RecordingError` for recordings that are no multisines.
+    """
+    runs: list[SimulatedRun] = []
+    notes: list[str] = []
+    for path in paths:
+        more, said = _of_one(path, identified, specimen)
+        runs += more
+        notes += said
+    return tuple(runs), tuple(notes)
+
+
+def _of_one(path: Path, identified: SimulatedModel, specimen: str) -> tuple[list[SimulatedRun], tuple[str, ...]]:
+    model = identified.model
+    with Recording(path) as recording:
+        if recording.kind not in kinds_that_yield(PeriodicSpectra):
+            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
+        found = experiments(
+            recording,
+            inputs=[channel.name for channel in model.inputs],
+            outputs=[channel.name for channel in model.outputs],
+            rate_hz=model.sample_rate_hz,
+        )
+        notes = (
+            *strangers(bench_of_recording(recording), specimen, None, str(path)),
+            *points_left_out(recording),
+        )
+    uses = identified.uses
+    other = "test" if uses else "unknown"
+    runs = [simulated_run(model, one, use=uses.get(fingerprint(one), other)) for one in found]
+    if not uses:
+        notes = (*notes, "the model does not say what it was identified with: these may be its training data")
+    return runs, notes

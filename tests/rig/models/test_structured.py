@@ -1,0 +1,270 @@
+"""Structured models from the command line: identified, kept in a file, shown, drawn, and asked for predictions."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import rig
+from identification import NonlinearElement
+from identification.structured.laws import Iwan, Jenkins, PolynomialSpring, UserSpring
+from rig.campaigns.plans import plan_from
+from rig.errors import RecordingError
+from rig.models.files.files import load, save
+from rig.models.files.structured import IdentifiedStructured
+from rig.models.files.structured_figure import draw_structured
+from rig.models.identify.structured_request import StructuredOptions
+from tests.rig.exchange.structured_models import structure
+
+LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
+LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2}
+
+
+@pytest.fixture(scope="session")
+def recordings(tmp_path_factory) -> Path:
+    """A folder with recordings at two levels, the modes of the lower one, and a model of the higher one."""
+    from rig.models.identify.data_request import DataOptions
+    from rig.models.identify.identify import Request, identify_model
+
+    folder = tmp_path_factory.mktemp("structured")
+    for name, level in (("low", 0.02), ("lines", 0.4)):
+        rig.run(plan_from(LINES | {"levels_rms_v": [level]}, name), output=folder / f"{name}.h5", seed=1).close()
+    save(identify_model([folder / "low.h5"], Request(kind="linear", count=1)), folder / "modes.h5")
+    request = Request(
+        kind="structured",
+        modes=folder / "modes.h5",
+        structured=StructuredOptions(laws="polynomial-spring"),
+        data=DataOptions(rate_hz=200.0, outputs="drive"),
+    )
+    save(identify_model([folder / "lines.h5"], request), folder / "S.h5")
+    return folder
+
+
+@pytest.fixture
+def there(command, recordings, monkeypatch):
+    """Commands typed in the folder of the recordings."""
+
+    def typed(line):
+        monkeypatch.chdir(recordings)
+        return command(line)
+
+    return typed
+
+
+def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(there):
+    told = json.loads(there("show S.h5 --json").out)
+    assert (told["kind"], told["sample_rate_hz"], told["outputs"]) == ("structured", 200.0, ["drive"])
+    assert [run["use"] for run in told["errors"]] == ["training", "validation"]
+    for run, before in zip(told["errors"], told["linear_errors"], strict=True):
+        assert run["errors"]["drive"] < 0.3 * before["errors"]["drive"]
+    assert told["fit"]["training_error"] == pytest.approx(told["errors"][0]["errors"]["drive"], rel=0.5)
+    assert told["errors"][0]["range_use"] == pytest.approx(1.0)
+    assert told["modes"][0]["frequency_hz"] == pytest.approx(24.37, rel=1e-3)
+    assert 0.0 < told["modes"][0]["frequency_std_hz"] < 0.1
+    assert [law["kind"] for law in told["elements"][0]["laws"]] == ["polynomial-spring"]
+    assert 0.0 < told["elements"][0]["largest_m"] < told["elements"][0]["reach_m"]
+    assert "polynomial-spring" in there("show S.h5").out
+
+
+def test_multisines_have_the_errors_of_the_file(there):
+    told = json.loads(there("predict S.h5 --multisine lines.h5 -o P.h5 --overwrite --json").out)
+    shown = json.loads(there("show S.h5 --json").out)
+    assert [run["use"] for run in told["multisines"]] == ["training", "validation"]
+    for run, known in zip(told["multisines"], shown["errors"], strict=True):
+        assert run["errors"] == known["errors"]
+        assert run["range_use"] == known["range_use"]
+    fresh = json.loads(there("predict S.h5 --multisine low.h5 -o P.h5 --overwrite --json").out)["multisines"]
+    assert {run["use"] for run in fresh} == {"test"}
+    assert all(run["range_use"] < 0.2 for run in fresh)
+
+
+def test_a_file_gives_back_fit_and_errors_to_the_bit(recordings, tmp_path):
+    first = load(recordings / "S.h5")
+    save(first, tmp_path / "again.h5")
+    again = load(tmp_path / "again.h5")
+    u = np.random.default_rng(0).normal(size=(1, 300))
+    for name in ("model", "linear"):
+        one, other = (getattr(found, name).simulate(u).outputs for found in (first, again))
+        assert np.array_equal(one, other)
+    assert again.fit.names == first.fit.names
+    assert np.array_equal(again.fit.covariance, first.fit.covariance)
+    assert again.fit.start.elements[0].laws[0].as_dict() == first.fit.start.elements[0].laws[0].as_dict()
+    assert [run.row() for run in again.runs] == [run.row() for run in first.runs]
+    assert np.array_equal(again.spectra.error, first.spectra.error)
+    assert (again.fit.stopped, again.uses, again.data) == (first.fit.stopped, first.uses, first.data)
+
+
+def test_elements_of_all_laws_come_back_from_a_model_alone(tmp_path):
+    sent = structure()
+    save(sent, tmp_path / "m.h5")
+    found = load(tmp_path / "m.h5")
+    assert found.fit is None
+    assert [law.as_dict() for e in found.model.elements for law in e.laws] == [
+        law.as_dict() for e in sent.elements for law in e.laws
+    ]
+    u = np.random.default_rng(0).normal(size=(1, 300))
+    assert np.array_equal(found.model.simulate(u).outputs, sent.simulate(u).outputs)
+
+
+def test_models_and_fits_draw_and_show_themselves(recordings):
+    fit = load(recordings / "S.h5").fit
+    for one in (fit, fit.model):
+        (axis,) = one.plot()
+        assert axis.get_xlabel() == "displacement of element 1, mm"
+        assert "polynomial-spring" in one._repr_html_()
+
+
+def drawn(found):
+    page = Figure(figsize=(12.0, 7.5), layout="constrained")
+    draw_structured(page, found)
+    lines = {axis.get_xlabel(): axis for axis in page.axes}
+    return page, lines
+
+
+def test_a_figure_shows_spectra_time_course_the_element_and_errors(there, recordings):
+    assert there("plot S.h5 -o S.png").status == 0
+    found = load(recordings / "S.h5")
+    page, axes = drawn(found)
+    assert {"frequency, Hz", "time, s", "displacement of element 1, mm", "range use"} == set(axes)
+    (element,) = found.model.elements
+    axis = axes["displacement of element 1, mm"]
+    (spring,) = [line for line in axis.get_lines() if line.get_label() == "spring"]
+    z, force = spring.get_data()
+    np.testing.assert_allclose(force, element.laws[0].force(z / (1e3 * element.scale_m)), rtol=1e-12, atol=1e-12)
+    assert axis.get_ylabel() == "force, N"
+    (span,) = axis.patches
+    assert span.get_x() + span.get_width() == pytest.approx(1e3 * element.scale_m * element.largest)
+    page, axes = drawn(replace(found, runs=(), spectra=None, stretch=None))
+    assert len(page.axes) == 1
+    assert "not in the file: spectra, time series, errors of experiments" in page.get_suptitle().replace("\n", " ")
+
+
+def test_the_loop_of_a_joint_is_that_of_its_sliders_moved_slowly():
+    element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(Jenkins(0.5, 0.3), Iwan(0.2)), largest=1.2)
+    _, axes = drawn(IdentifiedStructured(model=structure(elements=(element,))))
+    (line,) = [line for line in axes["displacement of element 1, mm"].get_lines() if line.get_label() == "joint"]
+    z, force = line.get_data()
+    stiffness, strength = np.concatenate([law.sliders() for law in element.laws], axis=1)
+    pulled, before, moved = np.zeros(strength.size), 0.0, []
+    for x in np.concatenate([np.linspace(0.0, z[0], 50), z, z]):  # to the first end, and two cycles
+        pulled = np.clip(pulled + stiffness * (x - before), -strength, strength)
+        before = x
+        moved.append(pulled.sum())
+    np.testing.assert_allclose(force, moved[-z.size :], rtol=1e-9, atol=1e-12)
+
+
+def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_them_alone(
+    there, recordings, monkeypatch
+):
+    (recordings / "own_law_of_a_test.py").write_text("def cubic(x, numbers):\n    return numbers[0] * x**3\n")
+    monkeypatch.syspath_prepend(recordings)
+    found = load(recordings / "S.h5")
+    (element,) = found.model.elements
+    law = UserSpring("own_law_of_a_test:cubic", (element.laws[0].coefficients_n[1],))
+    own = replace(found.model, elements=(replace(element, laws=(law,)),))
+    save(own, recordings / "own.h5")
+    shown = there("show own.h5")
+    assert "names a function, own_law_of_a_test:cubic: simulations import it" in shown.out
+    for line in ("plot own.h5 -o own.png", "export own.h5 -o own.mat"):
+        assert there(line).status == 0
+    refused = there("predict own.h5 --multisine lines.h5 -o O.h5")
+    assert "own.h5: function = 'own_law_of_a_test:cubic': is code that the model names" in refused.err
+    assert refused.err.endswith("--trust-code\n")
+    assert "own_law_of_a_test" not in sys.modules
+    done = there("predict own.h5 --multisine lines.h5 --trust-code -o O.h5 --overwrite --json")
+    assert done.status == 0, done.err
+    assert "own_law_of_a_test" in sys.modules
+    cubic = PolynomialSpring((0.0, element.laws[0].coefficients_n[1]))
+    save(replace(own, elements=(replace(element, laws=(cubic,)),)), recordings / "same.h5")
+    same = json.loads(there("predict same.h5 --multisine lines.h5 -o O.h5 --overwrite --json").out)
+    for one, other in zip(json.loads(done.out)["multisines"], same["multisines"], strict=True):
+        assert one["errors"]["drive"] == pytest.approx(other["errors"]["drive"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda told: told["model"]["elements"][0]["laws"][0].update(kind="magic"), "kind is 'magic', allowed are"),
+        (lambda told: told["model"]["elements"][0].pop("laws"), "'laws' is missing or unknown"),
+        (lambda told: told["model"]["elements"][0].update(laws=[3]), "does not hold what makes a structured"),
+        (lambda told: told["model"].update(steps="many"), "does not hold what makes a structured"),
+        (lambda told: told["model"].update(later=1), "is missing or unknown"),
+        (lambda told: told.pop("model"), "holds neither a fit nor a model"),
+        (lambda told: told.pop("runs"), "runs: is missing"),
+    ],
+)
+def test_what_is_no_such_file_is_named(change, said, tmp_path):
+    from rig.recording.arrays import read_arrays, write_arrays
+
+    save(structure(), tmp_path / "m.h5")
+    kind, arrays, attributes = read_arrays(tmp_path / "m.h5")
+    change(attributes)
+    write_arrays(tmp_path / "m.h5", kind, arrays, attributes)
+    with pytest.raises(RecordingError, match=said):
+        load(tmp_path / "m.h5")
+
+
+def test_a_file_that_lacks_an_array_is_named(tmp_path):
+    save(structure(), tmp_path / "m.h5")
+    with h5py.File(tmp_path / "m.h5", "r+") as file:
+        del file["arrays/model/direct"]
+    with pytest.raises(RecordingError, match=r"m\.h5: "):
+        load(tmp_path / "m.h5")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "identify lines.h5 --model structured",
+            "--modes: is missing, the modes with which a structured model begins; make",
+        ),
+        (
+            "identify lines.h5 --model structured --modes no.h5",
+            "no.h5: does not exist, wanted are the modes with which",
+        ),
+        (
+            "identify lines.h5 --model structured --modes low.h5",
+            "low.h5: is a file of kind multisine, wanted are the modes",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --states 2",
+            "--states: means nothing to --model structured",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --input force",
+            "--input: means nothing to --model struct",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --resume",
+            "--resume: means nothing to --model structured",
+        ),
+        ("identify lines.h5 --model pnlss --laws iwan", "--laws: means nothing to --model pnlss"),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws magic",
+            "--laws = 'magic': allowed are polynomial-spring, ",
+        ),
+        (
+            "identify S.h5 --model structured --modes modes.h5",
+            "S.h5: is a file of kind structured; a structured model comes from recordings: multisine, sweep",
+        ),
+        ("identify lines.h5 --model structured --modes modes.h5 --hold-out 2", "no level has more than 2 realisations"),
+        (
+            "predict S.h5 --frequency-response 1",
+            "--frequency-response: means nothing to a structured model, which answers",
+        ),
+        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to a structured model"),
+        ("predict S.h5 --multisine modes.h5", "modes.h5: "),
+        ("predict modes.h5 --multisine lines.h5", "predictions are made with a nonlinear-mode, pnlss, structured, "),
+    ],
+)
+def test_mistakes_are_named_in_one_line(there, line, said):
+    done = there(f"{line} -o X.h5")
+    assert done.status == 1
+    assert said in done.err
+    assert done.err.count("\n") == 1
