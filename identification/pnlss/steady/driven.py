@@ -54,6 +54,8 @@ class DrivenBalance(ABC):
 
     beyond: str
     """Message of a path that ends because states are beyond ``{:g}`` times their range."""
+    kinks = False
+    """Whether the residual has kinks, as with dry friction."""
     order: int
     """Number of multipliers."""
     ranges: int

@@ -1,5 +1,6 @@
 """Solutions of a harmonic balance: one at a given frequency from rest, and all along a band."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -54,7 +55,7 @@ def from_rest(balance: DrivenBalance, frequency_hz: float, largest_use: float = 
             lowest=0.5 * _FIRST_LEVEL,
             highest=1.0,
             points=_MOST_LEVELS,
-            steps=_LEVELS,
+            steps=replace(_LEVELS, kinks=balance.kinks),
             stop=lambda z, level: _beyond(balance, z, largest_use),
         )
     except IdentificationError:
@@ -90,7 +91,7 @@ def followed(
         lowest=low,
         highest=high,
         points=points,
-        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step),
+        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step, kinks=balance.kinks),
         stop=lambda z, frequency_hz: _beyond(balance, z, largest_use),
     )
     return Followed(path, _note(path, begin_hz, end_hz))

@@ -38,6 +38,7 @@ class StructuredBalance(DrivenBalance):
         modes, self.ranges = len(model.omega), len(model.elements)
         super().__init__(model, modes, drive, basis)
         self.model, self.order, self._system = model, 2 * modes, model.system
+        self.kinks = len(self._system.tables.sliders) > 0
         self._turning = basis.turned(0.0)[1]
         self._to_rate = basis.to_time @ self._turning
         shape = (self.ranges, basis.samples)
@@ -154,7 +155,7 @@ class StructuredBalance(DrivenBalance):
     def state_use(self, z: Float, to_time: Float) -> Float:
         """float[n_elements]: largest displacement of each element over its reach."""
         x = np.abs(to_time @ self.states(z) @ self._system.phi.T)
-        return np.asarray(np.max(x, axis=0, initial=0.0) / self._system.limits[:, 0])
+        return np.asarray(np.max(x, axis=0, initial=0.0) / self._system.tables.limits[:, 0])
 
     def input_use(self, inputs: Float, to_time: Float) -> Float:
         """NaN: a structured model does not know the range of its inputs."""

@@ -2,11 +2,35 @@
 
 import numpy as np
 
-from identification.structured.laws import damping_of, spring_of
+from identification.structured.kernels import damping_at, slide, spring_at
 from identification.structured.steps import System
-from vibrolock.compiled import unlocked_kernel
+from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 __all__ = ["along_period"]
+
+
+@inner_kernel
+def add_slider(
+    stiffness: float, strength: float, x: np.ndarray, to_time: np.ndarray, force: np.ndarray, by: np.ndarray
+) -> None:
+    """Add the force of a slider in the second of two periods that begin at rest, and its derivatives.
+
+    After one period both extremes of x have passed, and the loop is closed. A slider that sticks has moved from where it last
+    slipped, sample ``slipped``, or from rest (-1), so that its force changes with ``x(k) - x(slipped)``.
+    """
+    r, last, slipped = 0.0, 0.0, -1
+    for repeat in range(2):
+        for k in range(x.size):
+            _, r, _, sticking = slide(r, stiffness, strength, x[k] - last)
+            last = x[k]
+            if sticking < 1.0:
+                slipped = k
+            if repeat == 1:
+                force[k] += r
+                if slipped != k:
+                    for c in range(to_time.shape[1]):
+                        begin = to_time[slipped, c] if slipped >= 0 else 0.0
+                        by[k, c] += stiffness * (to_time[k, c] - begin)
 
 
 @unlocked_kernel
@@ -26,13 +50,14 @@ def along_period(
     ``to_rate``, float[samples, size], give from Fourier coefficients. ``by``, float[n_elements, samples, size]: derivatives
     of the force by the coefficients of x.
     """
+    tables = system.tables
     for e in range(x.shape[0]):
-        law, springs = system.laws[e, : system.sizes[e, 1]], system.sizes[e, 0]
-        reach, softest = system.limits[e, 0], system.limits[e, 1]
         for k in range(x.shape[1]):
-            spring, slope, _ = spring_of(x[e, k], law, springs, reach, softest)
-            damping[e, k], steep = damping_of(x[e, k], law, springs, reach)
+            spring, slope, _ = spring_at(x[e, k], tables.springs[e], tables.limits[e])
+            damping[e, k], steep = damping_at(x[e, k], tables.dampers[e], tables.limits[e, 0])
             force[e, k] = spring + damping[e, k] * rate[e, k]
             slope += steep * rate[e, k]
             for c in range(to_time.shape[1]):
                 by[e, k, c] = slope * to_time[k, c] + damping[e, k] * to_rate[k, c]
+        for s in range(tables.first[e], tables.first[e + 1]):
+            add_slider(tables.sliders[s, 0], tables.sliders[s, 1], x[e], to_time, force[e], by[e])
