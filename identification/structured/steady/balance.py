@@ -119,6 +119,16 @@ class StructuredBalance(DrivenBalance):
         size = self.basis.size
         return self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
 
+    def small_vibrations(self) -> tuple[Float, Float]:
+        """float[n_modes, n_modes] each: stiffness and damping at rest, where sliders stick, without the support."""
+        phi = self._system.phi
+        zero = np.zeros((self.basis.size, self.n_states))
+        _, damping, by = self._elements(zero, 1.0)
+        slope = by[:, 0, 0]  # of a constant displacement
+        stiffness = np.diag(self.model.omega**2) + phi.T @ (slope[:, None] * phi)
+        own = np.diag(2.0 * self.model.damping_ratio * self.model.omega)
+        return stiffness, own + phi.T @ (damping[:, :1] * phi)
+
     def linear_response(self, frequency_hz: float, row: int) -> tuple[Complex, Complex]:
         """Return modal coordinates and outputs of small vibrations."""
         at, n, count = self._at_rest(frequency_hz), self.n_states, self.state_unknowns

@@ -5,6 +5,7 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.pnlss.steady.assembly import response_of, steady_state_of
 from identification.pnlss.steady.basis import Basis
+from identification.pnlss.steady.drives import Sine
 from identification.pnlss.steady.notes import harmonics_notes, held_notes, loss_notes
 from identification.pnlss.steady.setting_up import Held, band_around, drive_of, held_values
 from identification.pnlss.steady.states import PnlssResponse, SteadyStates, largest_use
@@ -82,7 +83,7 @@ def structured_response(
     exciter
         Exciter that applies the force and moves with the model's drive point.
     lowest_hz, highest_hz
-        Band; by default within 15 % of the mode with the largest drive-point motion.
+        Band; by default within 15 % of the mode of small vibrations with the largest drive-point motion.
     harmonics, samples
         Numbers of harmonics without the static one, and of samples per period; by default 32 per harmonic, at least 256.
     points
@@ -154,9 +155,14 @@ def _balance(
 
 
 def _resonance_hz(model: StructuredModel) -> float:
-    """Frequency of the mode with the largest displacement at the first input at its resonance."""
-    compliance = model.input_shapes[:, 0] ** 2 / (model.damping_ratio * model.omega**2)
-    return float(model.frequency_hz[int(np.argmax(compliance))])
+    """Frequency of the mode of small vibrations with the largest displacement at the first input at its resonance."""
+    drive = Sine(1.0, 0, len(model.inputs))
+    stiffness, damping = StructuredBalance(model, drive, Basis(1, _LEAST_SAMPLES)).small_vibrations()
+    squares, vectors = np.linalg.eigh(stiffness)
+    omega = np.sqrt(np.maximum(squares, 0.0))
+    width = np.sum(vectors * (damping @ vectors), axis=0)
+    compliance = (model.input_shapes[:, 0] @ vectors) ** 2 / np.maximum(width * omega, 1e-300)
+    return float(omega[int(np.argmax(compliance))] / (2.0 * np.pi))
 
 
 def _reach_notes(points: SteadyStates) -> list[str]:

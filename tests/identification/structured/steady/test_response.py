@@ -106,3 +106,15 @@ def test_the_default_band_is_that_of_the_mode_that_moves_most():
     found = structured_frequency_response(beam(), 0.1)
     assert (found.frequency_hz.min(), found.frequency_hz.max()) == pytest.approx((0.85 * 25.0, 1.15 * 25.0))
     assert found.peak().frequency_hz == pytest.approx(25.0, rel=1e-3)
+
+
+def test_the_default_band_of_a_joint_is_that_of_the_stuck_structure():
+    model = friction()
+    stiffness = np.diag(model.omega**2)
+    for element in model.elements:
+        stiffness += np.outer(element.phi, element.phi) * np.sum(element.sliders(element.laws)[:, 0])
+    stuck_hz = np.sqrt(np.linalg.eigvalsh(stiffness)[0]) / (2.0 * np.pi)
+    assert stuck_hz > 1.03 * 25.0
+    found = structured_frequency_response(model, 0.001)
+    assert (found.frequency_hz.min(), found.frequency_hz.max()) == pytest.approx((0.85 * stuck_hz, 1.15 * stuck_hz))
+    assert found.peak().frequency_hz == pytest.approx(stuck_hz, rel=1e-3)
