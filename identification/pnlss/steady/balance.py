@@ -103,10 +103,10 @@ class Balance(DrivenBalance):
         model = self.model
         return np.asarray(np.linalg.lstsq(np.eye(model.states) - model.a, model.b @ inputs)[0])
 
-    def multipliers(self, z: Float, frequency_hz: float) -> Complex:
+    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
         """complex[n_states]: multipliers over one sample."""
         angle = self.angle(frequency_hz)
-        slope = self._evaluated(self.states(z), self.inputs_of(z))[2]
+        slope = self._evaluated(self.states(z), self.inputs_of(z, level))[2]
         states_by = self._derivative(slope[..., : self.n_states])
         return multipliers(states_by, self.basis.turned(angle)[0], self.basis, angle)
 

@@ -82,7 +82,7 @@ class DrivenBalance(ABC):
         """float[n_states]: states under small constant inputs."""
 
     @abstractmethod
-    def multipliers(self, z: Float, frequency_hz: float) -> Complex:
+    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
         """complex[order]: multipliers of a disturbance while the phase advances by `angle`, with unchanged inputs."""
 
     @abstractmethod

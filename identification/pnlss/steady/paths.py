@@ -12,7 +12,7 @@ from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
 from identification.pnlss.steady.driven import DrivenBalance
 
-__all__ = ["Followed", "followed", "from_rest", "polished", "sizes", "statically_stable"]
+__all__ = ["Followed", "beyond", "followed", "from_rest", "polished", "sizes", "statically_stable"]
 
 Float = NDArray[np.float64]
 
@@ -56,19 +56,19 @@ def from_rest(balance: DrivenBalance, frequency_hz: float, largest_use: float = 
             highest=1.0,
             points=_MOST_LEVELS,
             steps=replace(_LEVELS, kinks=balance.kinks),
-            stop=lambda z, level: _beyond(balance, z, largest_use),
+            stop=lambda z, level: beyond(balance, z, largest_use),
         )
     except IdentificationError:
         return None
     return path.unknowns[-1] if path.ending == "range" and path.parameter[-1] == 1.0 else None
 
 
-def statically_stable(balance: DrivenBalance, z: Float, frequency_hz: float) -> bool:
+def statically_stable(balance: DrivenBalance, z: Float, frequency_hz: float, level: float = 1.0) -> bool:
     """Return whether a vibration is stable under slow changes: the determinant of its Jacobian has the same sign as at rest."""
     rest = balance.linear(frequency_hz, _FIRST_LEVEL**2)
     signs = [
-        np.linalg.slogdet(balance.evaluated(at, frequency_hz, level)[1])[0]
-        for at, level in ((z, 1.0), (rest, _FIRST_LEVEL**2))
+        np.linalg.slogdet(balance.evaluated(at, frequency_hz, of)[1])[0]
+        for at, of in ((z, level), (rest, _FIRST_LEVEL**2))
     ]
     return bool(signs[0] == signs[1])
 
@@ -92,7 +92,7 @@ def followed(
         highest=high,
         points=points,
         steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step, kinks=balance.kinks),
-        stop=lambda z, frequency_hz: _beyond(balance, z, largest_use),
+        stop=lambda z, frequency_hz: beyond(balance, z, largest_use),
     )
     return Followed(path, _note(path, begin_hz, end_hz))
 
@@ -102,7 +102,7 @@ def polished(balance: DrivenBalance, z: Float, frequency_hz: float) -> Float | N
     return solved(balance.over_frequency(), z, frequency_hz, scale=sizes(balance, frequency_hz))
 
 
-def _beyond(balance: DrivenBalance, z: Float, largest_use: float) -> str:
+def beyond(balance: DrivenBalance, z: Float, largest_use: float) -> str:
     """Return a message if states are far outside the range of the training data; else an empty text."""
     use = balance.state_use(z, balance.basis.to_time)
     return balance.beyond.format(largest_use) if np.any(use > largest_use) else ""

@@ -132,12 +132,18 @@ def largest_use(use: Float) -> Float:
 
 
 def steady_states(
-    balance: DrivenBalance, unknowns: Float, frequency_hz: Float, statically_stable: NDArray[np.bool_]
+    balance: DrivenBalance,
+    unknowns: Float,
+    frequency_hz: Float,
+    statically_stable: NDArray[np.bool_],
+    level: Float | None = None,
 ) -> SteadyStates:
     """Convert solutions (float[n, n_unknowns]) of a balance to vibrations.
 
-    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that are stable under slow changes.
+    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that are stable under slow changes. ``level``
+    (float[n]): level of each, 1 by default.
     """
+    levels = [1.0] * len(unknowns) if level is None else level.tolist()
     basis, count, harmonics = balance.basis, frequency_hz.size, balance.basis.harmonics + 1
     sizes = {"states": balance.n_states, "inputs": len(balance.inputs), "outputs": len(balance.outputs)}
     series = {name: np.zeros((count, harmonics, size), dtype=complex) for name, size in sizes.items()}
@@ -146,12 +152,12 @@ def steady_states(
     use = {"states": np.zeros((count, balance.ranges)), "inputs": np.zeros((count, len(balance.inputs)))}
     fine = basis.at(2.0 * np.pi * np.arange(_FINE * harmonics) / (_FINE * harmonics))
     for k, (z, at_hz) in enumerate(zip(unknowns, frequency_hz.tolist(), strict=True)):
-        states, inputs = balance.states(z), balance.inputs_of(z)
+        states, inputs = balance.states(z), balance.inputs_of(z, levels[k])
         parts = {"states": states, "inputs": inputs, "outputs": balance.along(states, inputs, at_hz).outputs}
         for name, part in parts.items():
             series[name][k] = harmonics_of(part)
         use["states"][k], use["inputs"][k] = balance.state_use(z, fine), balance.input_use(inputs, fine)
-        found[k] = balance.multipliers(z, at_hz)
+        found[k] = balance.multipliers(z, at_hz, levels[k])
         if not balance.drive.size:
             loss = loss_of_stability(found[k], balance.angle(at_hz))
         else:

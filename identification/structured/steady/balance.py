@@ -142,10 +142,10 @@ class StructuredBalance(DrivenBalance):
         by = self._at_rest(1.0).residual_by[0, :, 0]
         return np.asarray(np.linalg.solve(by[:, : self.n_states], -by[:, self.n_states :] @ inputs))
 
-    def multipliers(self, z: Float, frequency_hz: float) -> Complex:
+    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
         """complex[2 n_modes]: multipliers over a period."""
         states, n, count, w = self.states(z), self.n_states, self.state_unknowns, 2.0 * np.pi * frequency_hz
-        stiffness = self.along(states, self.inputs_of(z), frequency_hz).residual_by[..., :n]
+        stiffness = self.along(states, self.inputs_of(z, level), frequency_hz).residual_by[..., :n]
         damping = self._elements(states, w)[1]
         parts = np.array([(self.basis.to_coefficients * row) @ self.basis.to_time for row in damping])
         drag = np.zeros((self.basis.size, n, self.basis.size, n))

@@ -15,7 +15,13 @@ from identification.structured.model import StructuredModel
 from identification.structured.steady.balance import StructuredBalance
 from identification.validation import positive
 
-__all__ = ["structured_frequency_response", "structured_response", "structured_steady_state"]
+__all__ = [
+    "balance_of",
+    "resonance_hz",
+    "structured_frequency_response",
+    "structured_response",
+    "structured_steady_state",
+]
 
 _SAMPLES = 32
 """Samples of a period per harmonic: dampers and springs have bends."""
@@ -97,9 +103,9 @@ def structured_response(
         If model, exciter and force do not match, the band limits do not rise, there are too few samples, or no periodic
         vibration is found at either end of the band.
     """
-    band_hz = band_around(lambda: _resonance_hz(model), lowest_hz, highest_hz, np.inf)
+    band_hz = band_around(lambda: resonance_hz(model), lowest_hz, highest_hz, np.inf)
     return response_of(
-        _balance(model, force_n, force, exciter, harmonics, samples),
+        balance_of(model, force_n, force, exciter, harmonics, samples),
         force_n,
         force,
         band_hz,
@@ -132,11 +138,11 @@ def structured_steady_state(
     ``largest_range_use``. Raises `IdentificationError` if no vibration is found.
     """
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
-    balance = _balance(model, force_n, force, exciter, harmonics, samples)
+    balance = balance_of(model, force_n, force, exciter, harmonics, samples)
     return steady_state_of(balance, at_hz, force_n, near, largest_range_use)
 
 
-def _balance(
+def balance_of(
     model: StructuredModel,
     level: float,
     force: Held,
@@ -144,6 +150,7 @@ def _balance(
     harmonics: int,
     samples: int | None,
 ) -> StructuredBalance:
+    """Return the equations; raise `IdentificationError` for what `structured_response` refuses."""
     if harmonics < 1:
         raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
     count = max(_SAMPLES * harmonics, _LEAST_SAMPLES) if samples is None else samples
@@ -154,12 +161,14 @@ def _balance(
     return StructuredBalance(model, drive_of(model, level, force, exciter, basis.size, row), basis)
 
 
-def _resonance_hz(model: StructuredModel) -> float:
-    """Frequency of the mode of small vibrations with the largest displacement at the first input at its resonance."""
+def resonance_hz(model: StructuredModel, near_hz: float | None = None) -> float:
+    """Frequency of a mode of small vibrations: the nearest one, or that which moves most at the first input."""
     drive = Sine(1.0, 0, len(model.inputs))
     stiffness, damping = StructuredBalance(model, drive, Basis(1, _LEAST_SAMPLES)).small_vibrations()
     squares, vectors = np.linalg.eigh(stiffness)
     omega = np.sqrt(np.maximum(squares, 0.0))
+    if near_hz is not None:
+        return float(omega[np.argmin(np.abs(omega - 2.0 * np.pi * near_hz))] / (2.0 * np.pi))
     width = np.sum(vectors * (damping @ vectors), axis=0)
     compliance = (model.input_shapes[:, 0] @ vectors) ** 2 / np.maximum(width * omega, 1e-300)
     return float(omega[int(np.argmax(compliance))] / (2.0 * np.pi))
