@@ -35,6 +35,7 @@ def structured_backbone(
     *,
     force: Held = "pure-sine",
     exciter: Exciter | None = None,
+    support: bool | None = None,
     near_hz: float | None = None,
     harmonics: int = 7,
     samples: int | None = None,
@@ -49,7 +50,7 @@ def structured_backbone(
         Model of one force; at least one output is a motion.
     force_n
         Largest force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``.
-    force, exciter
+    force, exciter, support
         As in `structured_response`, without ``voltage``.
     near_hz
         The backbone begins at the mode of small vibrations that is nearest; by default at that which moves most.
@@ -66,7 +67,7 @@ def structured_backbone(
         raise IdentificationError(
             "force: is 'voltage', allowed are pure-sine, fundamental, rms: phase lags refer to the force"
         )
-    balance = balance_of(model, force_n, force, exciter, harmonics, samples)
+    balance = balance_of(model, force_n, force, exciter, support, harmonics, samples)
     begin_hz = resonance_hz(model, None if near_hz is None else positive("near_hz", near_hz, "Hz"))
     path = continued(
         _Resonance(balance, model.input_shapes[:, 0]),

@@ -1,5 +1,7 @@
 """Frequency responses and single periodic vibrations of structured models at constant force."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.errors import IdentificationError
@@ -34,6 +36,7 @@ def structured_frequency_response(
     *,
     force: Held = "pure-sine",
     exciter: Exciter | None = None,
+    support: bool | None = None,
     lowest_hz: float | None = None,
     highest_hz: float | None = None,
     harmonics: int = 7,
@@ -47,6 +50,7 @@ def structured_frequency_response(
         force_n,
         force=force,
         exciter=exciter,
+        support=support,
         lowest_hz=lowest_hz,
         highest_hz=highest_hz,
         harmonics=harmonics,
@@ -62,6 +66,7 @@ def structured_response(
     *,
     force: Held = "pure-sine",
     exciter: Exciter | None = None,
+    support: bool | None = None,
     lowest_hz: float | None = None,
     highest_hz: float | None = None,
     harmonics: int = 7,
@@ -71,7 +76,7 @@ def structured_response(
 ) -> PnlssResponse:
     """Compute the steady response of a model to a constant force, by harmonic balance and arc-length continuation.
 
-    The balance is that of the continuous equation of motion, with the static force of the support. Result and notes are those
+    The balance is that of the continuous equation of motion. Result and notes are those
     of `pnlss_response`; ``states`` are the modal coordinates, ``state_use`` the largest displacement of each element over its
     reach, and the multipliers are those over a period. Stability does not consider the memory of the support's filter.
 
@@ -88,6 +93,9 @@ def structured_response(
         voltage at the exciter.
     exciter
         Exciter that applies the force and moves with the model's drive point.
+    support
+        Whether the support's static force acts, which is the exciter's. By default it does with an ``exciter``; a pure sine
+        is then a force without static part on the structure alone.
     lowest_hz, highest_hz
         Band; by default within 15 % of the mode of small vibrations with the largest drive-point motion.
     harmonics, samples
@@ -105,7 +113,7 @@ def structured_response(
     """
     band_hz = band_around(lambda: resonance_hz(model), lowest_hz, highest_hz, np.inf)
     return response_of(
-        balance_of(model, force_n, force, exciter, harmonics, samples),
+        balance_of(model, force_n, force, exciter, support, harmonics, samples),
         force_n,
         force,
         band_hz,
@@ -127,6 +135,7 @@ def structured_steady_state(
     *,
     force: Held = "pure-sine",
     exciter: Exciter | None = None,
+    support: bool | None = None,
     harmonics: int = 7,
     samples: int | None = None,
     near: SteadyStates | None = None,
@@ -138,7 +147,7 @@ def structured_steady_state(
     ``largest_range_use``. Raises `IdentificationError` if no vibration is found.
     """
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
-    balance = balance_of(model, force_n, force, exciter, harmonics, samples)
+    balance = balance_of(model, force_n, force, exciter, support, harmonics, samples)
     return steady_state_of(balance, at_hz, force_n, near, largest_range_use)
 
 
@@ -147,6 +156,7 @@ def balance_of(
     level: float,
     force: Held,
     exciter: Exciter | None,
+    support: bool | None,
     harmonics: int,
     samples: int | None,
 ) -> StructuredBalance:
@@ -158,6 +168,8 @@ def balance_of(
         raise IdentificationError(f"samples: is {count}, needs at least {2 * harmonics + 1} for {harmonics} harmonics")
     basis = Basis(harmonics, count)
     row, _ = held_values(model, None)
+    if not (exciter is not None if support is None else support):
+        model = replace(model, support_n_m=0.0)
     return StructuredBalance(model, drive_of(model, level, force, exciter, basis.size, row), basis)
 
 

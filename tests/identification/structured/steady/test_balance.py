@@ -43,7 +43,7 @@ def test_the_jacobian_agrees_with_finite_differences(model, held):
 
 def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
     model = beam(support_n_m=800.0)
-    found = structured_response(model, 0.01, lowest_hz=20.0, highest_hz=30.0, harmonics=1)
+    found = structured_response(model, 0.01, support=True, lowest_hz=20.0, highest_hz=30.0, harmonics=1)
     s = 2j * np.pi * found.points.frequency_hz[:, None]
     b = model.input_shapes[:, 0]
     modes = 1.0 / (model.omega**2 + 2.0 * model.damping_ratio * model.omega * s + s**2)
@@ -64,7 +64,7 @@ def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
 @pytest.mark.parametrize("make", [smooth, friction])
 def test_a_settled_simulation_has_the_harmonics_of_the_balance(make, samples):
     simulated, change = settled(make(rate_hz=RATE_HZ, steps=1), 1.0, samples, 300)
-    found = structured_steady_state(make(), 1.0, RATE_HZ / samples, harmonics=13)
+    found = structured_steady_state(make(), 1.0, RATE_HZ / samples, support=True, harmonics=13)
     assert change < 1e-8
     size = np.abs(simulated).max(axis=0)
     np.testing.assert_allclose(found.outputs[0] / size, simulated[:14] / size, atol=1e-4)
@@ -92,7 +92,7 @@ def test_a_slider_loses_the_energy_of_its_loop():
 def test_the_work_of_the_force_is_what_dampers_and_sliders_lose(make):
     model = make()
     force_n = 8.0
-    found = structured_steady_state(model, force_n, 25.3, harmonics=13)
+    found = structured_steady_state(model, force_n, 25.3, support=True, harmonics=13)
     w, at = 2.0 * np.pi * 25.3, found.states[0]
     h, phase = np.arange(14)[:, None], 2.0 * np.pi * np.arange(4000) / 4000
     turning = np.exp(1j * h * phase)

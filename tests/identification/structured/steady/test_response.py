@@ -118,3 +118,19 @@ def test_the_default_band_of_a_joint_is_that_of_the_stuck_structure():
     found = structured_frequency_response(model, 0.001)
     assert (found.frequency_hz.min(), found.frequency_hz.max()) == pytest.approx((0.85 * stuck_hz, 1.15 * stuck_hz))
     assert found.peak().frequency_hz == pytest.approx(stuck_hz, rel=1e-3)
+
+
+def test_the_support_acts_with_an_exciter_and_where_it_is_asked_for():
+    mean = {
+        support: structured_steady_state(smooth(), 1.0, 24.0, support=support).outputs[0, 0, 2].real
+        for support in (None, False, True)
+    }
+    assert mean[None] == mean[False]
+    assert abs(mean[True]) < 0.99 * abs(mean[False])
+    coupled = {
+        support: structured_steady_state(smooth(), 1.0, 24.0, force="fundamental", exciter=shaker(), support=support)
+        for support in (None, False, True)
+    }
+    np.testing.assert_array_equal(coupled[None].outputs, coupled[True].outputs)
+    assert coupled[True].outputs[0, 0, 2].real == pytest.approx(mean[True], rel=0.01)
+    assert coupled[False].outputs[0, 0, 2].real == pytest.approx(mean[False], rel=0.01)
