@@ -29,16 +29,18 @@ Float = NDArray[np.float64]
 class StructuredBalance(DrivenBalance):
     """Equations of a driven structured model; its states are the modal coordinates.
 
-    The multipliers do not include the memory of the support's filter.
+    ``support``: whether the support acts on the mean displacement. What its low-pass lets through of the fundamental always
+    acts: it does work, which the damping found by a fit offsets. The multipliers do not include the memory of the filter.
     """
 
     beyond = "elements are beyond {:g} times the reach of their laws"
 
-    def __init__(self, model: StructuredModel, drive: Drive, basis: Basis) -> None:
+    def __init__(self, model: StructuredModel, drive: Drive, basis: Basis, support: bool = True) -> None:
         modes, self.ranges = len(model.omega), len(model.elements)
         super().__init__(model, modes, drive, basis)
         self.model, self.order, self._system = model, 2 * modes, model.system
         self.kinks = len(self._system.tables.sliders) > 0
+        self._mean_supported = float(support)
         self._turning = basis.turned(0.0)[1]
         self._to_rate = basis.to_time @ self._turning
         shape = (self.ranges, basis.samples)
@@ -89,7 +91,7 @@ class StructuredBalance(DrivenBalance):
         model, basis = self.model, self.basis
         h, corner = np.arange(1, basis.harmonics + 1), 2.0 * np.pi * model.support_corner_hz
         low_pass, slope = np.zeros((2, basis.size, basis.size))
-        low_pass[0, 0] = 1.0
+        low_pass[0, 0] = self._mean_supported
         gain = np.asarray(1.0 / (1.0 + 1j * h * w / corner), dtype=np.complex128)
         for k, (factor, by_w) in enumerate(
             zip(complex_product(gain), complex_product(-1j * h / corner * gain**2), strict=True)

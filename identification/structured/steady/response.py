@@ -1,7 +1,5 @@
 """Frequency responses and single periodic vibrations of structured models at constant force."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from identification.errors import IdentificationError
@@ -94,8 +92,8 @@ def structured_response(
     exciter
         Exciter that applies the force and moves with the model's drive point.
     support
-        Whether the support's static force acts, which is the exciter's. By default it does with an ``exciter``; a pure sine
-        is then a force without static part on the structure alone.
+        Whether the support holds the mean position, with the static force of the exciter. By default it does with an
+        ``exciter``; a pure sine has no static part.
     lowest_hz, highest_hz
         Band; by default within 15 % of the mode of small vibrations with the largest drive-point motion.
     harmonics, samples
@@ -168,9 +166,8 @@ def balance_of(
         raise IdentificationError(f"samples: is {count}, needs at least {2 * harmonics + 1} for {harmonics} harmonics")
     basis = Basis(harmonics, count)
     row, _ = held_values(model, None)
-    if not (exciter is not None if support is None else support):
-        model = replace(model, support_n_m=0.0)
-    return StructuredBalance(model, drive_of(model, level, force, exciter, basis.size, row), basis)
+    supported = exciter is not None if support is None else support
+    return StructuredBalance(model, drive_of(model, level, force, exciter, basis.size, row), basis, supported)
 
 
 def resonance_hz(model: StructuredModel, near_hz: float | None = None) -> float:
