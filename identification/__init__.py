@@ -41,7 +41,8 @@ Responses and errors of PNLSS models
     ErrorSpectra, output_stretch, OutputStretch, ErrorTable, identify_many, ModelJob, IdentifiedModel,
     realisation_combinations
 Structured models
-    fit_structured, StructuredModel, StructuredFit, NonlinearElement
+    fit_structured, StructuredModel, StructuredFit, NonlinearElement, structured_backbone,
+    structured_frequency_response, structured_response, structured_steady_state
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
@@ -128,6 +129,12 @@ if TYPE_CHECKING:
     from identification.structured.elements import NonlinearElement
     from identification.structured.fit import StructuredFit, fit_structured
     from identification.structured.model import StructuredModel
+    from identification.structured.steady.backbone import structured_backbone
+    from identification.structured.steady.response import (
+        structured_frequency_response,
+        structured_response,
+        structured_steady_state,
+    )
 else:
     __getattr__, __dir__ = on_use(
         __name__,
@@ -251,6 +258,10 @@ else:
             "stabilisation": "linear.stabilisation",
             "steady_predictions": "prediction.frequency_response",
             "stepped_sine_mode": "nonlinear.stepped_sine",
+            "structured_backbone": "structured.steady.backbone",
+            "structured_frequency_response": "structured.steady.response",
+            "structured_response": "structured.steady.response",
+            "structured_steady_state": "structured.steady.response",
             "subspace": "linear.subspace",
             "unpack_frequency_responses": "frequency_responses",
             "zero_crossings": "signals.half_periods",
@@ -377,6 +388,10 @@ __all__ = [
     "stabilisation",
     "steady_predictions",
     "stepped_sine_mode",
+    "structured_backbone",
+    "structured_frequency_response",
+    "structured_response",
+    "structured_steady_state",
     "subspace",
     "unpack_frequency_responses",
     "zero_crossings",

@@ -77,6 +77,11 @@ def continued(
     while len(found) < points and not reason:
         last = found[-1]
         new, length = walk.next(last, length)
+        if new is None and allowed.kinks and (beyond := walk.beyond_kink(last)) is not None:
+            if beyond.tangent[-1] * last.tangent[-1] < 0.0:
+                turns.append((len(found) - 1, last.v))
+            found[-1] = last = beyond
+            new, length = walk.next(last, allowed.first)
         if new is None:
             ending = "step"
             break

@@ -32,6 +32,9 @@ class Steps:
         Newton iterations before a step counts as failed.
     tolerance
         A solution is accepted once the length of the last Newton correction is at most this.
+    kinks
+        Whether the curve may have kinks, as where dry friction begins to slip. Where even the shortest step fails, the path
+        then goes on along the tangent just ahead.
     """
 
     first: float = 0.02
@@ -40,6 +43,7 @@ class Steps:
     angle_deg: float = 20.0
     iterations: int = 8
     tolerance: float = 1e-8
+    kinks: bool = False
 
     def __post_init__(self) -> None:
         for name in ("first", "smallest", "largest", "angle_deg", "tolerance"):

@@ -16,6 +16,8 @@ Float = NDArray[np.float64]
 _GROWTH = 1.5
 _EASY = 3
 """Largest number of Newton iterations after which the step length may grow."""
+_AHEAD = 20.0
+"""Distance at which the tangent beyond a kink is found, in shortest steps."""
 _NEAR = 0.5
 """Farthest distance of a solution from the prediction, as a share of the step; beyond it may lie another part of the curve."""
 
@@ -102,6 +104,11 @@ class Walk:
                     return new, min(length * _GROWTH if easy else length, self._steps.largest)
             length *= 0.5
         return None, length
+
+    def beyond_kink(self, last: Point) -> Point | None:
+        """Return the same point with the tangent of the curve just ahead, which differs from its own at a kink."""
+        along = self._tangent(last.ahead(_AHEAD * self._steps.smallest), last.units, last.tangent)
+        return None if along is None else Point(last.v, last.units, along)
 
     def passes(self, first: Point, last: Point, step: float) -> bool:
         """Return whether the step from ``last`` passes through the first point of the path."""

@@ -71,8 +71,8 @@ class SteadyPrediction(Result):
         int[n], 0 for the response that begins at rest, 1 and above for detached branches, or for the part reached from the
         other end of the band if the first response leaves the allowed range of the model.
     range_use
-        float[n], modal amplitude over the largest identified, or states over the largest in the training data; NaN where
-        that is unknown.
+        float[n], modal amplitude over the largest identified, states over the largest in the training data, or displacement
+        of a nonlinear element over the reach of its laws; NaN where that is unknown.
     fold_frequency_hz, fold_amplitude_m, fold_modal_amplitude
         float[n_folds], points where the response turns back in frequency; amplitude of the drive point.
     notes

@@ -178,7 +178,7 @@ class PolynomialSpring(Spring):
     free: ClassVar = {"coefficients_n": PLAIN}
     linear = "coefficients_n"
 
-    coefficients_n: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    coefficients_n: tuple[float, ...] = (0.0,) * 5
     """Coefficients of the square, the cube, ..., N."""
 
     def force(self, x: Float) -> Float:
@@ -297,7 +297,7 @@ class PolynomialDamper(Damper):
     free: ClassVar = {"coefficients_n_s_m": FROM_ZERO}
     linear = "coefficients_n_s_m"
 
-    coefficients_n_s_m: tuple[float, ...] = (0.0,)
+    coefficients_n_s_m: tuple[float, ...] = (0.0, 0.0)
     """Coefficients of the size, its square, ..., N s/m, none below zero."""
 
     def damping(self, x: Float) -> Float:

@@ -6,40 +6,25 @@ Alternating frequency and time (Cameron and Griffin, J. Appl. Mech. 56, 1989): T
 over the phase, T^+ transforms them back. The Jacobian is ``R (x) I - T^+ diag(df/dx) T``.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.continuation.path import System
 from identification.pnlss.features import Features
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulation import use_of
 from identification.pnlss.steady.basis import Basis
+from identification.pnlss.steady.driven import DrivenBalance, Period
 from identification.pnlss.steady.drives import Drive
 from identification.pnlss.steady.kernels import along_period
+from identification.pnlss.steady.stability import multipliers
 
-__all__ = ["Balance", "Period", "samples_for"]
+__all__ = ["Balance", "samples_for"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _ENOUGH_FOR_BENDS = 16
 """Samples per harmonic for features that are not polynomials; aliasing is then of the order of the neglected harmonics."""
-
-
-class Period(NamedTuple):
-    """A model along a period: coefficients of inputs, outputs and next states, and their derivatives."""
-
-    inputs: Float
-    """float[size, n_inputs], coefficients of the inputs."""
-    outputs: Float
-    """float[size, n_outputs], coefficients of the outputs."""
-    next_states: Float
-    """float[size, n_states], coefficients of ``f``."""
-    states_by: Float
-    """float[size, n_states, size, n_variables], derivative of the coefficients of ``f`` with respect to those of (x, u)."""
-    outputs_by: Float
-    """float[size, n_outputs, size, n_variables], derivative of the outputs' coefficients with respect to those of (x, u)."""
 
 
 def samples_for(model: PnlssModel, harmonics: int) -> int:
@@ -56,20 +41,16 @@ def _bends(features: Features) -> bool:
     return bool(len(features.weights) or np.any(np.isfinite(features.limits)))
 
 
-class Balance:
-    """Equations of a driven model; unknowns are the coefficients of the states, float[size, n_states], then the drive's.
+class Balance(DrivenBalance):
+    """Equations of a driven PNLSS model."""
 
-    ``held`` (float[n_inputs]) are constant parts of the inputs, independent of the level.
-    """
+    beyond = "the states are beyond {:g} times those of the training data"
 
     def __init__(self, model: PnlssModel, drive: Drive, basis: Basis, held: Float | None = None) -> None:
-        self.model, self.drive, self.basis = model, drive, basis
-        self._held = np.zeros((basis.size, len(model.inputs)))
-        if held is not None:
-            self._held[0] = held
+        super().__init__(model, model.states, drive, basis, held)
+        self.model, self.order, self.ranges = model, model.states, model.states
         self._matrices = model.matrices
         self._tables = (model.state_features.table, model.output_features.table)
-        self._given, self._by_own = drive.inputs(basis.size)
         n, m, outputs = model.states, len(model.inputs), len(model.outputs)
         features = max(model.e.shape[1], model.f.shape[1])
         bends = max(len(model.state_features.weights), len(model.output_features.weights))
@@ -78,93 +59,61 @@ class Balance:
             np.empty((basis.samples, *shape)) for shape in ((n,), (outputs,), (n, n + m), (outputs, n + m))
         )
 
-    @property
-    def state_unknowns(self) -> int:
-        """Number of unknowns that belong to the states."""
-        return self.basis.size * self.model.states
-
-    def states(self, z: Float) -> Float:
-        """float[size, n_states]: coefficients of the states."""
-        return np.asarray(z[: self.state_unknowns].reshape(self.basis.size, -1))
-
-    def own(self, z: Float) -> Float:
-        """Return the unknowns of the drive."""
-        return np.asarray(z[self.state_unknowns :])
-
-    def period(self, z: Float, level: float = 1.0) -> Period:
-        """Evaluate the model along the period that the unknowns describe."""
-        size = self.basis.size
-        inputs = self._held + level * self._given + self._by_own @ self.own(z)
-        v = self.basis.to_time @ np.concatenate([self.states(z), inputs], axis=1)
-        x, y, x_slope, y_slope = self._samples
-        along_period(self._matrices, *self._tables, v, *self._room, x, y, x_slope, y_slope)
-
-        def derivative(slope: Float) -> Float:
-            flat = self.basis.products @ slope.reshape(self.basis.samples, -1)
-            return np.asarray(flat.reshape(size, size, *slope.shape[1:]).swapaxes(1, 2))
-
-        back = self.basis.to_coefficients
-        return Period(inputs, back @ y, back @ x, derivative(x_slope), derivative(y_slope))
-
     def angle(self, frequency_hz: float) -> float:
         """Phase advance per sample, rad."""
         return 2.0 * np.pi * frequency_hz / self.model.sample_rate_hz
 
-    def evaluated(self, z: Float, frequency_hz: float, level: float = 1.0) -> tuple[Float, Float, Float, Float]:
-        """Return the residual and its derivatives with respect to the unknowns, frequency (per Hz) and level."""
-        n, size, count = self.model.states, self.basis.size, self.state_unknowns
-        at = self.period(z, level)
+    def along(self, states: Float, inputs: Float, frequency_hz: float) -> Period:
+        """Evaluate the model: the residual is ``R X - T^+ f(T X, T U)``."""
         turn, turned = self.basis.turned(self.angle(frequency_hz))
-        states, own = self.states(z), self.own(z)
-        drive = self.drive.equations(own, level, frequency_hz, at.outputs)
+        x, y, x_slope, y_slope = self._evaluated(states, inputs)
+        back, n = self.basis.to_coefficients, self.n_states
+        residual_by = -self._derivative(x_slope)
+        for i in range(n):
+            residual_by[:, i, :, i] += turn
+        return Period(
+            outputs=back @ y,
+            residual=turn @ states - back @ x,
+            outputs_by=self._derivative(y_slope),
+            residual_by=residual_by,
+            outputs_by_frequency=np.zeros((self.basis.size, y.shape[1])),
+            residual_by_frequency=self.angle(1.0) * (turned @ states),
+        )
 
-        residual = np.concatenate([(turn @ states - at.next_states).ravel(), drive.residual])
-        jacobian = np.empty((z.size, z.size))
-        by_states = np.einsum("pq,ij->piqj", turn, np.eye(n)) - at.states_by[..., :n]
-        jacobian[:count, :count] = by_states.reshape(count, count)
-        by_inputs = at.states_by[..., n:].reshape(count, -1)
-        by_own = self._by_own.reshape(self._given.size, own.size)
-        jacobian[:count, count:] = -by_inputs @ by_own
-        by_frequency = np.concatenate([self.angle(1.0) * (turned @ states).ravel(), drive.by_frequency])
-        by_level = np.concatenate([-by_inputs @ self._given.ravel(), drive.by_level])
-        if own.size:
-            of_outputs = drive.by_outputs.reshape(own.size, -1)
-            rows = at.outputs_by.shape[1] * size
-            jacobian[count:, :count] = of_outputs @ at.outputs_by[..., :n].reshape(rows, count)
-            through = of_outputs @ at.outputs_by[..., n:].reshape(rows, -1)
-            jacobian[count:, count:] = drive.by_own + through @ by_own
-            by_level[count:] += through @ self._given.ravel()
-        return residual, jacobian, by_frequency, by_level
+    def _evaluated(self, states: Float, inputs: Float) -> tuple[Float, ...]:
+        """Next states, outputs and their derivatives, at all samples of the period."""
+        v = self.basis.to_time @ np.concatenate([states, inputs], axis=1)
+        along_period(self._matrices, *self._tables, v, *self._room, *self._samples)
+        return self._samples
 
-    def over_frequency(self) -> System:
-        """Return the equations with the frequency (Hz) as parameter."""
-        return lambda z, frequency_hz: self.evaluated(z, frequency_hz)[:3]
+    def _derivative(self, slope: Float) -> Float:
+        """``T^+ diag(slope) T``, float[size, k, size, n_variables], of float[samples, k, n_variables]."""
+        size = self.basis.size
+        flat = self.basis.products @ slope.reshape(self.basis.samples, -1)
+        return np.asarray(flat.reshape(size, size, *slope.shape[1:]).swapaxes(1, 2))
 
-    def over_level(self, frequency_hz: float) -> System:
-        """Return the equations at one frequency with the level as parameter."""
+    def linear_response(self, frequency_hz: float, row: int) -> tuple[Complex, Complex]:
+        """Return states and outputs of the linear part."""
+        model, point = self.model, np.exp(1j * self.angle(frequency_hz))
+        gain = np.linalg.solve(point * np.eye(model.states) - model.a, model.b[:, row])
+        return gain, model.linear_part.response(np.array([point]))[0][:, row]
 
-        def system(z: Float, level: float) -> tuple[Float, Float, Float]:
-            residual, by_z, _, by_level = self.evaluated(z, frequency_hz, level)
-            return residual, by_z, by_level
+    def static(self, inputs: Float) -> Float:
+        """Return the fixed point of the linear part."""
+        model = self.model
+        return np.asarray(np.linalg.lstsq(np.eye(model.states) - model.a, model.b @ inputs)[0])
 
-        return system
+    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
+        """complex[n_states]: multipliers over one sample."""
+        angle = self.angle(frequency_hz)
+        slope = self._evaluated(self.states(z), self.inputs_of(z, level))[2]
+        states_by = self._derivative(slope[..., : self.n_states])
+        return multipliers(states_by, self.basis.turned(angle)[0], self.basis, angle)
 
-    def linear(self, frequency_hz: float, level: float = 1.0) -> Float:
-        """Return the unknowns of the linear part at a level."""
-        model, z = self.model, np.zeros(self.state_unknowns)
-        point = np.array([np.exp(1j * self.angle(frequency_hz))])
-        row = self._driven_row()
-        response = model.linear_part.response(point)[0][:, row]
-        own = self.drive.linear(frequency_hz, response, self.basis.harmonics)
-        inputs = self._given + self._by_own @ own
-        amplitude = complex(inputs[1, row], -inputs[2, row])
-        gain = np.linalg.solve(point[0] * np.eye(model.states) - model.a, model.b[:, row])
-        states = z.reshape(self.basis.size, -1)
-        states[1], states[2] = level * (gain * amplitude).real, -level * (gain * amplitude).imag
-        if np.any(self._held):
-            states[0] = np.linalg.lstsq(np.eye(model.states) - model.a, model.b @ self._held[0])[0]
-        return np.concatenate([z, level * own])
+    def state_use(self, z: Float, to_time: Float) -> Float:
+        """float[n_states]: largest magnitude of each state over the largest in the training data."""
+        return use_of(np.max(np.abs(to_time @ self.states(z)), axis=0), self.model.state_range)
 
-    def _driven_row(self) -> int:
-        used = np.any(self._given != 0.0, axis=0) | np.any(self._by_own != 0.0, axis=(0, 2))
-        return int(np.argmax(used))
+    def input_use(self, inputs: Float, to_time: Float) -> Float:
+        """float[n_inputs]: largest magnitude of each input over the largest in the training data."""
+        return use_of(np.max(np.abs(to_time @ inputs), axis=0), self.model.input_range)

@@ -1,5 +1,6 @@
 """Solutions of a harmonic balance: one at a given frequency from rest, and all along a band."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,10 +10,9 @@ from identification.continuation.follow import continued
 from identification.continuation.newton import solved
 from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
-from identification.pnlss.simulation import use_of
-from identification.pnlss.steady.balance import Balance
+from identification.pnlss.steady.driven import DrivenBalance
 
-__all__ = ["Followed", "followed", "from_rest", "polished", "sizes", "statically_stable"]
+__all__ = ["Followed", "beyond", "followed", "from_rest", "polished", "sizes", "statically_stable"]
 
 Float = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Followed(NamedTuple):
     note: str
 
 
-def sizes(balance: Balance, frequency_hz: float) -> Float:
+def sizes(balance: DrivenBalance, frequency_hz: float) -> Float:
     """Size of each unknown in the linear solution at this frequency, the same for all harmonics."""
     linear = balance.linear(frequency_hz)
     states = np.max(np.abs(balance.states(linear)), axis=0)
@@ -42,7 +42,7 @@ def sizes(balance: Balance, frequency_hz: float) -> Float:
     return np.concatenate([np.tile(states, balance.basis.size), np.abs(own)])
 
 
-def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
+def from_rest(balance: DrivenBalance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
     """Return the unknowns of the vibration reached from rest as the level rises; None if the path does not reach the level."""
     linear, scale = balance.linear(frequency_hz, _FIRST_LEVEL), sizes(balance, frequency_hz)
     try:
@@ -55,26 +55,26 @@ def from_rest(balance: Balance, frequency_hz: float, largest_use: float = np.inf
             lowest=0.5 * _FIRST_LEVEL,
             highest=1.0,
             points=_MOST_LEVELS,
-            steps=_LEVELS,
-            stop=lambda z, level: _beyond(balance, z, largest_use),
+            steps=replace(_LEVELS, kinks=balance.kinks),
+            stop=lambda z, level: beyond(balance, z, largest_use),
         )
     except IdentificationError:
         return None
     return path.unknowns[-1] if path.ending == "range" and path.parameter[-1] == 1.0 else None
 
 
-def statically_stable(balance: Balance, z: Float, frequency_hz: float) -> bool:
+def statically_stable(balance: DrivenBalance, z: Float, frequency_hz: float, level: float = 1.0) -> bool:
     """Return whether a vibration is stable under slow changes: the determinant of its Jacobian has the same sign as at rest."""
     rest = balance.linear(frequency_hz, _FIRST_LEVEL**2)
     signs = [
-        np.linalg.slogdet(balance.evaluated(at, frequency_hz, level)[1])[0]
-        for at, level in ((z, 1.0), (rest, _FIRST_LEVEL**2))
+        np.linalg.slogdet(balance.evaluated(at, frequency_hz, of)[1])[0]
+        for at, of in ((z, level), (rest, _FIRST_LEVEL**2))
     ]
     return bool(signs[0] == signs[1])
 
 
 def followed(
-    balance: Balance, begin_hz: float, end_hz: float, *, points: int, step: float, largest_use: float
+    balance: DrivenBalance, begin_hz: float, end_hz: float, *, points: int, step: float, largest_use: float
 ) -> Followed | None:
     """Follow the response from rest at one end of a band to the other end; return None if no start is found."""
     start = from_rest(balance, begin_hz, largest_use)
@@ -91,23 +91,21 @@ def followed(
         lowest=low,
         highest=high,
         points=points,
-        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step),
-        stop=lambda z, frequency_hz: _beyond(balance, z, largest_use),
+        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step, kinks=balance.kinks),
+        stop=lambda z, frequency_hz: beyond(balance, z, largest_use),
     )
     return Followed(path, _note(path, begin_hz, end_hz))
 
 
-def polished(balance: Balance, z: Float, frequency_hz: float) -> Float | None:
+def polished(balance: DrivenBalance, z: Float, frequency_hz: float) -> Float | None:
     """Return the solution near ``z`` at a frequency; None if there is none."""
     return solved(balance.over_frequency(), z, frequency_hz, scale=sizes(balance, frequency_hz))
 
 
-def _beyond(balance: Balance, z: Float, largest_use: float) -> str:
+def beyond(balance: DrivenBalance, z: Float, largest_use: float) -> str:
     """Return a message if states are far outside the range of the training data; else an empty text."""
-    use = use_of(np.max(np.abs(balance.basis.to_time @ balance.states(z)), axis=0), balance.model.state_range)
-    if not np.any(use > largest_use):
-        return ""
-    return f"the states are beyond {largest_use:g} times those of the training data"
+    use = balance.state_use(z, balance.basis.to_time)
+    return balance.beyond.format(largest_use) if np.any(use > largest_use) else ""
 
 
 def _note(path: Path, begin_hz: float, end_hz: float) -> str:

@@ -3,24 +3,17 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.channels import MOTION_ORDER
-from identification.errors import IdentificationError
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.steady.balance import Balance
-from identification.pnlss.steady.paths import Followed, followed, from_rest, polished, statically_stable
-from identification.pnlss.steady.setting_up import Held, balance_of, band_of, harmonics_that_fit, unknowns_near
-from identification.pnlss.steady.states import PnlssResponse, SteadyStates, largest_use, motion_rows, steady_states
+from identification.pnlss.steady.assembly import response_of, steady_state_of
+from identification.pnlss.steady.notes import harmonics_notes, held_notes, loss_notes
+from identification.pnlss.steady.setting_up import Held, balance_of, band_of, harmonics_that_fit
+from identification.pnlss.steady.states import PnlssResponse, SteadyStates, largest_use
 from identification.prediction.exciter import Exciter
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.validation import positive
 
 __all__ = ["notes_of", "pnlss_frequency_response", "pnlss_response", "pnlss_steady_state"]
-
-Float = NDArray[np.float64]
-
-_STEP = 0.05
 
 
 def pnlss_frequency_response(
@@ -104,35 +97,15 @@ def pnlss_response(
     low, high = band_of(model, lowest_hz, highest_hz)
     held, more = harmonics_that_fit(model, harmonics, high)
     balance = balance_of(model, force_n, force, exciter, held_inputs, held, samples)
-    allowed = positive("largest_range_use", largest_range_use)
-    if points < 2:
-        raise IdentificationError(f"points: is {points}, needs at least 2")
-    found: list[Followed] = []
-    for begin, end in ((low, high), (high, low)):
-        path = followed(balance, begin, end, points=points, step=_STEP, largest_use=allowed)
-        if path is None:
-            more.append(f"at {begin:.4g} Hz no vibration was found that rest leads to within the range allowed")
-            continue
-        found.append(path)
-        if not path.note:
-            break
-        more.append(path.note)
-    if not found:
-        raise IdentificationError(
-            f"force_n: at {force_n:g} {'V' if force == 'voltage' else 'N'} the model has no periodic vibration at {low:.4g} "
-            f"or {high:.4g} Hz that rest leads to within {allowed:g} times the range of its training data"
-        )
-    states = [_along(balance, each) for each in found]
-    every = states[0] if len(states) == 1 else states[0].joined(states[1])
-    folds = [_turns(balance, each) for each in found]
-    return PnlssResponse(
-        force_n=float(force_n),
-        force=force,
-        points=every,
-        folds=folds[0] if len(folds) == 1 else folds[0].joined(folds[1]),
-        branch=np.repeat(np.arange(len(states)), [each.count for each in states]),
-        notes=(*notes_of(model, every, force, exciter, held_inputs), *_at_the_edge(every, low, high), *more),
-        complete=not any(each.note for each in found),
+    return response_of(
+        balance,
+        force_n,
+        force,
+        (low, high),
+        points=points,
+        largest_range_use=largest_range_use,
+        notes=lambda every: notes_of(model, every, force, exciter, held_inputs),
+        more=more,
     )
 
 
@@ -157,31 +130,7 @@ def pnlss_steady_state(
     at_hz = positive("frequency_hz", frequency_hz, "Hz")
     held, _ = harmonics_that_fit(model, harmonics, at_hz)
     balance = balance_of(model, force_n, force, exciter, held_inputs, held, samples)
-    if near is None:
-        z = from_rest(balance, at_hz, largest_range_use)
-    else:
-        z = polished(balance, unknowns_near(balance, near), at_hz)
-    if z is None:
-        raise IdentificationError(f"frequency_hz: no periodic vibration was found at {at_hz:g} Hz and {force_n:g}")
-    stable = np.array([statically_stable(balance, z, at_hz)])
-    return steady_states(balance, z[None], np.array([at_hz]), stable)
-
-
-def _along(balance: Balance, found: Followed) -> SteadyStates:
-    path = found.path
-    return steady_states(balance, path.unknowns, path.parameter, path.direction * path.direction[0] > 0.0)
-
-
-def _at_the_edge(points: SteadyStates, low: float, high: float) -> list[str]:
-    """Return a note if the largest amplitude is at an end of the band."""
-    at_hz = points.frequency_hz[int(np.argmax(np.abs(points.displacement_m[:, 1, 0])))]
-    return ["the largest amplitude is at an end of the band: widen it"] if at_hz in (low, high) else []
-
-
-def _turns(balance: Balance, found: Followed) -> SteadyStates:
-    path = found.path
-    none = np.zeros(path.turning_parameter.size, dtype=bool)
-    return steady_states(balance, path.turning_unknowns, path.turning_parameter, none)
+    return steady_state_of(balance, at_hz, force_n, near, largest_range_use)
 
 
 def notes_of(
@@ -192,36 +141,8 @@ def notes_of(
     held_inputs: Mapping[str, float] | None = None,
 ) -> tuple[str, ...]:
     """Return notes on the held quantity, harmonics at the peak, use of the trained range, and losses of stability but folds."""
-    constant = [f"input '{name}' is held at {value:g}" for name, value in (held_inputs or {}).items()]
-    return (*_held(model, force, exciter), *constant, *_harmonics(points), *_range(points), *_losses(points))
-
-
-def _held(model: PnlssModel, force: str, exciter: Exciter | None) -> list[str]:
-    where = f" of the exciter{f' ({exciter.source})' if exciter.source else ''}" if exciter else " at the model's input"
-    voltage_driven = exciter is None and not any(channel.role == "force" for channel in model.inputs)
-    maker = "the exciter inside the model" if voltage_driven else "the exciter"
-    return {
-        "pure-sine": ["held: a force without harmonics"],
-        "fundamental": [f"held: the force's fundamental; its harmonics are those that {maker} makes"],
-        "rms": [f"held: the RMS of the force; its harmonics are those that {maker} makes"],
-        "voltage": [f"held: the amplitude of a sine of voltage{where}"],
-    }[force]
-
-
-def _harmonics(points: SteadyStates) -> list[str]:
-    """Return notes on the harmonics of force and motion at the largest amplitude."""
-    peak = int(np.argmax(np.abs(points.displacement_m[:, 1, 0])))
-    row = motion_rows(points.output_channels)[0]
-    order = MOTION_ORDER[points.output_channels[row].motion]
-    h = np.arange(1, points.outputs.shape[1])
-    motion, force = np.abs(points.outputs[peak, 1:, row]) / h**order, np.abs(points.force_n[peak, 1:])
-    notes = [
-        f"at the peak harmonics 2 to {h[-1]} are {100.0 * np.linalg.norm(motion[1:]) / motion[0]:.2g} % of the "
-        "displacement's fundamental"
-    ]
-    if h.size > 1 and force[1] > 0.0:
-        notes.append(f"at the peak F2/F1 is {force[1] / force[0]:.2g}")
-    return notes if h.size > 1 else []
+    first = held_notes(model, force, exciter, held_inputs)
+    return (*first, *harmonics_notes(points), *_range(points), *loss_notes(points))
 
 
 def _range(points: SteadyStates) -> list[str]:
@@ -234,13 +155,4 @@ def _range(points: SteadyStates) -> list[str]:
             notes.append(
                 f"the {name} reach{'' if name == 'states' else 'es'} {largest:.2f} times the training data: extrapolated"
             )
-    return notes
-
-
-def _losses(points: SteadyStates) -> list[str]:
-    notes = []
-    for kind, what in (("period doubling", "the period doubles"), ("Neimark-Sacker", "the amplitude is modulated")):
-        at = [hz for hz, loss in zip(points.frequency_hz.tolist(), points.loss, strict=True) if loss == kind]
-        if at:
-            notes.append(f"{kind}: from {min(at):.4g} to {max(at):.4g} Hz the vibration is unstable, {what}")
     return notes

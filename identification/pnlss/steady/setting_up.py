@@ -1,6 +1,6 @@
 """Set up the equations of a harmonic balance: drive, held inputs, band, harmonics; find the linear resonance."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal, get_args
 
 import numpy as np
@@ -11,6 +11,7 @@ from identification.errors import IdentificationError
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.steady.balance import Balance, samples_for
 from identification.pnlss.steady.basis import Basis, real_coefficients
+from identification.pnlss.steady.driven import Driven, DrivenBalance
 from identification.pnlss.steady.drives import Coupled, Drive, HeldOutput, Sine
 from identification.pnlss.steady.states import SteadyStates, motion_rows
 from identification.prediction.exciter import Exciter
@@ -19,6 +20,7 @@ from identification.validation import positive
 __all__ = [
     "Held",
     "balance_of",
+    "band_around",
     "band_of",
     "drive_of",
     "harmonics_that_fit",
@@ -35,7 +37,7 @@ _LIGHT = 0.3
 _BAND = (0.85, 1.15)
 
 
-def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:
+def held_values(model: Driven, held_inputs: Mapping[str, float] | None) -> tuple[int, NDArray[np.float64]]:
     """Return the row of the driven input, and the constant values of all other inputs, float[n_inputs].
 
     The driven input is the only force, or the only input that is not held. Raises `IdentificationError` if there is no such
@@ -69,9 +71,7 @@ def held_values(model: PnlssModel, held_inputs: Mapping[str, float] | None) -> t
     return row, np.array([float(given.get(name, 0.0)) for name in names])
 
 
-def drive_of(
-    model: PnlssModel, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int
-) -> Drive:
+def drive_of(model: Driven, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int) -> Drive:
     """Return the drive at input ``row``; raise `IdentificationError` if model, exciter and held quantity do not match."""
     if held not in get_args(Held):
         raise IdentificationError(f"force: is '{held}', allowed are {', '.join(get_args(Held))}")
@@ -93,7 +93,7 @@ def drive_of(
     return Coupled(exciter, amplitude, held, drive, order, row, m, coefficients)
 
 
-def _voltage_driven(model: PnlssModel, amplitude: float, held: Held, exciter: Exciter | None, row: int) -> Drive:
+def _voltage_driven(model: Driven, amplitude: float, held: Held, exciter: Exciter | None, row: int) -> Drive:
     if exciter is not None:
         raise IdentificationError("exciter: is inside a model that is driven by a voltage; leave it out")
     force = find_role(model.outputs, "force")
@@ -152,14 +152,20 @@ def balance_of(
 
 def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None) -> tuple[float, float]:
     """Return the band in Hz, by default around the linear resonance; raise `IdentificationError` if the limits do not rise."""
+    return band_around(lambda: linear_resonance_hz(model), lowest_hz, highest_hz, 0.5 * model.sample_rate_hz)
+
+
+def band_around(
+    resonance: Callable[[], float], lowest_hz: float | None, highest_hz: float | None, most_hz: float
+) -> tuple[float, float]:
+    """Return the band in Hz, by default around a resonance (Hz); raise `IdentificationError` if the limits do not rise."""
     if lowest_hz is None or highest_hz is None:
-        resonance = linear_resonance_hz(model)
-        lowest_hz = _BAND[0] * resonance if lowest_hz is None else lowest_hz
-        highest_hz = _BAND[1] * resonance if highest_hz is None else highest_hz
-    half = 0.5 * model.sample_rate_hz
-    if not 0.0 < lowest_hz < highest_hz < half:
+        at_hz = resonance()
+        lowest_hz = _BAND[0] * at_hz if lowest_hz is None else lowest_hz
+        highest_hz = _BAND[1] * at_hz if highest_hz is None else highest_hz
+    if not 0.0 < lowest_hz < highest_hz < most_hz:
         raise IdentificationError(
-            f"lowest_hz, highest_hz: are {lowest_hz:g} and {highest_hz:g} Hz, need to rise between 0 and {half:g} Hz"
+            f"lowest_hz, highest_hz: are {lowest_hz:g} and {highest_hz:g} Hz, need to rise between 0 and {most_hz:g} Hz"
         )
     return float(lowest_hz), float(highest_hz)
 
@@ -180,7 +186,7 @@ def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> 
     ]
 
 
-def unknowns_near(balance: Balance, near: SteadyStates) -> Float:
+def unknowns_near(balance: DrivenBalance, near: SteadyStates) -> Float:
     """Return unknowns from the first point of other steady states; harmonics that these lack are zero."""
     size = balance.basis.size
 
@@ -193,6 +199,6 @@ def unknowns_near(balance: Balance, near: SteadyStates) -> Float:
     if own.size == 1:
         own[0] = voltage.real
     elif own.size:
-        row = next(row for row, channel in enumerate(balance.model.inputs) if channel.role == "force")
+        row = next(row for row, channel in enumerate(balance.inputs) if channel.role == "force")
         own[:] = [*inputs[1:, row], voltage.real, -voltage.imag]
     return np.concatenate([states.ravel(), own])

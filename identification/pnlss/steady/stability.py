@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identification.pnlss.steady.basis import Basis
 
-__all__ = ["Loss", "loss_of_stability", "multipliers"]
+__all__ = ["Loss", "by_centroid", "distinct", "loss_of_stability", "multipliers"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -48,18 +48,22 @@ def multipliers(states_by: Float, turn: Float, basis: Basis, angle_rad: float) -
     size, n = states_by.shape[:2]
     matrix = np.tensordot(turn.T, states_by, axes=1).reshape(size * n, size * n)  # R is orthogonal
     values, vectors = np.linalg.eig(matrix)
-    parts = vectors.reshape(size, n, -1)
-    cosine, sine = parts[1::2], parts[2::2]
+    order = by_centroid(vectors.reshape(size, n, -1), basis)
+    return distinct(values[order], n, 2.0 * np.pi / angle_rad)
+
+
+def by_centroid(vectors: Complex, basis: Basis) -> NDArray[np.int64]:
+    """int[k]: order of eigenvectors, complex[size, n_states, k], by the harmonic on which they are centred."""
+    cosine, sine = vectors[1::2], vectors[2::2]
     forward = np.sum(np.abs(cosine - 1j * sine) ** 2, axis=1) / 4.0
     backward = np.sum(np.abs(cosine + 1j * sine) ** 2, axis=1) / 4.0
-    weight = np.sum(np.abs(parts[0]) ** 2, axis=0) + np.sum(forward + backward, axis=0)
+    weight = np.sum(np.abs(vectors[0]) ** 2, axis=0) + np.sum(forward + backward, axis=0)
     h = np.arange(1, basis.harmonics + 1)
     centroid = np.abs(h @ (forward - backward)) / weight
-    order = np.argsort(centroid, kind="stable")
-    return _distinct(values[order], n, 2.0 * np.pi / angle_rad)
+    return np.argsort(centroid, kind="stable")
 
 
-def _distinct(values: Complex, count: int, samples: float) -> Complex:
+def distinct(values: Complex, count: int, samples: float) -> Complex:
     """Return the first ``count`` values that are no copies of earlier ones; if there are too few, the first copies too."""
     with np.errstate(under="ignore"):
         over_period = values**samples

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, Channel
 from identification.errors import IdentificationError
-from identification.pnlss.simulation import use_of
-from identification.pnlss.steady.balance import Balance
 from identification.pnlss.steady.basis import harmonics_of
-from identification.pnlss.steady.stability import Loss, loss_of_stability, multipliers
+from identification.pnlss.steady.driven import DrivenBalance
+from identification.pnlss.steady.stability import Loss, loss_of_stability
 from identification.prediction.steady_prediction import SteadyPrediction
 
 __all__ = ["PnlssResponse", "SteadyStates", "motion_rows", "steady_states"]
@@ -133,33 +132,36 @@ def largest_use(use: Float) -> Float:
 
 
 def steady_states(
-    balance: Balance, unknowns: Float, frequency_hz: Float, statically_stable: NDArray[np.bool_]
+    balance: DrivenBalance,
+    unknowns: Float,
+    frequency_hz: Float,
+    statically_stable: NDArray[np.bool_],
+    level: Float | None = None,
 ) -> SteadyStates:
     """Convert solutions (float[n, n_unknowns]) of a balance to vibrations.
 
-    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that are stable under slow changes.
+    ``statically_stable`` (bool[n]) marks, with a held force, the vibrations that are stable under slow changes. ``level``
+    (float[n]): level of each, 1 by default.
     """
-    model, basis = balance.model, balance.basis
-    count, harmonics = frequency_hz.size, basis.harmonics + 1
-    sizes = {"states": model.states, "inputs": len(model.inputs), "outputs": len(model.outputs)}
+    levels = [1.0] * len(unknowns) if level is None else level.tolist()
+    basis, count, harmonics = balance.basis, frequency_hz.size, balance.basis.harmonics + 1
+    sizes = {"states": balance.n_states, "inputs": len(balance.inputs), "outputs": len(balance.outputs)}
     series = {name: np.zeros((count, harmonics, size), dtype=complex) for name, size in sizes.items()}
-    found = np.zeros((count, model.states), dtype=complex)
+    found = np.zeros((count, balance.order), dtype=complex)
     stable, losses = np.zeros(count, dtype=bool), list[Loss]()
-    use: dict[str, list[Float]] = {"states": [], "inputs": []}
+    use = {"states": np.zeros((count, balance.ranges)), "inputs": np.zeros((count, len(balance.inputs)))}
     fine = basis.at(2.0 * np.pi * np.arange(_FINE * harmonics) / (_FINE * harmonics))
-    ranges = {"states": model.state_range, "inputs": model.input_range}
     for k, (z, at_hz) in enumerate(zip(unknowns, frequency_hz.tolist(), strict=True)):
-        period, angle = balance.period(z), balance.angle(at_hz)
-        parts = {"states": balance.states(z), "inputs": period.inputs, "outputs": period.outputs}
+        states, inputs = balance.states(z), balance.inputs_of(z, levels[k])
+        parts = {"states": states, "inputs": inputs, "outputs": balance.along(states, inputs, at_hz).outputs}
         for name, part in parts.items():
             series[name][k] = harmonics_of(part)
-        for name, limit in ranges.items():
-            use[name].append(use_of(np.max(np.abs(fine @ parts[name]), axis=0), limit))
-        found[k] = multipliers(period.states_by[..., : model.states], basis.turned(angle)[0], basis, angle)
+        use["states"][k], use["inputs"][k] = balance.state_use(z, fine), balance.input_use(inputs, fine)
+        found[k] = balance.multipliers(z, at_hz, levels[k])
         if not balance.drive.size:
-            loss = loss_of_stability(found[k], angle)
+            loss = loss_of_stability(found[k], balance.angle(at_hz))
         else:
-            loss = loss_of_stability(found[k], angle, real=False) if statically_stable[k] else "fold"
+            loss = loss_of_stability(found[k], balance.angle(at_hz), real=False) if statically_stable[k] else "fold"
         stable[k] = not loss
         losses.append(loss)
     return SteadyStates(
@@ -169,10 +171,10 @@ def steady_states(
         multipliers=found,
         stable=stable,
         loss=tuple(losses),
-        state_use=np.array(use["states"]).reshape(count, model.states),
-        input_use=np.array(use["inputs"]).reshape(count, len(model.inputs)),
-        input_channels=model.inputs,
-        output_channels=model.outputs,
+        state_use=use["states"],
+        input_use=use["inputs"],
+        input_channels=balance.inputs,
+        output_channels=balance.outputs,
     )
 
 
