@@ -12,13 +12,14 @@ For ``W = E + eps (q.v + q.C q/2)`` follows ``dW <= h (-(1 - theta) S + g U^2 + 
 - ``c w^2 + eps x c w >= -eps^2 c x^2/4`` and ``|x R| <= tau x^2 + (sum of strengths)^2/(4 tau)``,
 - ``(V + eps Q).b U <= theta S + U^2 (b.A^-1 b + eps b.B^-1 b)/(4 theta)``.
 
-The end of the step is ``q = Q + h V/2``, ``v = V + h a/2`` with the acceleration a of the equation of the step, so that its W is
-at most ``mu S + nu U^2 + k1``. Hence ``W_1 (1 + lambda h) <= W_0 + h (...)`` with ``lambda = (1 - theta)/mu``, and W never exceeds
-``(g/lambda + nu) m + k/lambda + k1``, where m is the mean square of the force with weights that fade with the rate lambda.
+The end of the step is ``q = Q + h V/2``, ``v = V + h a/2`` with the acceleration a of the equation of the step, so that
+its W is at most ``mu S + nu U^2 + k1``. Hence ``W_1 (1 + lambda h) <= W_0 + h (...)`` with ``lambda = (1 - theta)/mu``, and
+W never exceeds ``(g/lambda + nu) m + k/lambda + k1``, where m is the mean square of the force with weights that fade with the
+rate lambda.
 """
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,7 @@ def bound_of(model: StructuredModel, force_rms_n: float) -> Bound:
 
 @dataclass(frozen=True)
 class _Spring:
-    """Quadratic limits of the spring of an element: ``x f >= s x^2 - kappa``, ``low x^2/2 - below <= P <= high x^2/2 + above``."""
+    """Quadratic limits of a spring: ``x f >= s x^2 - kappa``, ``low x^2/2 - below <= P <= high x^2/2 + above``."""
 
     s: float
     kappa: float
@@ -160,8 +161,7 @@ def _with(
     eps = eps_share * float(damping.min())
     springs = [_spring(tables, e, slope_share) for e in range(len(phi))]
     most_damping = tables.dampers.max(axis=1) if len(phi) else np.zeros(0)
-    ends = tables.first
-    strength = np.array([tables.sliders[a:b, 1].sum() for a, b in zip(ends[:-1], ends[1:], strict=True)])
+    strength = np.array([tables.sliders[a:b, 1].sum() for a, b in pairwise(tables.first)])
     static = 1.0 / np.maximum(np.sum((phi / system.omega) ** 2, axis=1), 1e-300)
     a_form, b_form = np.diag(damping) - eps * np.eye(n), stiffness.copy()
     constant = 0.0
@@ -206,7 +206,7 @@ def _with(
     factor = np.linalg.inv(np.linalg.cholesky(s_form))
     mu = float(np.linalg.eigvalsh(factor @ w_form @ factor.T)[-1])
     rate = (1.0 - theta) / mu
-    largest = (g / rate + nu) * force**2 + constant / rate + fixed
+    largest = float((g / rate + nu) * force**2 + constant / rate + fixed)
     quadratic = 0.5 * np.block([[eye, eps * eye], [eps * eye, stiffness + eps * np.diag(damping)]])
     for e, spring in enumerate(springs):
         quadratic[n:, n:] += 0.5 * spring.low * np.outer(phi[e], phi[e])

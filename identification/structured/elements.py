@@ -27,9 +27,9 @@ _NUDGE = 1e-4
 class NonlinearElement:
     """Springs, dampers and joints that act on one displacement.
 
-    With the element's displacement ``z = direction . q`` relative to its scale, ``x = z / scale_m``, the forces of all laws add
-    up (`identification.structured.laws`). Beyond ``|x| = reach`` dampers stay constant, and springs go on as straight lines with
-    the mean slope of both ends, within limits that `StructuredModel` states.
+    With the element's displacement ``z = direction . q`` relative to its scale, ``x = z / scale_m``, the forces of all laws
+    add up (`identification.structured.laws`). Beyond ``|x| = reach`` dampers stay constant, and springs go on as straight lines
+    with the mean slope of both ends, within limits that `StructuredModel` states.
 
     Parameters
     ----------
@@ -183,7 +183,9 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
                 springs.append(change)
                 limits.append([element.reach, *np.repeat(_end_slope(element, change) * inside, 2)])
             elif isinstance(law, Damper):
-                dampers.append((element.damper([more]) - element.damper([law])) / _NUDGE)  # linear; less may be below zero
+                dampers.append(
+                    (element.damper([more]) - element.damper([law])) / _NUDGE
+                )  # linear; less may be below zero
             else:
                 change = np.zeros_like(tables.sliders)
                 moved = (element.sliders([more]) - element.sliders([less])) / (2.0 * _NUDGE)

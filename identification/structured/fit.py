@@ -188,7 +188,9 @@ def _prolonged(experiment: Experiment, periods: int) -> Experiment:
     if not periods:
         return experiment
     inputs, outputs = (
-        np.concatenate([values[:, : experiment.counted_from], np.tile(one, periods), values[:, experiment.counted_from :]], axis=1)
+        np.concatenate(
+            [values[:, : experiment.counted_from], np.tile(one, periods), values[:, experiment.counted_from :]], axis=1
+        )
         for values, one in (
             (experiment.inputs, experiment.counted_inputs[:, : experiment.period_samples]),
             (experiment.outputs, experiment.counted_outputs[:, : experiment.period_samples]),
@@ -229,7 +231,7 @@ class _Problem:
         """RMS of the residual of the last vector over that of the outputs."""
 
     def triangle(self, vector: Float) -> Float:
-        """float[P + 1, P + 1]: triangle of derivatives and residuals of all experiments and of what is expected, kept for the last."""
+        """float[P + 1, P + 1]: triangle of derivatives and residuals of experiments and of what is expected; kept."""
         if self._known is None or self._known[0] != vector.tobytes():
             model = self.parameters.model(vector)
             with threads() as count, ThreadPoolExecutor(count) as pool:

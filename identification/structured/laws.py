@@ -99,7 +99,11 @@ class Law:
         out: list[str] = []
         for name in self.free:
             value = getattr(self, name)
-            out += [f"{self.kind} {name}[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [f"{self.kind} {name}"]
+            out += (
+                [f"{self.kind} {name}[{k}]" for k in range(len(value))]
+                if isinstance(value, tuple)
+                else [f"{self.kind} {name}"]
+            )
         return tuple(out)
 
     @property
@@ -279,7 +283,7 @@ class UserSpring(Spring):
             function = getattr(importlib.import_module(module), name)
         except (ImportError, AttributeError, ValueError) as error:
             raise IdentificationError(
-                f"user-spring: function is '{self.function}', allowed is 'module:name' of a function that can be imported ({error})"
+                f"user-spring: function is '{self.function}', allowed is 'module:name' of one that can be imported ({error})"
             ) from None
         found = np.asarray(function(x, np.array(self.numbers)), dtype=np.float64)
         if found.shape != np.shape(x) or not np.all(np.isfinite(found)):
@@ -342,7 +346,7 @@ class Masing(Joint):
 
     def sliders(self) -> Float:
         """float[2, n]: stiffness and largest force."""
-        return np.array(self.stiffness_n) * np.array([np.ones(len(self.slips)), self.slips])
+        return np.asarray(np.array(self.stiffness_n) * np.array([np.ones(len(self.slips)), self.slips]))
 
 
 @dataclass(frozen=True, eq=False)

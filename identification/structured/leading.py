@@ -1,8 +1,8 @@
 """Simulations that the measured motion leads, so that a fit from a poor start does not end at a far minimum.
 
-A lightly damped model with wrong numbers soon moves in another phase, or on another branch, than the measurement, and the sum of
-squares has many minima. With a force ``rate (measured velocity - velocity)`` on every mode it cannot: its memory is as short as
-``1 / rate``. A fit begins with a fast rate and ends without any.
+A lightly damped model with wrong numbers soon moves in another phase, or on another branch, than the measurement, and the sum
+of squares has many minima. With a force ``rate (measured velocity - velocity)`` on every mode it cannot: its memory is as short
+as ``1 / rate``. A fit begins with a fast rate and ends without any.
 """
 
 from dataclasses import dataclass

@@ -239,7 +239,7 @@ def run_with_sensitivities(
 
     Parameters, in this order: omega, zeta, b (row by row), phi (row by row), the numbers of the laws as in `Changes`, the
     support's stiffness. ``sens``: [`System.size`, P], that of the state. ``motions``: 0, 1, 2 for displacement, velocity,
-    acceleration of an output. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P]. ``jacobian``: [N - counted_from, n_outputs, P].
+    acceleration. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P]. ``jacobian``: [N - counted_from, n_outputs, P].
     """
     n = system.omega.size
     q, v, r, half = state[:n], state[n : 2 * n], state[2 * n + 1 :], matrix[n]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -130,7 +130,7 @@ def _started(law: Law, numbers: Float, scale: float) -> Law:
 
 
 def measured_velocity(linear: StructuredModel, experiment: Experiment, measured_modes: int) -> Float:
-    """float[n_modes, n]: modal velocities of a periodic experiment in all its samples; zero for the modes above those measured."""
+    """float[n_modes, n]: modal velocities of a periodic experiment in all its samples; zero for modes that are not measured."""
     q, _, omega = _modal_spectra(linear, experiment, measured_modes)
     n = experiment.period_samples
     period = np.fft.irfft(1j * omega * q, n, axis=1) * n
@@ -201,7 +201,7 @@ class _Equation:
         if isinstance(law, Damper):
             return [one.damping(x) * self.phi * self.rate for one in law.basis()]
         found = [np.zeros_like(x) for _ in law.basis()]
-        for one, out in zip(law.basis(), found, strict=True):
+        for one, out in zip(cast(list[Joint], law.basis()), found, strict=True):
             slide_along(np.ascontiguousarray(one.sliders().T), x, out)
         return found
 

@@ -6,9 +6,9 @@ A step of length h from (q, v) has the mean velocity V and the end ``q + h V``, 
 
     ``F_e = (P_e(x + h w) - P_e(x))/(h w) + c_e(x + h w/2) w + R_e``,  ``x = phi_e . q``,  ``w = phi_e . V``
 
-with the mean input U, the potential P_e of a spring, its damping c_e and the mean force R_e of its sliders along the way. Over a
-step the mechanical energy, with ``r^2/(2 k)`` of each slider, then changes by the work of U less that of dampers and friction,
-exactly (the discrete gradient of Gonzalez, J. Nonlinear Sci. 6, 1996), whatever h is.
+with the mean input U, the potential P_e of a spring, its damping c_e and the mean force R_e of its sliders along the way. Over
+a step the mechanical energy, with ``r^2/(2 k)`` of each slider, then changes by the work of U less that of dampers and
+friction, exactly (the discrete gradient of Gonzalez, J. Nonlinear Sci. 6, 1996), whatever h is.
 """
 
 import math

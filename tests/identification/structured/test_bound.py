@@ -36,7 +36,14 @@ LAWS = st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=5)
 
 
 @settings(max_examples=25, deadline=None)
-@given(LAWS, st.floats(0.0, 2.0), st.floats(0.01, 3.0), st.floats(-1.0, 1.0), st.integers(0, 99), st.sampled_from([1, 2, 4]))
+@given(
+    LAWS,
+    st.floats(0.0, 2.0),
+    st.floats(0.01, 3.0),
+    st.floats(-1.0, 1.0),
+    st.integers(0, 99),
+    st.sampled_from([1, 2, 4]),
+)
 def test_no_random_or_resonant_force_exceeds_the_bound(springs, damper, friction, across, seed, steps):
     first = NonlinearElement(
         direction=[0.9, across],

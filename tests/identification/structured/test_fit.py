@@ -8,8 +8,8 @@ import pytest
 from identification import Channel, IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
-from identification.structured.laws import PolynomialDamper, PolynomialSpring
 from identification.structured.fit import fit_structured
+from identification.structured.laws import PolynomialDamper, PolynomialSpring
 from identification.structured.parameters import Parameters
 from tests.identification.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
 
