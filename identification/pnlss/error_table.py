@@ -123,7 +123,7 @@ class ErrorTable:
     @classmethod
     def of(
         cls,
-        models: Mapping[str, PnlssModel],
+        models: Mapping[str, PnlssModel | Simulator],
         jobs: Sequence[ModelJob],
         levels: Mapping[str, Sequence[Experiment]],
         *,
@@ -215,7 +215,7 @@ class ErrorTable:
 
 
 def _tests(
-    model: PnlssModel, job: ModelJob, test: str, experiments: Sequence[Experiment], output: int
+    model: PnlssModel | Simulator, job: ModelJob, test: str, experiments: Sequence[Experiment], output: int
 ) -> list[ModelTest]:
     if not experiments:
         return []

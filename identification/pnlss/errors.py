@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
 from identification.validation import read_only
+
+if TYPE_CHECKING:
+    from identification.pnlss.runs import SimulatedMotion, Simulator
 
 __all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
 
@@ -68,8 +72,10 @@ class PnlssErrors:
         return int(np.count_nonzero(~self.bounded))
 
 
-def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, samples: int = SAMPLES) -> PnlssErrors:
+def pnlss_errors(model: "PnlssModel | Simulator", experiments: Sequence[Experiment], *, samples: int = SAMPLES) -> PnlssErrors:
     """Simulate each experiment and compare; an initial state to be estimated is fitted to the first ``samples`` samples.
+
+    A model of another kind is simulated from rest.
 
     Raises `IdentificationError` if there are no experiments, their channels or sample rates differ from the model's, or an
     output is zero where it counts.
@@ -83,12 +89,13 @@ def pnlss_errors(model: PnlssModel, experiments: Sequence[Experiment], *, sample
         belongs(model, experiment, what)
         check_not_zero(experiment, what)
         scale = np.max(np.abs(experiment.counted_outputs), axis=1)
-        begin = None
-        if experiment.initial_state == "estimated":
+        if isinstance(model, PnlssModel) and experiment.initial_state == "estimated":
             begin = estimated_initial_state(model, experiment, samples=samples)
-        run = model.simulate(experiment.inputs, initial_state=begin)
-        bounded[index], use[index] = run.bounded, run.range_use
-        if run.bounded:
+            run: SimulatedMotion = model.simulate(experiment.inputs, initial_state=begin)
+        else:
+            run = model.simulate(experiment.inputs)
+        bounded[index], use[index] = run.unbounded_at is None, run.range_use
+        if bounded[index]:
             with np.errstate(over="ignore"):
                 errors = (run.outputs[:, experiment.counted_from :] - experiment.counted_outputs) / scale[:, None]
                 rms[index] = scale * np.sqrt(np.mean(errors**2, axis=1))

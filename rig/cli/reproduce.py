@@ -25,6 +25,7 @@ def reproduce_(
         float,
         typer.Option(help="Scatter of modal frequencies from run to run, relative; each realisation then is a run."),
     ] = 0.0,
+    model: Annotated[str, typer.Option("--model", help="Kind of the models: pnlss or structured.")] = "pnlss",
     input: Annotated[str, typer.Option("--input", help="What goes into the models: force or voltage.")] = "force",
     beside: Annotated[
         list[str] | None,
@@ -70,6 +71,7 @@ def reproduce_(
         folder=output,
         models=int(models) if models.isdecimal() else models,
         scatter=scatter,
+        model=model,
         input=input,
         beside=tuple(beside or ()),
         saturating=saturating,

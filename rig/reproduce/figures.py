@@ -11,7 +11,7 @@ from rig.drawing.areas import broad
 from rig.drawing.page import grid, legend_below, page_for
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends
 from rig.drawing.style import COLOURS, MAIN, MARKERS, REJECTED, SECOND, shade, title
-from rig.reproduce.study import VARIANTS, Study
+from rig.reproduce.study import Study
 from rig.reproduce.sweeps import COUPLED, SweepResult
 from rig.reproduce.true_responses import Truth
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_study"]
 
 _SEED = 0
-_IDENTIFIED, _LINEAR = next(iter(VARIANTS)), "linear start"
+_LINEAR = "linear start"
 _MOST_SHOWN, _MOST_OF_UNBOUNDED = 2.5, 1.6  # times the largest recorded value
 _HELD = {"pure-sine": "pure sine", "fundamental": "constant fundamental", "voltage": "constant voltage"}
 _POINTS: dict[str, Any] = {"textcoords": "offset points"}
@@ -49,7 +49,7 @@ def _errors(page: "Figure", study: Study) -> None:
     says which levels the study does not have.
     """
     sets = study.table.training_sets
-    shown = tuple(study.tables) if len(sets) == 1 else (_IDENTIFIED, _LINEAR)
+    shown = tuple(study.tables) if len(sets) == 1 else tuple(name for name in study.tables if name in (next(iter(study.tables)), _LINEAR))
     tables = {name: study.tables[name] for name in shown if name in study.tables}
     axes = grid(page, 1, len(sets))[0]
     tests = [test for test in (SAME_LEVEL, *study.table.levels) if _tested(study.table, test)]

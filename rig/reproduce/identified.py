@@ -10,17 +10,26 @@ import numpy as np
 
 from identification import (
     Experiment,
+    LinearModes,
     ModelJob,
     PnlssFit,
+    StructuredFit,
+    fit_structured,
     identify_many,
     identify_pnlss,
+    linear_modes,
     realisation_combinations,
 )
+from identification.structured.laws import Law
 from rig.errors import RecordingError
+from rig.measurements import response_matrices
 from rig.models.files.files import load_as, save
 from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.files.structured import STRUCTURED, IdentifiedStructured
 from rig.models.identify.data_fingerprints import uses_of
+from rig.recording.reader import Recording
 from rig.reproduce.options import Options
+from rig.reproduce.recordings import recorded
 
 __all__ = ["Models", "identify_all"]
 
@@ -35,7 +44,7 @@ class Models:
 
     jobs: tuple[ModelJob, ...]
     """Data from which each model was identified."""
-    fits: Mapping[str, PnlssFit]
+    fits: Mapping[str, PnlssFit | StructuredFit]
     """Fits by name of the model."""
     failures: Mapping[str, str]
     """Why models could not be identified, by name of the model."""
@@ -47,8 +56,8 @@ class Models:
             fits = [self.fits[j.name] for j in self.jobs if j.training_set == training_set and j.name in self.fits]
             if not fits:
                 continue
-            seconds = np.array([fit.history.seconds[-1] for fit in fits])
-            iterations = np.array([fit.history.iterations for fit in fits])
+            seconds = np.array([_seconds(fit) for fit in fits])
+            iterations = np.array([_iterations(fit) for fit in fits])
             found.append(
                 {
                     "training_set": training_set,
@@ -57,7 +66,9 @@ class Models:
                     "seconds_most": float(seconds.max()),
                     "iterations_mean": float(iterations.mean()),
                     "seconds_per_iteration": float(seconds.sum() / max(1, iterations.sum())),
-                    "chosen_mean": float(np.mean([fit.chosen for fit in fits])),
+                    "chosen_mean": float(
+                        np.mean([fit.chosen if isinstance(fit, PnlssFit) else fit.evaluations for fit in fits])
+                    ),
                 }
             )
         return found
@@ -80,10 +91,26 @@ def identify_all(
     )
     by_name = {job.name: job for job in jobs}
     files = {job.name: _file(options, job.name) for job in jobs}
-    fits: dict[str, PnlssFit] = {name: _kept(path) for name, path in files.items() if path.exists()}
+    fits: dict[str, Any] = {name: _kept(options, path) for name, path in files.items() if path.exists()}
     failures: dict[str, str] = {}
+    identify = _structured(options, say) if options.model == "structured" else _pnlss(options)
+    for found in identify_many(jobs, identify, n_jobs=options.jobs, done=fits):
+        if found.fit is None:
+            failures[found.name] = found.reason
+        else:
+            fits[found.name] = found.fit
+            data = by_name[found.name].training, by_name[found.name].validation
+            of = IdentifiedPnlss if options.model == "pnlss" else IdentifiedStructured
+            kept = of(model=found.fit.model, fit=found.fit, seconds=found.seconds, uses=uses_of(*data))
+            save(kept.on(*data), files[found.name])
+        count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
+        say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
+    return Models(jobs, fits, failures)
+
+
+def _pnlss(options: Options) -> Callable[..., PnlssFit]:
     specimen = options.specimen
-    identify = partial(
+    return partial(
         _identify,
         states=options.model_states,
         degrees=() if options.saturating else specimen.degrees,
@@ -94,17 +121,29 @@ def identify_all(
         seed=options.seed,
         settings=options.fit_settings,
     )
-    for found in identify_many(jobs, identify, n_jobs=options.jobs, done=fits):
-        if found.fit is None:
-            failures[found.name] = found.reason
-        else:
-            fits[found.name] = found.fit
-            data = by_name[found.name].training, by_name[found.name].validation
-            kept = IdentifiedPnlss(model=found.fit.model, fit=found.fit, seconds=found.seconds, uses=uses_of(*data))
-            save(kept.on(*data), files[found.name])
-        count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
-        say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
-    return Models(jobs, fits, failures)
+
+
+def _structured(options: Options, say: Callable[[str], None]) -> Callable[..., StructuredFit]:
+    """Return the fit of structured models, with the modes of a recording of their own."""
+    with Recording(recorded(options, options.specimen.modes_plan, say)) as recording:
+        lowest = next(iter(response_matrices(recording).values()))
+    modes = linear_modes(lowest, modes=options.specimen.modes)
+    return partial(_identify_structured, modes=modes, laws=options.specimen.laws)
+
+
+def _identify_structured(
+    training: Sequence[Experiment], *, validation: Sequence[Experiment], modes: LinearModes, laws: tuple[Law, ...]
+) -> StructuredFit:
+    """Fit one model; a structured model needs no validation data."""
+    return fit_structured(modes, training, laws=laws)
+
+
+def _seconds(fit: PnlssFit | StructuredFit) -> float:
+    return float(fit.history.seconds[-1]) if isinstance(fit, PnlssFit) else fit.seconds
+
+
+def _iterations(fit: PnlssFit | StructuredFit) -> int:
+    return fit.history.iterations if isinstance(fit, PnlssFit) else fit.evaluations
 
 
 def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment], **how: Any) -> PnlssFit:
@@ -115,16 +154,19 @@ def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment
     return fit
 
 
-def _kept(path: Path) -> PnlssFit:
-    fit: PnlssFit | None = load_as(PNLSS, path).fit
+def _kept(options: Options, path: Path) -> PnlssFit | StructuredFit:
+    kind = PNLSS if options.model == "pnlss" else STRUCTURED
+    fit: PnlssFit | StructuredFit | None = load_as(kind, path).fit
     if fit is None:
         raise RecordingError(f"{path}: holds a model without its fit; remove the file, and it is identified again")
     return fit
 
 
-def _outcome(fit: PnlssFit | None, reason: str) -> str:
+def _outcome(fit: PnlssFit | StructuredFit | None, reason: str) -> str:
     if fit is None:
         return f"FAILED: {reason}"
+    if isinstance(fit, StructuredFit):
+        return f"training {100 * fit.training_error:6.3f} %  {fit.evaluations} simulations"
     return (
         f"training {100 * fit.training_error:6.3f} %  validation {100 * fit.validation_error:6.3f} %  iteration "
         f"{fit.chosen} of {fit.history.iterations}"

@@ -17,6 +17,7 @@ PAPER = "paper"
 _SATURATING = 60
 """Fewest default iterations with saturating features, because their weights begin at random."""
 INPUTS = ("force", "voltage")
+MODELS = ("pnlss", "structured")
 PARTS = ("steady", "sweeps")
 """Parts of a study that can be left out."""
 
@@ -35,6 +36,8 @@ class Options:
     """Number of models of each training set, or ``paper``."""
     scatter: float = 0.0
     """Relative standard deviation of modal frequencies from run to run; above 0 each realisation is a separate run."""
+    model: str = "pnlss"
+    """Kind of the models: ``pnlss`` or ``structured``."""
     input: str = "force"
     """Input of the models: ``force`` or ``voltage``."""
     beside: tuple[str, ...] = ()
@@ -65,6 +68,18 @@ class Options:
                 f"driver.name = {self.bench.driver.name!r} in bench {self.bench.name}: allowed is 'virtual'; a study "
                 "holds predictions against the truth, which only a virtual bench tells"
             )
+        if self.model not in MODELS:
+            raise ConfigurationError(f"`model` {self.model}: allowed is {', '.join(MODELS)}")
+        if self.model == "structured":
+            for name, given in (
+                ("input", self.input != "force"),
+                ("beside", self.beside),
+                ("saturating", self.saturating),
+                ("states", self.states),
+                ("iterations", self.iterations),
+            ):
+                if given:
+                    raise ConfigurationError(f"`{name}` {getattr(self, name)}: is of PNLSS models; leave it out")
         if self.input not in INPUTS:
             raise ConfigurationError(f"`input` {self.input}: allowed is {', '.join(INPUTS)}")
         for name in self.beside:
@@ -123,6 +138,8 @@ class Options:
         saturating = f"-tanh{self.saturating}" if self.saturating else ""
         states = f"-n{self.model_states}" if self.model_states != self.specimen.states else ""
         fitted = f"-r{self.realisations}" if self.realisations is not None else ""
+        if self.model == "structured":
+            return f"structured{fitted}"
         return f"{self.input}{beside}{saturating}{states}{fitted}"
 
     @property

@@ -124,5 +124,5 @@ def _seed(options: Options, name: str) -> int:
     """Return the seed of a plan, derived from that of the study; the next thousand seeds are for single runs of the plan."""
     specimen = options.specimen
     first, *others = specimen.beside
-    names = [*specimen.levels.values(), first, specimen.exciter, *specimen.sweeps, *others]
+    names = [*specimen.levels.values(), first, specimen.exciter, *specimen.sweeps, *others, specimen.modes_plan]
     return options.seed * 1_000_000 + 1000 * names.index(name)

@@ -10,7 +10,7 @@ from rig.errors import RecordingError
 from rig.models.files.predictions import CUT
 from rig.reproduce.folder import write_json
 from rig.reproduce.options import Options
-from rig.reproduce.study import VARIANTS, Study
+from rig.reproduce.study import Study
 from rig.system.text_files import read_text
 from rig.text.console import number, print_table
 
@@ -146,12 +146,12 @@ def _say_sweeps(study: Study) -> None:
 
 def _say_others(options: Options) -> None:
     """Print the same errors for other kinds of models of these recordings, if they are in the folder."""
-    main = next(iter(VARIANTS))
     rows = []
     for path in sorted(options.folder.glob("*/table.json")):
         try:
-            found = json.loads(read_text(path, 10_000_000, RecordingError))["errors"][main]
-        except (RecordingError, RecursionError, ValueError, KeyError, TypeError):
+            found = json.loads(read_text(path, 10_000_000, RecordingError))["errors"]
+            found = next(iter(found.values()))
+        except (RecordingError, RecursionError, ValueError, KeyError, TypeError, AttributeError, StopIteration):
             continue
         for row in found:
             if row["model"] is None:

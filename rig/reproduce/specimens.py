@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from identification.structured.laws import Law, Masing, PolynomialDamper, PolynomialSpring
 from rig.errors import ConfigurationError
 
 __all__ = ["SPECIMENS", "Specimen", "specimen_of"]
@@ -38,6 +39,12 @@ class Specimen:
     """Largest number of iterations of a fit."""
     patience: int
     """Iterations without a smaller validation error after which a fit ends."""
+    modes_plan: str
+    """Plan that gives a structured model its modes."""
+    modes: int
+    """Number of modes that the plan shows."""
+    laws: tuple[Law, ...]
+    """Laws of the nonlinear element of a structured model."""
     beside: tuple[str, ...] = ("backbone-fine",)
     """Plans whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
@@ -61,6 +68,9 @@ SPECIMENS = {
         iterations=60,
         patience=20,
         sweeps=("sweep-1", "sweep-2", "sweep-3"),
+        modes_plan="multisine-1",
+        modes=1,
+        laws=(PolynomialSpring(), PolynomialDamper()),
         beside=("backbone-fine", "harmonics-varied"),
     ),
     "friction-beam": Specimen(
@@ -78,6 +88,9 @@ SPECIMENS = {
         iterations=30,
         patience=10,
         sweeps=("sweep-1", "sweep-2"),
+        modes_plan="modal",
+        modes=4,
+        laws=(Masing(),),
     ),
 }
 """Specimens by the name that ``rig reproduce`` takes."""

@@ -11,7 +11,9 @@ from identification import (
     IdentificationError,
     PnlssModel,
     SteadyPrediction,
+    StructuredModel,
     pnlss_frequency_response,
+    structured_frequency_response,
 )
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
@@ -76,7 +78,7 @@ class Steady:
 
 
 def steady(
-    options: Options, models: Mapping[str, tuple[str, PnlssModel]], say: Callable[[str], None]
+    options: Options, models: Mapping[str, tuple[str, PnlssModel | StructuredModel]], say: Callable[[str], None]
 ) -> tuple[list[Steady], tuple[Truth, ...]]:
     """Return the predictions of the selected models (by training set), and the true responses of the rig.
 
@@ -95,18 +97,20 @@ def steady(
 
 
 def _predicted(
-    options: Options, model: PnlssModel, truth: Truth, exciter: Exciter | None
+    options: Options, model: PnlssModel | StructuredModel, truth: Truth, exciter: Exciter | None
 ) -> tuple[SteadyPrediction | None, str]:
     low, high = options.specimen.band_hz
+    how = {
+        "force": truth.held,
+        "exciter": exciter if truth.held == "fundamental" else None,
+        "lowest_hz": low,
+        "highest_hz": high,
+    }
     try:
-        found = pnlss_frequency_response(
-            model,
-            truth.level,
-            force=truth.held,
-            exciter=exciter if truth.held == "fundamental" else None,
-            lowest_hz=low,
-            highest_hz=high,
-        )
+        if isinstance(model, StructuredModel):
+            found = structured_frequency_response(model, truth.level, **how)
+        else:
+            found = pnlss_frequency_response(model, truth.level, **how)
     except IdentificationError as error:
         return None, str(error)
     return found, ""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from identification import ErrorTable, Experiment, IdentificationError, PnlssFit, PnlssModel
+from identification import ErrorTable, Experiment, IdentificationError, PnlssModel, StructuredModel
 from rig.reproduce.folder import prepare
 from rig.reproduce.identified import Models, identify_all
 from rig.reproduce.options import Options
@@ -15,13 +15,19 @@ from rig.reproduce.true_responses import Truth
 
 __all__ = ["VARIANTS", "Study", "reproduce"]
 
-VARIANTS: dict[str, Callable[[PnlssFit], PnlssModel | None]] = {
-    "chosen on validation data": lambda fit: fit.model,
-    "last iterate": lambda fit: fit.last,
-    "chosen, monomials bounded": lambda fit: fit.model.bounded(),
-    "linear start": lambda fit: fit.linear,
+VARIANTS: dict[str, dict[str, Callable[[Any], PnlssModel | StructuredModel | None]]] = {
+    "pnlss": {
+        "chosen on validation data": lambda fit: fit.model,
+        "last iterate": lambda fit: fit.last,
+        "chosen, monomials bounded": lambda fit: fit.model.bounded(),
+        "linear start": lambda fit: fit.linear,
+    },
+    "structured": {
+        "fitted": lambda fit: fit.model,
+        "start": lambda fit: fit.start,
+    },
 }
-"""Models that a single fit offers, by their name in tables. The first is the identified model itself."""
+"""Models that a single fit offers, by the kind and by their name in tables. The first is the identified model itself."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,7 +50,7 @@ class Study:
     @property
     def table(self) -> ErrorTable:
         """Error table of the identified models themselves."""
-        return self.tables[next(iter(VARIANTS))]
+        return next(iter(self.tables.values()))
 
     def summary(self) -> dict[str, Any]:
         """Return everything in one JSON-able dictionary."""
@@ -52,6 +58,7 @@ class Study:
         return {
             "kind": "reproduction",
             "specimen": options.specimen.name,
+            "model": options.model,
             "input": options.input,
             "beside": list(options.beside),
             "saturating": options.saturating,
@@ -84,7 +91,7 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     if not models.fits:
         name, reason = next(iter(models.failures.items()))
         raise IdentificationError(f"no model could be identified; {name}: {reason}")
-    tables = {name: _table(options, models, levels, of) for name, of in VARIANTS.items()}
+    tables = {name: _table(options, models, levels, of) for name, of in VARIANTS[options.model].items()}
     table = next(iter(tables.values()))
     selected = {name: (model, models.fits[model].model) for name, model in table.selected.items()}
     found: list[Steady] = []
@@ -102,7 +109,7 @@ def _table(
     options: Options,
     models: Models,
     levels: Mapping[str, Sequence[Experiment]],
-    of: Callable[[PnlssFit], PnlssModel | None],
+    of: Callable[[Any], PnlssModel | StructuredModel | None],
 ) -> ErrorTable:
     variants = {name: of(fit) for name, fit in models.fits.items()}
     known = {name: model for name, model in variants.items() if model is not None}

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Exciter, Experiment, PnlssModel, pnlss_coupled_run
+from identification import Exciter, Experiment, PnlssModel, StructuredModel, pnlss_coupled_run
 from identification.channels import find_role
+from identification.pnlss.runs import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.reproduce.exciter import exciter_of
@@ -72,11 +73,11 @@ class SweepResult:
 
 
 def simulated_sweeps(
-    options: Options, models: Mapping[str, tuple[str, PnlssModel]], say: Callable[[str], None]
+    options: Options, models: Mapping[str, tuple[str, PnlssModel | StructuredModel]], say: Callable[[str], None]
 ) -> list[SweepResult]:
     """Simulate every sweep of the specimen with every selected model, from the measured input of the model.
 
-    Force-input models are also simulated from the voltage, with the exciter coupled.
+    PNLSS models with the force as input are also simulated from the voltage, with the exciter coupled.
     """
     found = []
     exciter = exciter_of(options, say) if options.input == "force" else None
@@ -88,7 +89,7 @@ def simulated_sweeps(
             (driven,) = training_data(options, recorded(options, sweep, say), given="voltage")
         for training_set, (name, model) in models.items():
             found.append(_simulated(sweep, plan, training_set, name, model, experiment))
-            if exciter is not None:
+            if exciter is not None and isinstance(model, PnlssModel):
                 found.append(_simulated(sweep, plan, training_set, name, model, driven, exciter))
     return found
 
@@ -98,11 +99,12 @@ def _simulated(
     plan: SweepPlan,
     training_set: str,
     name: str,
-    model: PnlssModel,
+    model: PnlssModel | StructuredModel,
     experiment: Experiment,
     exciter: Exciter | None = None,
 ) -> SweepResult:
-    if exciter is None:
+    run: SimulatedMotion
+    if exciter is None or isinstance(model, StructuredModel):
         run = model.simulate(experiment.inputs)
     else:
         lowest_hz = _LOWEST * min(plan.start_hz, plan.stop_hz)
@@ -130,7 +132,7 @@ def _simulated(
         frequency_hz=plan.start_hz + (plan.stop_hz - plan.start_hz) * share,
         measured=_largest(there, width),
         simulated=_largest(here, width),
-        rms_error=float(np.linalg.norm(here - there) / np.linalg.norm(there)) if run.bounded else float("inf"),
+        rms_error=float(np.linalg.norm(here - there) / np.linalg.norm(there)) if at is None else float("inf"),
         range_use=run.range_use,
         unbounded_at_s=at,
     )
