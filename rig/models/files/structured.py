@@ -15,6 +15,10 @@ from rig.text.console import number, print_table
 __all__ = ["STRUCTURED", "IdentifiedStructured", "functions_of"]
 
 
+_LEAST_SUPPORT_N_M = 1e-3
+"""Stiffness of the support below which it counts as none."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedStructured(SimulatedModel):
     """A structured model and its origin.
@@ -171,7 +175,7 @@ def _say(summary: dict[str, Any]) -> None:
             for index, element in enumerate(summary["elements"], 1)
         ],
     )
-    if summary["support_n_m"] > 0.0:
+    if summary["support_n_m"] > _LEAST_SUPPORT_N_M:
         print(f"unseen support at the drive point: {number(summary['support_n_m'], '.4g')} N/m")
     say_errors(summary)
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import rig
 from identification import NonlinearElement
-from identification.structured.laws import Iwan, Jenkins, PolynomialSpring, UserSpring
+from identification.structured.laws import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.models.files.files import load, save
@@ -215,6 +215,14 @@ def test_a_file_that_lacks_an_array_is_named(tmp_path):
         del file["arrays/model/direct"]
     with pytest.raises(RecordingError, match=r"m\.h5: "):
         load(tmp_path / "m.h5")
+
+
+def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
+    page = (Path(__file__).parents[3] / "docs/how-to/identify-a-structured-model.md").read_text(encoding="utf-8")
+    for name in sorted(set(LAWS) - {"user-spring"}):
+        (law,) = StructuredOptions(laws=name).for_fit()["laws"]
+        assert isinstance(law, LAWS[name])
+        assert f"`{name}`" in page
 
 
 @pytest.mark.parametrize(
