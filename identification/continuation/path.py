@@ -34,7 +34,7 @@ class Steps:
         A solution is accepted once the length of the last Newton correction is at most this.
     kinks
         Whether the curve may have kinks, as where dry friction begins to slip. Where even the shortest step fails, the path
-        then goes on along the tangent just ahead.
+        then goes on along the tangent just ahead, within 90 degrees of its own.
     """
 
     first: float = 0.02

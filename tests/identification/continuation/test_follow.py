@@ -142,3 +142,30 @@ def test_newton_says_where_there_is_no_solution() -> None:
         continued(circle, [1.0], 2.0, lowest=-1.0, highest=1.0)
     with pytest.raises(IdentificationError, match="largest: is 0, must be finite and above zero"):
         Steps(largest=0.0)
+
+
+def bent(z: Float, p: float) -> Answer:
+    """``z = 0`` below p = 0.5, a line of slope 5 above it."""
+    slope = 5.0 if p > 0.5 else 0.0
+    return np.array([z[0] - slope * (p - 0.5)]), np.array([[1.0]]), np.array([-slope])
+
+
+def peaked(z: Float, p: float) -> Answer:
+    """``p = 1 - |z - 1|/2``."""
+    return np.array([p - 1.0 + 0.5 * abs(z[0] - 1.0)]), np.array([[0.5 * np.sign(z[0] - 1.0)]]), np.array([1.0])
+
+
+def test_a_curve_goes_on_behind_a_kink_if_kinks_are_allowed() -> None:
+    assert continued(bent, [0.0], 0.0, highest=1.0).ending == "step"
+    path = continued(bent, [0.0], 0.0, highest=1.0, steps=Steps(kinks=True))
+    assert path.ending == "range"
+    np.testing.assert_allclose(path.unknowns[:, 0], np.maximum(5.0 * (path.parameter - 0.5), 0.0), atol=1e-9)
+    assert path.unknowns[-1, 0] == pytest.approx(2.5)
+
+
+def test_a_kink_at_which_the_parameter_turns_back_is_a_turning_point() -> None:
+    path = continued(peaked, [-0.8], 0.1, lowest=-1.0, highest=2.0, steps=Steps(kinks=True))
+    assert path.ending == "range"
+    assert path.unknowns[-1, 0] == pytest.approx(5.0)
+    assert path.turning_parameter == pytest.approx([1.0], abs=1e-4)
+    assert path.turning_unknowns[:, 0] == pytest.approx([1.0], abs=1e-4)
