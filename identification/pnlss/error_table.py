@@ -12,6 +12,7 @@ from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.many import ModelJob
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulators import Simulator
 
 __all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest"]
 

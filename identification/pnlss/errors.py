@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,8 @@ from identification.pnlss.fitting.initial_states import SAMPLES, fitted_initial_
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulators import Follower, SimulatedMotion, Simulator
 from identification.validation import read_only
-
-if TYPE_CHECKING:
-    from identification.pnlss.runs import SimulatedMotion, Simulator
 
 __all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
 
@@ -72,10 +69,12 @@ class PnlssErrors:
         return int(np.count_nonzero(~self.bounded))
 
 
-def pnlss_errors(model: "PnlssModel | Simulator", experiments: Sequence[Experiment], *, samples: int = SAMPLES) -> PnlssErrors:
+def pnlss_errors(
+    model: PnlssModel | Simulator, experiments: Sequence[Experiment], *, samples: int = SAMPLES
+) -> PnlssErrors:
     """Simulate each experiment and compare; an initial state to be estimated is fitted to the first ``samples`` samples.
 
-    A model of another kind is simulated from rest.
+    A model of another kind begins from rest, or as it does itself (`identification.pnlss.simulators.Follower`).
 
     Raises `IdentificationError` if there are no experiments, their channels or sample rates differ from the model's, or an
     output is zero where it counts.
@@ -92,6 +91,8 @@ def pnlss_errors(model: "PnlssModel | Simulator", experiments: Sequence[Experime
         if isinstance(model, PnlssModel) and experiment.initial_state == "estimated":
             begin = estimated_initial_state(model, experiment, samples=samples)
             run: SimulatedMotion = model.simulate(experiment.inputs, initial_state=begin)
+        elif isinstance(model, Follower):
+            run = model.simulate_experiment(experiment)
         else:
             run = model.simulate(experiment.inputs)
         bounded[index], use[index] = run.unbounded_at is None, run.range_use

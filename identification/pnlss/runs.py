@@ -1,57 +1,21 @@
 """Experiments as a model simulates them: errors, their spectra, and a stretch of time. For any model that can be simulated."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.pnlss.errors import estimated_initial_state
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.checks import check_not_zero
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulators import Follower, SimulatedMotion, Simulator
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 
-__all__ = ["SimulatedMotion", "Simulator", "error_spectra", "output_stretch", "simulated_run"]
+__all__ = ["error_spectra", "output_stretch", "simulated_run"]
 
 Float = NDArray[np.float64]
-
-
-class SimulatedMotion(Protocol):
-    """What a simulation returns: `identification.Simulation`, for example."""
-
-    @property
-    def outputs(self) -> Float:
-        """float[n_outputs, n]."""
-
-    @property
-    def unbounded_at(self) -> int | None:
-        """First sample at which the run is unbounded; None if there is none."""
-
-    @property
-    def range_use(self) -> float:
-        """Largest of what the model knows the trained range of over that range; inf if unbounded, NaN if unknown."""
-
-
-class Simulator(Protocol):
-    """A model that is simulated from rest with the inputs of an experiment."""
-
-    @property
-    def inputs(self) -> tuple[Channel, ...]:
-        """Input channels."""
-
-    @property
-    def outputs(self) -> tuple[Channel, ...]:
-        """Output channels."""
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """Sample rate of inputs and outputs."""
-
-    def simulate(self, inputs: Any, /) -> SimulatedMotion:
-        """Return the run under ``inputs``, float[n_inputs, n]."""
 
 
 def simulated_run(
@@ -149,7 +113,7 @@ def _simulated(model: Simulator, experiment: Experiment, initial_state: Float | 
         raise IdentificationError(
             f"experiment '{experiment.name}': does not begin at rest, as a {type(model).__name__} does"
         )
-    return model.simulate(experiment.inputs)
+    return model.simulate_experiment(experiment) if isinstance(model, Follower) else model.simulate(experiment.inputs)
 
 
 def check_channels(model: Simulator, experiment: Experiment) -> None:

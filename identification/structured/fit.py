@@ -16,9 +16,10 @@ from identification.pnlss.experiment import Experiment, same_channels
 from identification.pnlss.fitting.threads import threads
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
-from identification.structured.model import StructuredModel
+from identification.structured.modal_motion import measured_velocity
+from identification.structured.model import LEAD, StructuredModel
 from identification.structured.parameters import Parameters
-from identification.structured.start import linear_start, measured_velocity, with_element
+from identification.structured.start import linear_start, with_element
 from vibrolock.results import Result
 
 __all__ = ["StructuredFit", "fit_structured"]
@@ -28,8 +29,6 @@ Float = NDArray[np.float64]
 _ROUGH, _FINE = 1e-3, 1e-5
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
 _EVALUATIONS = 100
-_LEAD = 0.05
-"""Damping ratio of the forces that lead the measured modes before the samples that count."""
 _STAGES = {
     False: ((0.05, False), (0.01, False), (0.0, False)),
     True: ((0.05, False), (0.01, False), (0.01, True), (0.0, True)),
@@ -126,10 +125,13 @@ def fit_structured(
             raise IdentificationError(
                 f"experiments[{number}].initial_state: is '{experiment.initial_state}', allowed is zero, a run from rest"
             )
+    if steps < 1:
+        raise IdentificationError(f"steps: is {steps}, allowed is 1 or above")
     if not laws:
         raise IdentificationError("laws: is empty, needs one at least")
     linear = linear_start(modes, first, steps)
-    start = with_element(linear, experiments, len(modes.frequency_hz), laws, reach)
+    led = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
+    start = with_element(linear, experiments, led, laws, reach)
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
     start = replace(start, support_largest_n=largest)
     start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
@@ -137,7 +139,7 @@ def fit_structured(
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     moves = int(np.argmax(np.abs(start.elements[0].direction)))
     found, evaluations = start, 0
-    measured = np.arange(len(linear.omega)) < len(modes.frequency_hz)
+    measured = np.arange(len(linear.omega)) < led
     slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
     for ratio, free in _STAGES[support]:
         if free and not found.support_n_m:
@@ -147,7 +149,7 @@ def fit_structured(
         settled = [_prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
         leads = [
             Lead(
-                2.0 * _LEAD * linear.omega * measured,
+                2.0 * LEAD * linear.omega * measured,
                 2.0 * ratio * linear.omega * measured,
                 measured_velocity(linear, e, int(measured.sum())),
                 e.counted_from - count * e.period_samples,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from identification.structured.model import ends_of_steps
 from identification.structured.steps import System
 
-__all__ = ["Lead", "led", "not_led", "own_shapes"]
+__all__ = ["Lead", "not_led", "own_shapes"]
 
 Float = NDArray[np.float64]
 
@@ -40,11 +40,6 @@ class Lead:
     def inputs(self, ends: Float, steps: int) -> Float:
         """Return inputs at the ends of steps with one more for each mode."""
         return np.ascontiguousarray(np.hstack([ends, ends_of_steps(self.velocity, steps)]))
-
-
-def led(system: System, rate: Float) -> System:
-    """Return the system with more damping, and with one more input for each mode."""
-    return system._replace(zeta=system.zeta + 0.5 * rate / system.omega, b=np.hstack([system.b, np.diag(rate)]))
 
 
 def not_led(derivatives: Float, system: System, rate: Float) -> Float:

@@ -8,8 +8,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel
 from identification.errors import IdentificationError
+from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement, tables_of
-from identification.structured.steps import Room, System, run
+from identification.structured.modal_motion import measured_velocity
+from identification.structured.steps import Room, System, led, run
 from identification.validation import finite_array, positive
 from vibrolock.results import Result
 
@@ -19,6 +21,8 @@ Float = NDArray[np.float64]
 
 _SOFTEST, _STIFFEST = -0.5, 4.0
 """Slopes of the springs beyond their reach, relative to the static stiffness in their direction, all elements together."""
+LEAD = 0.05
+"""Damping ratio of the forces that lead a simulation to the measured motion before the samples that count."""
 _WINDOW = ("kaiser", 8.0)
 
 
@@ -63,7 +67,8 @@ class StructuredModel(Result):
 
     with mass-normalised modal coordinates q. Outputs are ``C q``, ``C q'`` or ``C q''`` by the unit of their channel, plus
     ``D u``. s is the static force of a support at the first input that a piezoelectric sensor does not show: minus
-    ``support_n_m`` times the low-passed displacement of the first input, at most ``support_largest_n``.
+    ``support_n_m`` times the displacement of the first input behind two low-passes, at most ``support_largest_n``. One
+    low-pass alone would do work on vibrations far above its corner.
 
     The simulation takes ``steps`` steps of the implicit midpoint rule in each sample, with discrete gradients of the potential
     energies (`identification.structured.steps`): over each step the energy changes by the work of the input less that of the
@@ -92,7 +97,7 @@ class StructuredModel(Result):
     steps
         Steps in a sample.
     support_n_m, support_corner_hz, support_largest_n
-        Stiffness of the unseen support, corner of its low-pass (that of the sensor's high-pass), and its largest force.
+        Stiffness of the unseen support, corner of its low-passes (that of the sensor's high-pass), and its largest force.
     specimen
         Name of the test specimen.
     training
@@ -203,10 +208,17 @@ class StructuredModel(Result):
         u = finite_array("inputs", inputs, np.float64, 2)
         if len(u) != len(self.inputs):
             raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
-        system, modes = self.system, len(self.omega)
-        states = np.zeros((u.shape[1], 3, modes))
-        room = room_for(system)
-        run(system, room, ends_of_steps(u, self.steps), np.zeros(system.size), states)
+        system = self.system
+        return self._run([system, system], 0, u, ends_of_steps(u, self.steps))
+
+    def _run(self, systems: Sequence[System], until: int, u: Float, ends: Float) -> Motion:
+        """Simulate from rest, up to sample ``until`` with the first system and then with the second."""
+        system, n = systems[0], u.shape[1]
+        states, state, unsolved = np.zeros((n, 3, len(self.omega))), np.zeros(system.size), 0
+        for part, first, last in zip(systems, (0, until), (until, n), strict=True):
+            room = room_for(part)
+            run(part, room, ends[first * self.steps : last * self.steps + 1], state, states[first:last])
+            unsolved += int(room.unsolved[0])
         largest = np.max(np.abs(states[:, 0] @ system.phi.T), axis=0, initial=0.0)
         return Motion(
             outputs=outputs_of(self, u, states),
@@ -214,12 +226,28 @@ class StructuredModel(Result):
             velocity=states[:, 1].T,
             acceleration=states[:, 2].T,
             reach_use=np.asarray(largest / system.tables.limits[:, 0]),
-            unsolved_steps=int(room.unsolved[0]),
+            unsolved_steps=unsolved,
             range_use=max(
                 (float(x / e.largest) for x, e in zip(largest, self.elements, strict=True) if e.largest),
                 default=float("nan"),
             ),
         )
+
+    def simulate_experiment(self, experiment: Experiment) -> Motion:
+        """Return the motion under the inputs of an experiment.
+
+        A periodic one begins with the measured motion: up to the samples that count, a force on every mode whose motion the
+        outputs tell apart leads it to the measured velocity. Where several steady vibrations are possible, the run is thus on
+        the measured branch. Others begin at rest.
+        """
+        if not experiment.period_samples:
+            return self.simulate(experiment.inputs)
+        modes, until = len(self.omega), experiment.counted_from
+        rate = 2.0 * LEAD * self.omega * (np.arange(modes) < len(self.outputs))
+        velocity = measured_velocity(self, experiment, min(modes, len(self.outputs)))
+        free = self.system
+        ends = np.hstack([ends_of_steps(experiment.inputs, self.steps), ends_of_steps(velocity, self.steps)])
+        return self._run([led(free, rate), led(free, 0.0 * rate)], until, experiment.inputs, np.ascontiguousarray(ends))
 
     def trained_with(self, runs: Sequence[ArrayLike]) -> "StructuredModel":
         """Return the model with the largest displacements of its elements under ``runs``, float[n_inputs, n] each."""

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from identification.linear.modes import LinearModes
 from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
-from identification.structured.leading import Lead, led, not_led, own_shapes
+from identification.structured.leading import Lead, not_led, own_shapes
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
 from identification.structured.sensitivities import run_with_sensitivities
+from identification.structured.steps import led
 
 __all__ = ["Parameters"]
 

@@ -207,16 +207,20 @@ def end_sliders(
 def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: np.ndarray) -> None:
     """Take the sensitivities of displacements, velocities and support to the end of the step."""
     n, h, inputs = half.size, system.step_s, system.b.shape[1]
-    alpha = 0.5 * h * system.support[1]
+    alpha, last = 0.5 * h * system.support[1], sens.shape[0] - 1
     for c in range(sens.shape[1]):
         moved = 0.0
         for i in range(n):
             moved += system.b[i, 0] * (sens[i, c] + 0.5 * h * rhs[i, c])
             sens[i, c] += h * rhs[i, c]
             sens[n + i, c] = 2.0 * rhs[i, c] - sens[n + i, c]
-        sens[2 * n, c] = ((1.0 - alpha) * sens[2 * n, c] + 2.0 * alpha * moved) / (1.0 + alpha)
+        before = sens[last, c]
+        sens[last, c] = ((1.0 - alpha) * before + 2.0 * alpha * moved) / (1.0 + alpha)
+        sens[2 * n, c] = ((1.0 - alpha) * sens[2 * n, c] + alpha * (before + sens[last, c])) / (1.0 + alpha)
     for i in range(n):
-        sens[2 * n, 2 * n + i * inputs] += 2.0 * alpha * half[i] / (1.0 + alpha)
+        change = 2.0 * alpha * half[i] / (1.0 + alpha)
+        sens[last, 2 * n + i * inputs] += change
+        sens[2 * n, 2 * n + i * inputs] += alpha * change / (1.0 + alpha)
 
 
 @unlocked_kernel

@@ -8,22 +8,23 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.channels import MOTION_ORDER, find_name
+from identification.channels import find_name
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
 from identification.structured.kernels import slide_along
 from identification.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, Law, Spring
+from identification.structured.modal_motion import LOWEST, modal_spectra
 from identification.structured.model import StructuredModel
 
-__all__ = ["linear_start", "measured_velocity", "with_element"]
+__all__ = ["linear_start", "with_element"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_LOWEST, _HIGHEST = 0.2, 6.0
-"""Lines of the regression, relative to the frequency of the mode."""
+_HIGHEST = 6.0
+"""Highest line of the regression, relative to the frequency of the mode."""
 _POSITIONS = np.linspace(-1.0, 1.0, 21)
 """Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
 _RESIDUAL_DAMPING = 0.02
@@ -87,7 +88,7 @@ def with_element(
     periodic = [experiment for experiment in experiments if experiment.period_samples]
     if not periodic:
         raise IdentificationError("experiments: none is periodic, needs one at least for the initial values")
-    coordinates = [_modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
+    coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
     sizes = [np.sqrt(np.mean(np.abs(q) ** 2, axis=1)) for q, _, _ in coordinates]
     mode = int(np.argmax(np.max(sizes, axis=0)))
     shape = float(linear.input_shapes[mode, 0])
@@ -129,17 +130,6 @@ def _started(law: Law, numbers: Float, scale: float) -> Law:
     return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})
 
 
-def measured_velocity(linear: StructuredModel, experiment: Experiment, measured_modes: int) -> Float:
-    """float[n_modes, n]: modal velocities of a periodic experiment in all its samples; zero for modes that are not measured."""
-    q, _, omega = _modal_spectra(linear, experiment, measured_modes)
-    n = experiment.period_samples
-    period = np.fft.irfft(1j * omega * q, n, axis=1) * n
-    samples = (np.arange(experiment.inputs.shape[1]) - experiment.counted_from) % n
-    velocity = np.zeros((len(linear.omega), samples.size))
-    velocity[:measured_modes] = period[:, samples]
-    return velocity
-
-
 def _root(function: Callable[[float], float], places: Float) -> float:
     """Return the root nearest to zero between two of the places; without a change of sign the place of the least value."""
     from scipy.optimize import brentq  # only on use: it takes long to load
@@ -151,27 +141,6 @@ def _root(function: Callable[[float], float], places: Float) -> float:
     middles = 0.5 * (places[crossings] + places[crossings + 1])
     at = crossings[np.argmin(np.abs(middles))]
     return float(brentq(function, places[at], places[at + 1], rtol=1e-6))
-
-
-def _modal_spectra(linear: StructuredModel, experiment: Experiment, modes: int) -> tuple[Complex, Complex, Float]:
-    """Amplitudes (of the FFT over its length) of modal coordinates and input of the mean period, and frequencies in rad/s."""
-    n = experiment.period_samples
-    inputs, outputs = (
-        np.fft.rfft(values.reshape(len(values), -1, n).mean(axis=1), axis=1) / n
-        for values in (experiment.counted_inputs, experiment.counted_outputs)
-    )
-    omega = 2.0 * np.pi * np.fft.rfftfreq(n, 1.0 / experiment.sample_rate_hz)
-    moving = np.zeros_like(outputs)
-    moving[:, 1:] = [
-        row[1:] / (1j * omega[1:]) ** MOTION_ORDER[channel.motion]
-        for row, channel in zip(outputs, experiment.output_channels, strict=True)
-    ]
-    above = slice(modes, None)
-    residual = linear.output_shapes[:, above] @ (linear.input_shapes[above] / linear.omega[above, None] ** 2)
-    moving = moving - residual @ inputs
-    q = np.linalg.pinv(linear.output_shapes[:, :modes]) @ moving
-    q[:, omega < _LOWEST * linear.omega[0]] = 0.0
-    return q, inputs, np.asarray(omega, dtype=np.float64)
 
 
 class _Equation:
@@ -187,7 +156,7 @@ class _Equation:
     ) -> None:
         coordinates, inputs, omega = spectra
         own = linear.omega[mode]
-        self.lines = (omega > _LOWEST * own) & (omega < _HIGHEST * own)
+        self.lines = (omega > LOWEST * own) & (omega < _HIGHEST * own)
         dynamic = own**2 - omega**2 + 2j * linear.damping_ratio[mode] * own * omega
         left = linear.input_shapes[mode] @ inputs - dynamic * coordinates[mode]
         self.left, self.phi, self.q = left[self.lines], phi, q

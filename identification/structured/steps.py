@@ -20,7 +20,19 @@ from identification.structured.elements import Tables
 from identification.structured.kernels import damping_at, slide, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["Room", "System", "accelerate", "along", "end_step", "rigidity", "run", "solve", "take_input", "take_step"]
+__all__ = [
+    "Room",
+    "System",
+    "accelerate",
+    "along",
+    "end_step",
+    "led",
+    "rigidity",
+    "run",
+    "solve",
+    "take_input",
+    "take_step",
+]
 
 NEWTON = 60  # iterations at most; a step that is not solved by then is counted
 CAREFUL = 12  # iterations with whole steps; those after them are halved
@@ -49,8 +61,13 @@ class System(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Size of the state: displacements, velocities, the support's filter, forces of the sliders."""
-        return 2 * len(self.omega) + 1 + len(self.tables.sliders)
+        """Size of the state: displacements, velocities, the support's filter, sliders, first stage of the filter."""
+        return 2 * len(self.omega) + 2 + len(self.tables.sliders)
+
+
+def led(system: System, rate: np.ndarray) -> System:
+    """Return the system with more damping, and with one more input for each mode."""
+    return system._replace(zeta=system.zeta + 0.5 * rate / system.omega, b=np.hstack([system.b, np.diag(rate)]))
 
 
 class Room(NamedTuple):
@@ -223,7 +240,10 @@ def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np
         there += system.b[i, 0] * (q[i] + 0.5 * system.step_s * room.mean[i])
         q[i] += system.step_s * room.mean[i]
         v[i] = 2.0 * room.mean[i] - v[i]
-    state[2 * q.size] = ((1.0 - alpha) * state[2 * q.size] + 2.0 * alpha * there) / (1.0 + alpha)
+    last = state.size - 1
+    before = state[last]
+    state[last] = ((1.0 - alpha) * before + 2.0 * alpha * there) / (1.0 + alpha)
+    state[2 * n] = ((1.0 - alpha) * state[2 * n] + alpha * (before + state[last])) / (1.0 + alpha)
 
 
 @unlocked_kernel

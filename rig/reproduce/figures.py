@@ -49,7 +49,11 @@ def _errors(page: "Figure", study: Study) -> None:
     says which levels the study does not have.
     """
     sets = study.table.training_sets
-    shown = tuple(study.tables) if len(sets) == 1 else tuple(name for name in study.tables if name in (next(iter(study.tables)), _LINEAR))
+    shown = (
+        tuple(study.tables)
+        if len(sets) == 1
+        else tuple(name for k, name in enumerate(study.tables) if k == 0 or name == _LINEAR)
+    )
     tables = {name: study.tables[name] for name in shown if name in study.tables}
     axes = grid(page, 1, len(sets))[0]
     tests = [test for test in (SAME_LEVEL, *study.table.levels) if _tested(study.table, test)]

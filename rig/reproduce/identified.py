@@ -93,7 +93,7 @@ def identify_all(
     files = {job.name: _file(options, job.name) for job in jobs}
     fits: dict[str, Any] = {name: _kept(options, path) for name, path in files.items() if path.exists()}
     failures: dict[str, str] = {}
-    identify = _structured(options, say) if options.model == "structured" else _pnlss(options)
+    identify: Callable[..., Any] = _structured(options, say) if options.model == "structured" else _pnlss(options)
     for found in identify_many(jobs, identify, n_jobs=options.jobs, done=fits):
         if found.fit is None:
             failures[found.name] = found.reason

@@ -100,17 +100,12 @@ def _predicted(
     options: Options, model: PnlssModel | StructuredModel, truth: Truth, exciter: Exciter | None
 ) -> tuple[SteadyPrediction | None, str]:
     low, high = options.specimen.band_hz
-    how = {
-        "force": truth.held,
-        "exciter": exciter if truth.held == "fundamental" else None,
-        "lowest_hz": low,
-        "highest_hz": high,
-    }
+    used = exciter if truth.held == "fundamental" else None
+    respond: Any = structured_frequency_response if isinstance(model, StructuredModel) else pnlss_frequency_response
     try:
-        if isinstance(model, StructuredModel):
-            found = structured_frequency_response(model, truth.level, **how)
-        else:
-            found = pnlss_frequency_response(model, truth.level, **how)
+        found: SteadyPrediction = respond(
+            model, truth.level, force=truth.held, exciter=used, lowest_hz=low, highest_hz=high
+        )
     except IdentificationError as error:
         return None, str(error)
     return found, ""

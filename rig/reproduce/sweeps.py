@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from identification import Exciter, Experiment, PnlssModel, StructuredModel, pnlss_coupled_run
 from identification.channels import find_role
-from identification.pnlss.runs import SimulatedMotion
+from identification.pnlss.simulators import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.reproduce.exciter import exciter_of

@@ -14,6 +14,7 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.threads import available_threads
 from identification.pnlss.model import PnlssModel
+from identification.pnlss.simulators import Simulator
 
 __all__ = [
     "available_bytes",
@@ -31,7 +32,7 @@ _SQUARES = 6
 """Parameter-sized square matrices held at once: normal equations, those of one experiment, eigenvectors, work space."""
 
 
-def belongs(model: PnlssModel, experiment: Experiment, what: str) -> None:
+def belongs(model: PnlssModel | Simulator, experiment: Experiment, what: str) -> None:
     """Raise `IdentificationError` unless the experiment has the channels and the sample rate of the model."""
     if abs(experiment.sample_rate_hz / model.sample_rate_hz - 1.0) > 1e-9:
         raise IdentificationError(

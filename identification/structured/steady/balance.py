@@ -92,9 +92,9 @@ class StructuredBalance(DrivenBalance):
         h, corner = np.arange(1, basis.harmonics + 1), 2.0 * np.pi * model.support_corner_hz
         low_pass, slope = np.zeros((2, basis.size, basis.size))
         low_pass[0, 0] = self._mean_supported
-        gain = np.asarray(1.0 / (1.0 + 1j * h * w / corner), dtype=np.complex128)
+        stage = np.asarray(1.0 / (1.0 + 1j * h * w / corner), dtype=np.complex128)
         for k, (factor, by_w) in enumerate(
-            zip(complex_product(gain), complex_product(-1j * h / corner * gain**2), strict=True)
+            zip(complex_product(stage**2), complex_product(-2j * h / corner * stage**3), strict=True)
         ):
             here = slice(2 * k + 1, 2 * k + 3)
             low_pass[here, here], slope[here, here] = factor, by_w

@@ -17,7 +17,7 @@ from identification import (
     simulated_run,
 )
 from identification.packing import pack_all, unpack_all
-from identification.pnlss.runs import Simulator
+from identification.pnlss.simulators import Simulator
 from rig.models.files.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result

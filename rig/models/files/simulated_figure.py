@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import Channel, ErrorSpectra, OutputStretch
-    from identification.pnlss.runs import Simulator
+    from identification.pnlss.simulators import Simulator
     from rig.models.files.simulated import SimulatedModel
 
 __all__ = ["channels_of", "draw_simulated"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from identification import Experiment
-from identification.pnlss.runs import Simulator
+from identification.pnlss.simulators import Simulator
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording

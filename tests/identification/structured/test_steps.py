@@ -27,7 +27,7 @@ def energy(system, state):
     n = system.omega.size
     q, v = state[:n], state[n : 2 * n]
     stored = 0.5 * v @ v + 0.5 * np.sum((system.omega * q) ** 2)
-    stored += np.sum(0.5 * state[2 * n + 1 :] ** 2 / system.tables.sliders[:, 0])
+    stored += np.sum(0.5 * state[2 * n + 1 : -1] ** 2 / system.tables.sliders[:, 0])
     return stored + sum(spring(system, e, float(phi @ q))[2] for e, phi in enumerate(system.phi))
 
 
@@ -73,7 +73,7 @@ def continuous(model, u, times):
     def rates(t, x):
         q, v = x[:2], x[2:4]
         force = np.interp(t, times, u)
-        force -= model.support_largest_n * np.tanh(model.support_n_m * x[4] / model.support_largest_n)
+        force -= model.support_largest_n * np.tanh(model.support_n_m * x[5] / model.support_largest_n)
         a = b * force - 2.0 * zeta * omega * v - omega**2 * q
         for e, element in enumerate(model.elements):
             z, rate = element.direction @ q, element.direction @ v
@@ -81,7 +81,7 @@ def continuous(model, u, times):
             if e == 0:
                 force = force + element.laws[1].damping(z / element.scale_m) * rate
             a -= element.direction * force
-        return np.concatenate([v, a, [2.0 * np.pi * model.support_corner_hz * (b @ q - x[4])]])
+        return np.concatenate([v, a, 2.0 * np.pi * model.support_corner_hz * np.array([b @ q - x[4], x[4] - x[5]])])
 
     return rates
 
@@ -97,7 +97,7 @@ def test_the_run_tends_to_the_solution_of_the_equation_with_the_square_of_the_st
         found = solve_ivp(
             continuous(model, ends, times),
             (0.0, times[-1]),
-            np.zeros(5),
+            np.zeros(6),
             method="DOP853",
             t_eval=times[:-1:steps],
             rtol=1e-9,
@@ -206,7 +206,7 @@ def test_whatever_the_coefficients_the_potential_energy_rises_far_away(springs, 
 
     def potential(far):
         q = far * direction
-        return energy(system, np.concatenate([q, np.zeros(3)])) / max(
+        return energy(system, np.concatenate([q, np.zeros(4)])) / max(
             far * far * np.sum((system.omega * direction) ** 2), 1e-9
         )
 
@@ -231,7 +231,7 @@ def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
     held = ends_of_steps(forces[seed % 3][None], model.steps)[:-1, 0]
     integral = np.cumsum(held**2)[:: model.steps] / (RATE_HZ * model.steps)
     bound = np.sum(model.input_shapes[:, 0] ** 2) / (4.0 * slowest) * integral
-    states = np.vstack([found.displacement, found.velocity, np.zeros((1, samples))]).T
+    states = np.vstack([found.displacement, found.velocity, np.zeros((2, samples))]).T
     energies = np.array([energy(model.system, state) for state in states])
     assert np.max(found.reach_use) > 3.0
     assert np.all(energies[1:] <= bound[1:] + 1e-9)

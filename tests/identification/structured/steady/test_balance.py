@@ -47,7 +47,7 @@ def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
     s = 2j * np.pi * found.points.frequency_hz[:, None]
     b = model.input_shapes[:, 0]
     modes = 1.0 / (model.omega**2 + 2.0 * model.damping_ratio * model.omega * s + s**2)
-    filtered = 800.0 / (1.0 + s / (2.0 * np.pi * model.support_corner_hz))
+    filtered = 800.0 / (1.0 + s / (2.0 * np.pi * model.support_corner_hz)) ** 2
     receptance = modes @ b**2
     share = 1.0 / (1.0 + filtered[:, 0] * receptance)  # of the force, beside the support
     exact = 0.01 * ((s**model.motions) * ((modes * b) @ model.output_shapes.T) * share[:, None] + model.direct[:, 0])
@@ -111,7 +111,7 @@ def test_the_work_of_the_force_is_what_dampers_and_sliders_lose(make):
                     before, r = r, float(np.clip(r + stiffness * (x[k] - x[k - 1]), -strength, strength))
                     work += repeat * 0.5 * (before + r) * (x[k] - x[k - 1])
             lost += work * w / (2.0 * np.pi)
-    low_pass = 1.0 / (1.0 + 1j * h[:, 0] * w / (2.0 * np.pi * model.support_corner_hz))
+    low_pass = 1.0 / (1.0 + 1j * h[:, 0] * w / (2.0 * np.pi * model.support_corner_hz)) ** 2
     there = at @ model.input_shapes[:, 0]
     support = 0.5 * np.sum(np.real(model.support_n_m * low_pass * there * np.conj(1j * h[:, 0] * w * there)))
     assert by_modes < 0.97 * given
