@@ -42,7 +42,7 @@ Responses and errors of PNLSS models
     realisation_combinations
 Structured models
     fit_structured, StructuredModel, StructuredFit, NonlinearElement, structured_backbone,
-    structured_frequency_response, structured_response, structured_steady_state
+    structured_frequency_response, structured_response, structured_steady_state, bound_of, Bound
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
@@ -126,6 +126,7 @@ if TYPE_CHECKING:
     from identification.slow_flows.continuous import ContinuousBackbone, continuous_backbone
     from identification.slow_flows.short_points import ShortPoint, short_point
     from identification.slow_flows.slow_flow import SlowFlow, slow_flow
+    from identification.structured.bound import Bound, bound_of
     from identification.structured.elements import NonlinearElement
     from identification.structured.fit import StructuredFit, fit_structured
     from identification.structured.model import StructuredModel
@@ -141,6 +142,7 @@ else:
         {
             "Backbone": "backbones",
             "BackboneMapping": "mapping.backbone",
+            "Bound": "structured.bound",
             "Channel": "channels",
             "Comparison": "prediction.comparison",
             "ConstantForceCurve": "response_control.curves",
@@ -205,6 +207,7 @@ else:
             "VoltageSweep": "prediction.sweep_inputs",
             "best_linear_approximation": "multisine.best_linear_approximation",
             "best_linear_responses": "pnlss.best_linear",
+            "bound_of": "structured.bound",
             "coherence": "multisine.best_linear_approximation",
             "combined": "nonlinear.repeatability",
             "compare": "prediction.comparison",
@@ -271,6 +274,7 @@ else:
 __all__ = [
     "Backbone",
     "BackboneMapping",
+    "Bound",
     "Channel",
     "Comparison",
     "ConstantForceCurve",
@@ -335,6 +339,7 @@ __all__ = [
     "VoltageSweep",
     "best_linear_approximation",
     "best_linear_responses",
+    "bound_of",
     "coherence",
     "combined",
     "compare",

@@ -16,7 +16,7 @@ from identification.pnlss.experiment import Experiment, same_channels
 from identification.pnlss.fitting.threads import threads
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
-from identification.structured.modal_motion import measured_velocity
+from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.model import LEAD, StructuredModel
 from identification.structured.parameters import Parameters
 from identification.structured.start import linear_start, with_element
@@ -34,8 +34,6 @@ _STAGES = {
     True: ((0.05, False), (0.01, False), (0.01, True), (0.0, True)),
 }
 """Damping ratio of the leading forces in each fit, and whether the support is free; by whether it is asked for."""
-_SETTLED, _LONGEST = 1e-2, 8
-"""Share of the led motion's error that is left when a simulation counts, and most periods that this may take."""
 _MISFIT = 0.01
 """Relative misfit of the samples against which the errors of the modal test are weighed."""
 _LARGEST_STATIC = 10.0
@@ -145,8 +143,8 @@ def fit_structured(
         if free and not found.support_n_m:
             found = replace(found, support_n_m=stiffness)
         # the last fit is free for so long before it counts that nothing is left of the lead
-        lengths = [0 if ratio or not e.period_samples else _settling_periods(e, slowest) for e in experiments]
-        settled = [_prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
+        lengths = [0 if ratio or not e.period_samples else settling_periods(e, slowest) for e in experiments]
+        settled = [prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
         leads = [
             Lead(
                 2.0 * LEAD * linear.omega * measured,
@@ -167,7 +165,7 @@ def fit_structured(
     freedom = max(problem.count - vector.size, 1)
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom
     return StructuredFit(
-        model=problem.parameters.model(vector).trained_with([experiment.inputs for experiment in experiments]),
+        model=problem.parameters.model(vector).trained_with(experiments),
         start=start,
         names=problem.parameters.names,
         values=vector,
@@ -177,29 +175,6 @@ def fit_structured(
         seconds=time.perf_counter() - began,
         stopped=problem.stopped,
     )
-
-
-def _settling_periods(experiment: Experiment, rate: float) -> int:
-    """Periods in which a motion that decays with ``rate`` (rad/s) falls to `_SETTLED`."""
-    seconds = experiment.period_samples / experiment.sample_rate_hz
-    return min(int(np.ceil(np.log(1.0 / _SETTLED) / (rate * seconds))), _LONGEST)
-
-
-def _prolonged(experiment: Experiment, periods: int) -> Experiment:
-    """Return an experiment with more periods before those that count."""
-    if not periods:
-        return experiment
-    inputs, outputs = (
-        np.concatenate(
-            [values[:, : experiment.counted_from], np.tile(one, periods), values[:, experiment.counted_from :]], axis=1
-        )
-        for values, one in (
-            (experiment.inputs, experiment.counted_inputs[:, : experiment.period_samples]),
-            (experiment.outputs, experiment.counted_outputs[:, : experiment.period_samples]),
-        )
-    )
-    begins = experiment.counted_from + periods * experiment.period_samples
-    return replace(experiment, inputs=inputs, outputs=outputs, counted_from=begins)
 
 
 class _Problem:

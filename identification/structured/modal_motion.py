@@ -1,5 +1,6 @@
 """Modal coordinates of a measured steady vibration, from the spectra of its outputs."""
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -8,13 +9,16 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER
 from identification.pnlss.experiment import Experiment
 
-__all__ = ["LOWEST", "measured_velocity", "modal_spectra"]
+__all__ = ["LOWEST", "measured_velocity", "modal_spectra", "prolonged", "settling_periods"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 LOWEST = 0.2
 """Lines below this share of the first frequency are left out: sensors of acceleration do not show such motion."""
+
+_SETTLED, _LONGEST = 1e-2, 8
+"""Share of the led motion's error that is left when a simulation counts, and most periods that this may take."""
 
 
 class Modal(Protocol):
@@ -63,3 +67,26 @@ def measured_velocity(linear: Modal, experiment: Experiment, measured_modes: int
     velocity = np.zeros((len(linear.omega), samples.size))
     velocity[:measured_modes] = period[:, samples]
     return velocity
+
+
+def settling_periods(experiment: Experiment, rate: float) -> int:
+    """Periods in which a motion that decays with ``rate`` (rad/s) falls to `_SETTLED`."""
+    seconds = experiment.period_samples / experiment.sample_rate_hz
+    return min(int(np.ceil(np.log(1.0 / _SETTLED) / (rate * seconds))), _LONGEST)
+
+
+def prolonged(experiment: Experiment, periods: int) -> Experiment:
+    """Return an experiment with more periods before those that count."""
+    if not periods:
+        return experiment
+    inputs, outputs = (
+        np.concatenate(
+            [values[:, : experiment.counted_from], np.tile(one, periods), values[:, experiment.counted_from :]], axis=1
+        )
+        for values, one in (
+            (experiment.inputs, experiment.counted_inputs[:, : experiment.period_samples]),
+            (experiment.outputs, experiment.counted_outputs[:, : experiment.period_samples]),
+        )
+    )
+    begins = experiment.counted_from + periods * experiment.period_samples
+    return replace(experiment, inputs=inputs, outputs=outputs, counted_from=begins)

@@ -10,7 +10,7 @@ from identification.channels import MOTION_ORDER, Channel
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement, tables_of
-from identification.structured.modal_motion import measured_velocity
+from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.steps import Room, System, led, run
 from identification.validation import finite_array, positive
 from vibrolock.results import Result
@@ -237,21 +237,25 @@ class StructuredModel(Result):
         """Return the motion under the inputs of an experiment.
 
         A periodic one begins with the measured motion: up to the samples that count, a force on every mode whose motion the
-        outputs tell apart leads it to the measured velocity. Where several steady vibrations are possible, the run is thus on
-        the measured branch. Others begin at rest.
+        outputs tell apart leads it to the measured velocity; periods that are not returned follow without that force. Where
+        several steady vibrations are possible, the run is thus on the measured branch. Other experiments begin at rest.
         """
         if not experiment.period_samples:
             return self.simulate(experiment.inputs)
-        modes, until = len(self.omega), experiment.counted_from
-        rate = 2.0 * LEAD * self.omega * (np.arange(modes) < len(self.outputs))
-        velocity = measured_velocity(self, experiment, min(modes, len(self.outputs)))
-        free = self.system
-        ends = np.hstack([ends_of_steps(experiment.inputs, self.steps), ends_of_steps(velocity, self.steps)])
-        return self._run([led(free, rate), led(free, 0.0 * rate)], until, experiment.inputs, np.ascontiguousarray(ends))
+        modes, told = len(self.omega), min(len(self.omega), len(self.outputs))
+        added = settling_periods(experiment, float(np.min((self.omega * self.damping_ratio)[:told])))
+        longer, until = prolonged(experiment, added), experiment.counted_from
+        rate = 2.0 * LEAD * self.omega * (np.arange(modes) < told)
+        velocity, free = measured_velocity(self, longer, told), self.system
+        ends = np.hstack([ends_of_steps(longer.inputs, self.steps), ends_of_steps(velocity, self.steps)])
+        run_of = self._run([led(free, rate), led(free, 0.0 * rate)], until, longer.inputs, np.ascontiguousarray(ends))
+        kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
+        names = ("outputs", "displacement", "velocity", "acceleration")
+        return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})
 
-    def trained_with(self, runs: Sequence[ArrayLike]) -> "StructuredModel":
-        """Return the model with the largest displacements of its elements under ``runs``, float[n_inputs, n] each."""
-        use = np.max([self.simulate(inputs).reach_use for inputs in runs], axis=0)
+    def trained_with(self, experiments: Sequence[Experiment]) -> "StructuredModel":
+        """Return the model with the largest displacements of its elements in ``experiments``."""
+        use = np.max([self.simulate_experiment(one).reach_use for one in experiments], axis=0)
         known = zip(self.elements, use.tolist(), strict=True)
         return replace(self, elements=tuple(replace(e, largest=share * e.reach) for e, share in known))
 

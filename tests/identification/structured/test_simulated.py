@@ -30,7 +30,7 @@ def experiment(force=FORCE, **changes) -> Experiment:
 
 
 def test_a_run_is_compared_with_what_was_measured_and_with_the_range_of_the_training_data():
-    trained = MODEL.trained_with([0.5 * FORCE, FORCE])
+    trained = MODEL.trained_with([experiment(0.5 * FORCE), experiment()])
     outputs = MODEL.simulate(FORCE).outputs
     largest = np.max(np.abs(outputs)) / 1e-3  # the only mode moves the element as it moves the output
     assert trained.elements[0].largest == pytest.approx(largest, rel=1e-12)
