@@ -128,14 +128,19 @@ def _structured(options: Options, say: Callable[[str], None]) -> Callable[..., S
     with Recording(recorded(options, options.specimen.modes_plan, say)) as recording:
         lowest = next(iter(response_matrices(recording).values()))
     modes = linear_modes(lowest, modes=options.specimen.modes)
-    return partial(_identify_structured, modes=modes, laws=options.specimen.laws)
+    return partial(_identify_structured, modes=modes, laws=options.specimen.laws, support=options.specimen.support)
 
 
 def _identify_structured(
-    training: Sequence[Experiment], *, validation: Sequence[Experiment], modes: LinearModes, laws: tuple[Law, ...]
+    training: Sequence[Experiment],
+    *,
+    validation: Sequence[Experiment],
+    modes: LinearModes,
+    laws: tuple[Law, ...],
+    support: bool,
 ) -> StructuredFit:
     """Fit one model; a structured model needs no validation data."""
-    return fit_structured(modes, training, laws=laws)
+    return fit_structured(modes, training, laws=laws, support=support)
 
 
 def _seconds(fit: PnlssFit | StructuredFit) -> float:

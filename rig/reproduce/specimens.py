@@ -45,6 +45,8 @@ class Specimen:
     """Number of modes that the plan shows."""
     laws: tuple[Law, ...]
     """Laws of the nonlinear element of a structured model."""
+    support: bool
+    """Whether a structured model has the static force of the exciter. Only a spring that is not symmetric makes it visible."""
     beside: tuple[str, ...] = ("backbone-fine",)
     """Plans whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
@@ -71,6 +73,7 @@ SPECIMENS = {
         modes_plan="multisine-1",
         modes=1,
         laws=(PolynomialSpring(), PolynomialDamper()),
+        support=True,
         beside=("backbone-fine", "harmonics-varied"),
     ),
     "friction-beam": Specimen(
@@ -91,6 +94,7 @@ SPECIMENS = {
         modes_plan="modal",
         modes=4,
         laws=(Masing(),),
+        support=False,
     ),
 }
 """Specimens by the name that ``rig reproduce`` takes."""

@@ -200,3 +200,30 @@ def test_mistakes_are_one_line_and_leave_no_folder(tmp_path, monkeypatch, line, 
     assert said in done.err
     assert done.err.count("\n") == 1
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.slow
+def test_structured_models_stand_beside_the_others_in_the_same_folder(folder):
+    line = "reproduce magnet-beam --models 1 --levels 1 --without sweeps --realisations 1 --model structured"
+    done = typed(f"{line} -o {folder}")
+    assert done.status == 0, done.err
+    found = json.loads((folder / "structured-r1" / "table.json").read_text())
+    (own,) = [row for row in found["errors"]["fitted"] if row["model"] is None]
+    assert (own["unbounded_runs"], found["model"]) == (0, "structured")
+    assert own["mean"] < 0.005
+    assert "all kinds of models in this folder" in done.out
+    (again,) = [line for line in typed(f"{line} -o {folder}").err.splitlines() if "model " in line] or [""]
+    assert again == ""  # the model is not fitted twice
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        ("--model spline", "--model spline: allowed is pnlss, structured"),
+        ("--model structured --states 2", "--states 2: is of PNLSS models; leave it out"),
+        ("--model structured --input voltage", "--input voltage: is of PNLSS models; leave it out"),
+    ],
+)
+def test_what_is_not_of_structured_models_is_refused(tmp_path, option, message):
+    done = typed(f"reproduce magnet-beam {option} -o {tmp_path / 'study'}")
+    assert (done.status, message in done.err) == (1, True), done.err
