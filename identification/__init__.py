@@ -43,6 +43,8 @@ Responses and errors of PNLSS models
 Structured models
     fit_structured, StructuredModel, StructuredFit, NonlinearElement, structured_backbone,
     structured_frequency_response, structured_response, structured_steady_state, bound_of, Bound
+Changes from run to run
+    fit_with_scatter, RunScatter, OutputBand
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
@@ -118,6 +120,8 @@ if TYPE_CHECKING:
     from identification.prediction.uncertainty import ResponseBand, response_band
     from identification.response_control.curves import ConstantForceCurve
     from identification.response_control.force_surface import ForceSurface, force_surface
+    from identification.scatter.fit import fit_with_scatter
+    from identification.scatter.run_scatter import OutputBand, RunScatter
     from identification.signals.decimation import decimated
     from identification.signals.fourier import periodic_vibration
     from identification.signals.half_periods import HalfPeriods, zero_crossings
@@ -207,6 +211,9 @@ else:
             "VoltageSweep": "prediction.sweep_inputs",
             "best_linear_approximation": "multisine.best_linear_approximation",
             "best_linear_responses": "pnlss.best_linear",
+            "OutputBand": "scatter.run_scatter",
+            "RunScatter": "scatter.run_scatter",
+            "fit_with_scatter": "scatter.fit",
             "bound_of": "structured.bound",
             "coherence": "multisine.best_linear_approximation",
             "combined": "nonlinear.repeatability",
@@ -309,6 +316,7 @@ __all__ = [
     "NonlinearElement",
     "NonlinearMode",
     "NonlinearModeMapping",
+    "OutputBand",
     "OutputStretch",
     "PeriodicSpectra",
     "PeriodicVibration",
@@ -322,6 +330,7 @@ __all__ = [
     "Repeatability",
     "ResponseBand",
     "ResponseMatrixMapping",
+    "RunScatter",
     "ShortPoint",
     "SimulatedRun",
     "Simulation",
@@ -355,6 +364,7 @@ __all__ = [
     "fit_pnlss",
     "fit_state_space",
     "fit_structured",
+    "fit_with_scatter",
     "force_drop_out",
     "force_surface",
     "frequency_response",

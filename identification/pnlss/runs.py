@@ -13,7 +13,7 @@ from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulators import Follower, SimulatedMotion, Simulator
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 
-__all__ = ["error_spectra", "output_stretch", "simulated_run"]
+__all__ = ["error_spectra", "output_stretch", "run_of", "simulated_run"]
 
 Float = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def simulated_run(
     """
     check_channels(model, experiment)
     check_not_zero(experiment, f"experiment '{experiment.name}'")
-    run = _simulated(model, experiment, initial_state)
+    run = run_of(model, experiment, initial_state)
     measured = experiment.counted_outputs
     size = np.linalg.norm(measured, axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -59,7 +59,7 @@ def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experi
         return np.abs(np.fft.rfft(mean, axis=1))[:, 1 : (period + 1) // 2] * (2.0 / period)
 
     def output(one: Simulator | None) -> Float:
-        run = None if one is None else _simulated(one, experiment, None)
+        run = None if one is None else run_of(one, experiment)
         if run is None or run.unbounded_at is not None:
             return np.full(experiment.counted_outputs.shape, np.nan)
         return run.outputs[:, experiment.counted_from :]
@@ -86,7 +86,7 @@ def output_stretch(
     `IdentificationError` if channels or sample rates of model and experiment differ.
     """
     check_channels(model, experiment)
-    run = _simulated(model, experiment, initial_state)
+    run = run_of(model, experiment, initial_state)
     largest = experiment.counted_from + int(np.argmax(np.abs(experiment.counted_outputs[0])))
     last = experiment.outputs.shape[1]
     first = max(min(largest - samples // 2, last - samples), experiment.counted_from)
@@ -103,7 +103,11 @@ def output_stretch(
     )
 
 
-def _simulated(model: Simulator, experiment: Experiment, initial_state: Float | None) -> SimulatedMotion:
+def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None = None) -> SimulatedMotion:
+    """Return the run under the inputs of an experiment, which begins as the experiment and the model require.
+
+    Raises `IdentificationError` if channels or sample rates differ, or the model cannot begin as the experiment does.
+    """
     check_channels(model, experiment)
     estimated = initial_state is None and experiment.initial_state == "estimated"
     if isinstance(model, PnlssModel):

@@ -124,8 +124,8 @@ def _started(law: Law, numbers: Float, scale: float) -> Law:
     if not law.linear:
         return law
     found = numbers / (scale**2 if isinstance(law, Damper) else scale)
-    if law.free[law.linear] is POSITIVE:
-        found = np.maximum(found, _TINY)
+    least = {POSITIVE: _TINY, FROM_ZERO: 0.0}.get(law.free[law.linear], -np.inf)
+    found = np.maximum(found, least)  # the bounds of the regression hold up to rounding
     value = getattr(law, law.linear)
     return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})
 

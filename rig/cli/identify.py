@@ -109,6 +109,14 @@ def identify(
             help="Of a PNLSS or structured model: small levels count as much as large ones in the fit.",
         ),
     ] = False,
+    scatter: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="What shifts from one recording to the next in a PNLSS or structured model: frequency, damping, gain.",
+            show_default="nothing",
+        ),
+    ] = None,
     laws: Annotated[
         str | None,
         typer.Option(
@@ -158,6 +166,7 @@ def identify(
             validation=tuple(validation or ()),
             hold_out=hold_out,
             relative=True if relative else None,
+            scatter=scatter,
         ),
     )
     with insisting() as signals:

@@ -13,7 +13,15 @@ from identification import (
     PnlssModel,
 )
 from rig.models.files.kind import Arrays, Attributes, FileKind
-from rig.models.files.simulated import SimulatedModel, errors_in, packed_errors, say_errors, unpacked_errors
+from rig.models.files.simulated import (
+    SimulatedModel,
+    errors_in,
+    packed_errors,
+    say_errors,
+    say_scatter,
+    scatter_in,
+    unpacked_errors,
+)
 from rig.text.console import number
 
 __all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
@@ -109,6 +117,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
             "interrupted": fit.interrupted,
             "seconds": float(fit.history.seconds[-1]),
         },
+        "scatter": scatter_in(found),
         **errors_in(found),
         "training": list(model.training),
         "state_range": model.state_range.tolist(),
@@ -142,6 +151,7 @@ def _say(summary: dict[str, Any]) -> None:
             f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; {fit['stopped']}; "
             f"{number(summary['seconds'], '.1f')} s in all"
         )
+    say_scatter(summary["scatter"])
     say_errors(summary)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from identification import (
     ErrorSpectra,
     Experiment,
     OutputStretch,
+    RunScatter,
     SimulatedRun,
     error_spectra,
     output_stretch,
@@ -22,7 +23,7 @@ from rig.models.files.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result
 
-__all__ = ["SimulatedModel", "errors_in", "packed_errors", "say_errors", "unpacked_errors"]
+__all__ = ["SimulatedModel", "errors_in", "packed_errors", "say_errors", "say_scatter", "scatter_in", "unpacked_errors"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,6 +48,8 @@ class SimulatedModel(Result):
         Fingerprint that identifies the data of the fit; empty if unknown.
     uses
         ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
+    scatter
+        Shifts of the model from run to run; None if it has none. Then ``model`` is that of a run in the middle.
     """
 
     model: Simulator
@@ -58,6 +61,7 @@ class SimulatedModel(Result):
     notes: tuple[str, ...] = ()
     data: str = ""
     uses: Mapping[str, str] = field(default_factory=dict)
+    scatter: RunScatter | None = None
 
     @property
     def linear(self) -> Simulator | None:
@@ -69,18 +73,20 @@ class SimulatedModel(Result):
         training: Sequence[Experiment],
         validation: Sequence[Experiment],
         initial_states: Iterable[np.ndarray] = (),
+        recordings: Sequence[str] = (),
     ) -> Self:
         """Return it with its errors on all data, with spectra and a stretch over time.
 
-        ``initial_states``: those of the training experiments that do not begin at rest, in their order.
+        ``initial_states``: those of the training experiments that do not begin at rest, in their order. ``recordings``: that of
+        each experiment, whose own shifts the model then has.
         """
         every = [(one, "training") for one in training] + [(one, "validation") for one in validation]
         begins = iter(initial_states)
         states = [
             next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every
         ]
+        models = [self._of(recording) for recording in recordings] or [self.model] * len(every)
         moved = [bool(np.all(np.any(one.counted_outputs != 0.0, axis=1))) for one, _ in every]
-        both, known = list(compress(every, moved)), list(compress(states, moved))
         still = [
             f"{one.name}: an output is zero throughout, so that it has no errors"
             for (one, _), is_moved in zip(every, moved, strict=True)
@@ -90,20 +96,73 @@ class SimulatedModel(Result):
         found = replace(
             self,
             runs=tuple(
-                simulated_run(self.model, one, initial_state=begin, use=use)
-                for (one, use), begin in zip(both, known, strict=True)
+                simulated_run(model, one, initial_state=begin, use=use)
+                for (one, use), begin, model in compress(zip(every, states, models, strict=True), moved)
             ),
-            linear_runs=() if linear is None else tuple(simulated_run(linear, one, use=use) for one, use in both),
+            linear_runs=()
+            if linear is None
+            else tuple(simulated_run(linear, one, use=use) for one, use in compress(every, moved)),
             notes=(*self.notes, *still),
         )
-        return found.on(training, validation)
+        return found.on(training, validation, recordings)
 
-    def on(self, training: Sequence[Experiment], validation: Sequence[Experiment]) -> Self:
+    def _of(self, recording: str) -> Simulator:
+        """Return the model of a recording, with its shifts if there is scatter."""
+        return self.model if self.scatter is None else self.scatter.model_of(cast(Any, self.model), recording)
+
+    def on(
+        self, training: Sequence[Experiment], validation: Sequence[Experiment], recordings: Sequence[str] = ()
+    ) -> Self:
         """Return it with spectra and a stretch over time of the last experiment, preferably periodic and of validation data."""
         every = [*training, *validation]
         periodic = [one for one in validation if one.period_samples] or [one for one in training if one.period_samples]
-        spectra = error_spectra(self.model, self.linear, periodic[-1]) if periodic else None
-        return replace(self, spectra=spectra, stretch=output_stretch(self.model, (periodic or every)[-1]))
+        shown = (periodic or every)[-1]
+        at = next(index for index, one in enumerate(every) if one is shown)
+        model = self._of(recordings[at]) if recordings else self.model
+        spectra = error_spectra(model, self.linear, shown) if periodic else None
+        return replace(self, spectra=spectra, stretch=output_stretch(model, shown))
+
+
+def scatter_in(found: SimulatedModel) -> list[dict[str, Any]] | None:
+    """Return the widths of the scatter as ``rig show --json`` prints them."""
+    of = found.scatter
+    if of is None:
+        return None
+    return [
+        {
+            "effect": str(effect),
+            "width": width.width,
+            "width_low": width.low,
+            "width_high": width.high,
+            "mean_std": width.mean_std,
+            "recordings": len(of.runs),
+            "settled": of.settled,
+        }
+        for effect, width in zip(of.effects, of.widths, strict=True)
+    ]
+
+
+def say_scatter(rows: list[dict[str, Any]] | None) -> None:
+    """Print the widths of the scatter, if there is any."""
+    if not rows:
+        return
+    print(
+        f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those with each run's shifts"
+    )
+    print_table(
+        ("shift of", "standard deviation %", "95 % interval", "+- of the middle %"),
+        [
+            (
+                row["effect"],
+                number(row["width"], ".3g", 100.0),
+                f"{number(row['width_low'], '.3g', 100.0)} to {number(row['width_high'], '.3g', 100.0)}",
+                number(row["mean_std"], ".2g", 196.0),
+            )
+            for row in rows
+        ],
+    )
+    if not rows[0]["settled"]:
+        print("the shifts had not settled when the fit ended")
 
 
 def packed_errors(found: SimulatedModel) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -120,6 +179,9 @@ def packed_errors(found: SimulatedModel) -> tuple[dict[str, Any], dict[str, Any]
     for name, things in (kept_runs | {name: () if one is None else (one,) for name, one in ones.items()}).items():
         inside, of_things = pack_all(name, things)
         arrays, attributes = arrays | inside, attributes | of_things
+    if found.scatter is not None:
+        inside, attributes["scatter"] = found.scatter.to_arrays()
+        arrays |= {f"scatter/{name}": array for name, array in inside.items()}
     return arrays, attributes
 
 
@@ -129,6 +191,9 @@ def unpacked_errors(arrays: Arrays, attributes: Attributes) -> dict[str, Any]:
     parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in kinds.items()}
     spectra = parts.pop("spectra")
     stretch = unpack_all(OutputStretch, "stretch", arrays, attributes) if "stretch" in attributes else ()
+    if "scatter" in attributes:
+        inside = {name.removeprefix("scatter/"): array for name, array in arrays.items() if name.startswith("scatter/")}
+        parts["scatter"] = RunScatter.from_arrays(inside, attributes["scatter"])
     return parts | {
         "spectra": spectra[0] if spectra else None,
         "stretch": stretch[0] if stretch else None,

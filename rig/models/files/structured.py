@@ -9,7 +9,15 @@ from identification import IdentificationError, NonlinearElement, StructuredFit,
 from identification.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
 from identification.structured.laws import Joint, UserSpring
 from rig.models.files.kind import Arrays, Attributes, FileKind
-from rig.models.files.simulated import SimulatedModel, errors_in, packed_errors, say_errors, unpacked_errors
+from rig.models.files.simulated import (
+    SimulatedModel,
+    errors_in,
+    packed_errors,
+    say_errors,
+    say_scatter,
+    scatter_in,
+    unpacked_errors,
+)
 from rig.text.console import number, print_table
 
 __all__ = ["STRUCTURED", "IdentifiedStructured", "functions_of"]
@@ -128,6 +136,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
             "stopped": fit.stopped,
             "seconds": fit.seconds,
         },
+        "scatter": scatter_in(found),
         **errors_in(found),
         "training": list(model.training),
         "seconds": found.seconds,
@@ -177,6 +186,7 @@ def _say(summary: dict[str, Any]) -> None:
     )
     if summary["support_n_m"] > _LEAST_SUPPORT_N_M:
         print(f"unseen support at the drive point: {number(summary['support_n_m'], '.4g')} N/m")
+    say_scatter(summary["scatter"])
     say_errors(summary)
 
 

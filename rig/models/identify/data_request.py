@@ -10,6 +10,7 @@ from rig.errors import ConfigurationError
 __all__ = ["DataOptions", "Options"]
 
 _INPUTS = ("force", "voltage")
+_SCATTERING = ("frequency", "damping", "gain")
 
 
 class Options:
@@ -41,6 +42,9 @@ class DataOptions(Options):
     relative: bool | None = None
     """Whether the errors of each experiment count relative to its outputs. Otherwise absolute errors count, and large levels
     dominate."""
+    scatter: str | None = None
+    """What shifts from run to run, separated by commas: ``frequency`` and ``damping`` of the modes in the excited band, and
+    ``gain``. Every recording is a run."""
 
     def __post_init__(self) -> None:
         if self.hold_out is not None and self.hold_out < 0:
@@ -49,8 +53,15 @@ class DataOptions(Options):
             raise ConfigurationError(f"`rate_hz` = {self.rate_hz:g}: allowed is any number above 0, Hz")
         if self.input not in (None, *_INPUTS):
             raise ConfigurationError(f"`input` = {self.input!r}: allowed are {', '.join(_INPUTS)}")
+        if self.scatter is not None and not set(self.scattering) <= set(_SCATTERING):
+            raise ConfigurationError(f"`scatter` = {self.scatter!r}: allowed are {', '.join(_SCATTERING)}, with commas")
         if self.validation and self.hold_out:
             raise ConfigurationError("`hold_out`: is instead of `validation`; leave one of the two out")
+
+    @property
+    def scattering(self) -> tuple[str, ...]:
+        """What shifts from run to run; empty if nothing does."""
+        return () if self.scatter is None else tuple(name.strip() for name in self.scatter.split(","))
 
     @property
     def channels(self) -> dict[str, Any]:

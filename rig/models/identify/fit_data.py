@@ -1,14 +1,15 @@
 """Training and validation data of models that are fitted over time: experiments of all files at one sample rate."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import TypeVar, cast
 
 import numpy as np
 
-from identification import Experiment
+from identification import Experiment, PnlssFit, RunScatter, StructuredFit, fit_with_scatter
 from identification.pnlss.simulators import Simulator
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
@@ -21,7 +22,9 @@ from rig.models.identify.data_request import DataOptions
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
-__all__ = ["FitData", "fit_data"]
+__all__ = ["FitData", "fit_data", "fitted"]
+
+Fit = TypeVar("Fit", StructuredFit, PnlssFit)
 
 _EVERY = 4
 """Every how many settled points one is used as validation data."""
@@ -37,6 +40,8 @@ class FitData:
     """Experiments to which the model is fitted."""
     validation: tuple[Experiment, ...]
     """Experiments by which the model is judged."""
+    runs: tuple[str, ...]
+    """Recording of each experiment, of the training and then of the validation data."""
     notes: tuple[str, ...]
     """Remarks on the data for the user, one line each."""
 
@@ -95,6 +100,8 @@ def fit_data(
     held = options.hold_out if options.hold_out is not None else (0 if options.validation else 1)
     training: list[Experiment] = []
     validation: list[Experiment] = []
+    of_training: list[str] = []
+    of_validation: list[str] = []
     notes: list[str] = []
     most = 0
     for path in paths:
@@ -103,19 +110,32 @@ def fit_data(
             notes += points_left_out(recording)
         most = max(most, *(len(same) for same in _alike(found)), 0)
         kept, out = _held_out(found, held)
-        training += kept
-        validation += out
+        training, of_training = training + kept, of_training + [str(path)] * len(kept)
+        validation, of_validation = validation + out, of_validation + [str(path)] * len(out)
     if options.hold_out is not None and options.hold_out >= max(most, 2):
         raise ConfigurationError(
             f"`hold_out` = {options.hold_out}: no level has more than {most} realisations; allowed is 0 to {max(most - 1, 1)}"
         )
     for path in options.validation:
         with Recording(path) as recording:
-            validation += experiments(recording, rate_hz=rate_hz, **channels)
+            found = experiments(recording, rate_hz=rate_hz, **channels)
+        validation, of_validation = validation + list(found), of_validation + [str(path)] * len(found)
     _check_alive([*training, *validation])
     if options.relative:
         training, validation = list(_relative(training)), list(_relative(validation) if validation else ())
-    return FitData(tuple(training), tuple(validation), tuple(notes))
+    return FitData(tuple(training), tuple(validation), (*of_training, *of_validation), tuple(notes))
+
+
+def fitted(fit: Callable[..., Fit], data: FitData, options: DataOptions) -> tuple[Fit, RunScatter | None]:
+    """Call ``fit(training, validation=...)``, with the shifts of the recordings if they are asked for."""
+    if not options.scattering:
+        return fit(data.training, validation=data.validation), None
+    if len(set(data.runs)) < 2:
+        raise ConfigurationError("`scatter`: needs two recordings at least, each of which is a run; add others")
+    found, scatter = fit_with_scatter(
+        fit, data.training, validation=data.validation, runs=data.runs, kinds=options.scattering
+    )
+    return cast(Fit, found), scatter
 
 
 def _check_alive(experiments: Sequence[Experiment]) -> None:

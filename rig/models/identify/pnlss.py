@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from identification import (
@@ -17,7 +18,7 @@ from rig.models.files.files import load_as
 from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.identify.data_fingerprints import uses_of
 from rig.models.identify.data_request import DataOptions
-from rig.models.identify.fit_data import FitData, fit_data
+from rig.models.identify.fit_data import FitData, fit_data, fitted
 from rig.models.identify.pnlss_request import PnlssOptions
 from rig.recording.reader import Recording
 
@@ -34,11 +35,13 @@ def identified_pnlss(
     After Ctrl-C, return the state reached; `PnlssOptions.resume` continues from it. Raises `RecordingError` for files with
     other contents, `identification.IdentificationError` if the data does not allow the identification.
     """
-    begun = time.perf_counter()
+    begun, scatter = time.perf_counter(), None
     earlier = None if options.resume is None else _earlier(options.resume)
     data = fit_data(paths, of_data, "PNLSS", like=None if earlier is None else earlier.model)
     data = replace(data, notes=(*data.notes, *_remarks(data, paths)))
     if earlier is not None and earlier.fit is not None:
+        if earlier.scatter is not None or of_data.scattering:
+            raise ConfigurationError(f"{options.resume}: a fit with scatter does not go on; leave `resume` out")
         _check_resumed(options, earlier, data)
     settings = FitSettings() if options.iterations is None else FitSettings(iterations=options.iterations)
     if earlier is not None and earlier.fit is not None:
@@ -52,25 +55,26 @@ def identified_pnlss(
         )
         begun -= earlier.seconds
     else:
-        fit = identify_pnlss(
-            data.training,
+        how = partial(
+            identify_pnlss,
             states=2 if options.states is None else options.states,
             degrees=options.chosen_degrees,
             output_degrees=() if options.output_polynomials is False else None,
             saturating=options.saturating_features,
-            validation=data.validation,
             settings=settings,
             progress=progress,
         )
+        fit, scatter = fitted(how, data, of_data)
     found = IdentifiedPnlss(
         model=fit.model,
         fit=fit,
+        scatter=scatter,
         seconds=time.perf_counter() - begun,
         notes=data.notes,
         data=data.fingerprint,
         uses=uses_of(data.training, data.validation),
     )
-    return found.judged(data.training, data.validation, fit.initial_states)
+    return found.judged(data.training, data.validation, fit.initial_states, data.runs)
 
 
 def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from identification import LinearModes, ModalAnalysis, fit_structured
 from identification.structured.start import linear_start
@@ -14,7 +14,7 @@ from rig.models.files.linear_modes import LINEAR_MODES
 from rig.models.files.structured import IdentifiedStructured
 from rig.models.identify.data_fingerprints import uses_of
 from rig.models.identify.data_request import DataOptions
-from rig.models.identify.fit_data import fit_data
+from rig.models.identify.fit_data import fit_data, fitted
 from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 from rig.recording.arrays import kind_of
 
@@ -37,17 +37,19 @@ def identified_structured(
     found = _modes_in(modes)
     data = fit_data(paths, of_data, "structured", kinds=_KINDS)
     one_specimen(**{str(modes): found.specimen, str(paths[0]): data.training[0].specimen})
-    fit = fit_structured(found, data.training, steps=_STEPS, **options.for_fit())
+    how: dict[str, Any] = {"steps": _STEPS, **options.for_fit()}
+    fit, scatter = fitted(lambda training, validation: fit_structured(found, training, **how), data, of_data)
     identified = IdentifiedStructured(
         model=fit.model,
         fit=fit,
+        scatter=scatter,
         linear=linear_start(found, data.training[0], _STEPS),
         seconds=time.perf_counter() - begun,
         notes=data.notes,
         data=data.fingerprint,
         uses=uses_of(data.training, data.validation),
     )
-    return identified.judged(data.training, data.validation)
+    return identified.judged(data.training, data.validation, recordings=data.runs)
 
 
 def _modes_in(path: Path) -> LinearModes:
