@@ -26,6 +26,9 @@ def reproduce_(
         typer.Option(help="Scatter of modal frequencies from run to run, relative; each realisation then is a run."),
     ] = 0.0,
     model: Annotated[str, typer.Option("--model", help="Kind of the models: pnlss or structured.")] = "pnlss",
+    shifts: Annotated[
+        bool, typer.Option("--shifts", help="Fit the modes of every run with shifts of their own; with --scatter.")
+    ] = False,
     input: Annotated[str, typer.Option("--input", help="What goes into the models: force or voltage.")] = "force",
     beside: Annotated[
         list[str] | None,
@@ -72,6 +75,7 @@ def reproduce_(
         models=int(models) if models.isdecimal() else models,
         scatter=scatter,
         model=model,
+        shifts=shifts,
         input=input,
         beside=tuple(beside or ()),
         saturating=saturating,

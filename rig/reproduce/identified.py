@@ -13,8 +13,10 @@ from identification import (
     LinearModes,
     ModelJob,
     PnlssFit,
+    RunScatter,
     StructuredFit,
     fit_structured,
+    fit_with_scatter,
     identify_many,
     identify_pnlss,
     linear_modes,
@@ -48,6 +50,8 @@ class Models:
     """Fits by name of the model."""
     failures: Mapping[str, str]
     """Why models could not be identified, by name of the model."""
+    scatter: Mapping[str, RunScatter]
+    """Shifts from run to run by name of the model; empty if no model has any."""
 
     def times(self) -> list[dict[str, Any]]:
         """Return for each training set: the number of models, and the times and iterations of their fits."""
@@ -91,21 +95,44 @@ def identify_all(
     )
     by_name = {job.name: job for job in jobs}
     files = {job.name: _file(options, job.name) for job in jobs}
-    fits: dict[str, Any] = {name: _kept(options, path) for name, path in files.items() if path.exists()}
+    kept = {name: _kept(options, path) for name, path in files.items() if path.exists()}
+    fits: dict[str, Any] = {name: one.fit for name, one in kept.items()}
+    scatter = {name: one.scatter for name, one in kept.items() if one.scatter is not None}
     failures: dict[str, str] = {}
     identify: Callable[..., Any] = _structured(options, say) if options.model == "structured" else _pnlss(options)
-    for found in identify_many(jobs, identify, n_jobs=options.jobs, done=fits):
+    fit_all = partial(_with_shifts if options.shifts else _without_shifts, identify)
+    for found in identify_many(jobs, fit_all, n_jobs=options.jobs, done=fits):
         if found.fit is None:
             failures[found.name] = found.reason
         else:
-            fits[found.name] = found.fit
+            fits[found.name], shifts = found.fit
+            if shifts is not None:
+                scatter[found.name] = shifts
             data = by_name[found.name].training, by_name[found.name].validation
             of = IdentifiedPnlss if options.model == "pnlss" else IdentifiedStructured
-            kept = of(model=found.fit.model, fit=found.fit, seconds=found.seconds, uses=uses_of(*data))
-            save(kept.on(*data), files[found.name])
+            fit = fits[found.name]
+            one = of(model=fit.model, fit=fit, seconds=found.seconds, uses=uses_of(*data), scatter=shifts)
+            save(one.on(*data, _runs(*data) if shifts else ()), files[found.name])
         count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
-        say(f"{count}  {_outcome(found.fit, found.reason)}  {found.seconds:.1f} s")
-    return Models(jobs, fits, failures)
+        say(f"{count}  {_outcome(fits.get(found.name), scatter.get(found.name), found.reason)}  {found.seconds:.1f} s")
+    return Models(jobs, fits, failures, scatter)
+
+
+def _runs(training: Sequence[Experiment], validation: Sequence[Experiment]) -> list[str]:
+    """Names of the runs: with scatter each realisation is one."""
+    return [one.name for one in (*training, *validation)]
+
+
+def _without_shifts(
+    identify: Callable[..., Any], training: Sequence[Experiment], *, validation: Sequence[Experiment]
+) -> tuple[Any, RunScatter | None]:
+    return identify(training, validation=validation), None
+
+
+def _with_shifts(
+    identify: Callable[..., Any], training: Sequence[Experiment], *, validation: Sequence[Experiment]
+) -> tuple[Any, RunScatter | None]:
+    return fit_with_scatter(identify, training, validation=validation, runs=_runs(training, validation))
 
 
 def _pnlss(options: Options) -> Callable[..., PnlssFit]:
@@ -159,22 +186,22 @@ def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment
     return fit
 
 
-def _kept(options: Options, path: Path) -> PnlssFit | StructuredFit:
-    kind = PNLSS if options.model == "pnlss" else STRUCTURED
-    fit: PnlssFit | StructuredFit | None = load_as(kind, path).fit
-    if fit is None:
+def _kept(options: Options, path: Path) -> IdentifiedPnlss | IdentifiedStructured:
+    found: IdentifiedPnlss | IdentifiedStructured = load_as(PNLSS if options.model == "pnlss" else STRUCTURED, path)
+    if found.fit is None:
         raise RecordingError(f"{path}: holds a model without its fit; remove the file, and it is identified again")
-    return fit
+    return found
 
 
-def _outcome(fit: PnlssFit | StructuredFit | None, reason: str) -> str:
+def _outcome(fit: PnlssFit | StructuredFit | None, scatter: RunScatter | None, reason: str) -> str:
     if fit is None:
         return f"FAILED: {reason}"
+    shifts = "" if scatter is None else f"  frequencies shift by {100 * scatter.widths[0].width:.3g} %"
     if isinstance(fit, StructuredFit):
-        return f"training {100 * fit.training_error:6.3f} %  {fit.evaluations} simulations"
+        return f"training {100 * fit.training_error:6.3f} %  {fit.evaluations} simulations{shifts}"
     return (
         f"training {100 * fit.training_error:6.3f} %  validation {100 * fit.validation_error:6.3f} %  iteration "
-        f"{fit.chosen} of {fit.history.iterations}"
+        f"{fit.chosen} of {fit.history.iterations}{shifts}"
     )
 
 

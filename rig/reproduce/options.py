@@ -38,6 +38,8 @@ class Options:
     """Relative standard deviation of modal frequencies from run to run; above 0 each realisation is a separate run."""
     model: str = "pnlss"
     """Kind of the models: ``pnlss`` or ``structured``."""
+    shifts: bool = False
+    """Whether the modes of every run have shifts of their own in the fit (`identification.fit_with_scatter`)."""
     input: str = "force"
     """Input of the models: ``force`` or ``voltage``."""
     beside: tuple[str, ...] = ()
@@ -80,6 +82,8 @@ class Options:
             ):
                 if given:
                     raise ConfigurationError(f"`{name}` {getattr(self, name)}: is of PNLSS models; leave it out")
+        if self.shifts and not self.scatter:
+            raise ConfigurationError("`shifts`: is for runs that differ; add `scatter`, or leave it out")
         if self.input not in INPUTS:
             raise ConfigurationError(f"`input` {self.input}: allowed is {', '.join(INPUTS)}")
         for name in self.beside:
@@ -138,9 +142,10 @@ class Options:
         saturating = f"-tanh{self.saturating}" if self.saturating else ""
         states = f"-n{self.model_states}" if self.model_states != self.specimen.states else ""
         fitted = f"-r{self.realisations}" if self.realisations is not None else ""
+        shifts = "-shifts" if self.shifts else ""
         if self.model == "structured":
-            return f"structured{fitted}"
-        return f"{self.input}{beside}{saturating}{states}{fitted}"
+            return f"structured{fitted}{shifts}"
+        return f"{self.input}{beside}{saturating}{states}{fitted}{shifts}"
 
     @property
     def recordings(self) -> Path:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from identification import ErrorTable, Experiment, IdentificationError, PnlssModel, StructuredModel
+from identification.scatter.own_model import OwnModel
+from rig.models.files.simulated import rows_of_scatter
 from rig.reproduce.folder import prepare
 from rig.reproduce.identified import Models, identify_all
 from rig.reproduce.options import Options
@@ -28,6 +30,9 @@ VARIANTS: dict[str, dict[str, Callable[[Any], PnlssModel | StructuredModel | Non
     },
 }
 """Models that a single fit offers, by the kind and by their name in tables. The first is the identified model itself."""
+
+OWN_SHIFTS = "with each run's own shifts"
+"""Name of the identified model in tables, if its shifts are estimated for every run that it is compared with."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,6 +68,11 @@ class Study:
             "beside": list(options.beside),
             "saturating": options.saturating,
             "scatter": options.scatter,
+            "shifts": [
+                {"model": name, **row}
+                for name, scatter in self.models.scatter.items()
+                for row in rows_of_scatter(scatter)
+            ],
             "seed": options.seed,
             "states": options.model_states,
             "realisations": options.realisations,
@@ -91,7 +101,14 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     if not models.fits:
         name, reason = next(iter(models.failures.items()))
         raise IdentificationError(f"no model could be identified; {name}: {reason}")
-    tables = {name: _table(options, models, levels, of) for name, of in VARIANTS[options.model].items()}
+    variants = {
+        name: {model: of(fit) for model, fit in models.fits.items()} for name, of in VARIANTS[options.model].items()
+    }
+    if models.scatter:
+        first = next(iter(variants.values()))
+        own = {name: OwnModel(first[name], scatter) for name, scatter in models.scatter.items()}
+        variants = {OWN_SHIFTS: own} | variants
+    tables = {name: _table(options, models, levels, of) for name, of in variants.items()}
     table = next(iter(tables.values()))
     selected = {name: (model, models.fits[model].model) for name, model in table.selected.items()}
     found: list[Steady] = []
@@ -109,8 +126,7 @@ def _table(
     options: Options,
     models: Models,
     levels: Mapping[str, Sequence[Experiment]],
-    of: Callable[[Any], PnlssModel | StructuredModel | None],
+    variants: Mapping[str, Any],
 ) -> ErrorTable:
-    variants = {name: of(fit) for name, fit in models.fits.items()}
     known = {name: model for name, model in variants.items() if model is not None}
     return ErrorTable.of(known, models.jobs, levels, output=options.channel, failures=models.failures)

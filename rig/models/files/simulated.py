@@ -23,7 +23,16 @@ from rig.models.files.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result
 
-__all__ = ["SimulatedModel", "errors_in", "packed_errors", "say_errors", "say_scatter", "scatter_in", "unpacked_errors"]
+__all__ = [
+    "SimulatedModel",
+    "errors_in",
+    "packed_errors",
+    "rows_of_scatter",
+    "say_errors",
+    "say_scatter",
+    "scatter_in",
+    "unpacked_errors",
+]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -125,9 +134,11 @@ class SimulatedModel(Result):
 
 def scatter_in(found: SimulatedModel) -> list[dict[str, Any]] | None:
     """Return the widths of the scatter as ``rig show --json`` prints them."""
-    of = found.scatter
-    if of is None:
-        return None
+    return None if found.scatter is None else rows_of_scatter(found.scatter)
+
+
+def rows_of_scatter(of: RunScatter) -> list[dict[str, Any]]:
+    """Return the widths of a scatter, one row for each effect."""
     return [
         {
             "effect": str(effect),
@@ -147,7 +158,8 @@ def say_scatter(rows: list[dict[str, Any]] | None) -> None:
     if not rows:
         return
     print(
-        f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those with each run's shifts"
+        f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those "
+        "with each run's shifts"
     )
     print_table(
         ("shift of", "standard deviation %", "95 % interval", "+- of the middle %"),
