@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identification.structured.laws import Law, Masing, PolynomialDamper, PolynomialSpring
+from identification.structured.laws import Law, Masing, PolynomialSpring
 from rig.errors import ConfigurationError
 
 __all__ = ["SPECIMENS", "Specimen", "specimen_of"]
@@ -72,7 +72,7 @@ SPECIMENS = {
         sweeps=("sweep-1", "sweep-2", "sweep-3"),
         modes_plan="multisine-1",
         modes=1,
-        laws=(PolynomialSpring(), PolynomialDamper()),
+        laws=(PolynomialSpring(), Masing()),
         support=True,
         beside=("backbone-fine", "harmonics-varied"),
     ),

@@ -101,7 +101,7 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     if not models.fits:
         name, reason = next(iter(models.failures.items()))
         raise IdentificationError(f"no model could be identified; {name}: {reason}")
-    variants = {
+    variants: dict[str, dict[str, Any]] = {
         name: {model: of(fit) for model, fit in models.fits.items()} for name, of in VARIANTS[options.model].items()
     }
     if models.scatter:

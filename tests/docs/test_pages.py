@@ -102,6 +102,7 @@ SLOW = (
             "protect-a-fragile-specimen",
             "predict-with-a-pnlss-model",
             "identify-a-structured-model",
+            "fit-runs-that-differ",
         )
     ),
 )
