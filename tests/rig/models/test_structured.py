@@ -83,6 +83,24 @@ def test_multisines_have_the_errors_of_the_file(there):
     assert all(run["range_use"] < 0.2 for run in fresh)
 
 
+def test_every_recording_has_shifts_of_its_own(there, recordings):
+    (recordings / "restless.toml").write_text('base = "magnet-beam"\n[driver.options.scatter]\nfrequency = 0.001\n')
+    for seed in (2, 3):
+        plan = plan_from(LINES | {"bench": str(recordings / "restless.toml"), "levels_rms_v": [0.4]}, "restless")
+        rig.run(plan, output=recordings / f"restless{seed}.h5", seed=seed, overwrite=True).close()
+    of = "--model structured --modes modes.h5 --laws polynomial-spring --rate 200 --outputs drive"
+    line = f"identify restless2.h5 restless3.h5 {of} --scatter frequency -o T.h5 --overwrite"
+    told = json.loads(there(f"{line} --json").out)
+    (width,) = told["scatter"]
+    assert (width["effect"], width["recordings"]) == ("frequency 1", 2)
+    assert width["width_low"] < 0.001 < width["width_high"]
+    found = load(recordings / "T.h5")
+    one, other = (found.scatter.model_of(found.model, run).frequency_hz[0] for run in found.scatter.runs)
+    assert abs(one / other - 1.0) > 1e-4
+    assert max(run["errors"]["drive"] for run in told["errors"]) < 0.03
+    assert "shifts from run to run, 2 runs" in there("show T.h5").out
+
+
 def test_a_file_gives_back_fit_and_errors_to_the_bit(recordings, tmp_path):
     first = load(recordings / "S.h5")
     save(first, tmp_path / "again.h5")
@@ -261,6 +279,15 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
             "identify S.h5 --model structured --modes modes.h5",
             "S.h5: is a file of kind structured; a structured model comes from recordings: multisine, sweep",
         ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --scatter mass",
+            "--scatter = 'mass': allowed are frequency, damping, gain",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --scatter gain",
+            "--scatter: needs two recordings at least",
+        ),
+        ("identify lines.h5 --model linear --scatter gain", "--scatter: means nothing to --model linear"),
         ("identify lines.h5 --model structured --modes modes.h5 --hold-out 2", "no level has more than 2 realisations"),
         (
             "predict S.h5 --frequency-response 1",

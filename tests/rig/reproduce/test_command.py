@@ -216,11 +216,28 @@ def test_structured_models_stand_beside_the_others_in_the_same_folder(folder):
     assert again == ""  # the model is not fitted twice
 
 
+@pytest.mark.slow
+def test_runs_that_differ_have_shifts_of_their_own(tmp_path):
+    line = "reproduce magnet-beam --models 1 --levels 1 --without sweeps --without steady --model structured"
+    done = typed(f"{line} --scatter 0.001 --shifts -o {tmp_path / 'study'}")
+    assert done.status == 0, done.err
+    found = json.loads((tmp_path / "study" / "structured-shifts" / "table.json").read_text())
+    own, middle = (
+        next(row["mean"] for row in found["errors"][variant] if row["model"] is None)
+        for variant in ("with each run's own shifts", "fitted")
+    )
+    assert own < 0.005 < middle
+    (frequency,) = [row for row in found["shifts"] if row["effect"] == "frequency 1"]
+    assert frequency["width_low"] < 0.001 < frequency["width_high"]
+    assert "frequencies shift by" in done.err
+
+
 @pytest.mark.parametrize(
     ("option", "message"),
     [
         ("--model spline", "--model spline: allowed is pnlss, structured"),
         ("--model structured --states 2", "--states 2: is of PNLSS models; leave it out"),
+        ("--shifts", "--shifts: is for runs that differ; add --scatter, or leave it out"),
         ("--model structured --input voltage", "--input voltage: is of PNLSS models; leave it out"),
     ],
 )
