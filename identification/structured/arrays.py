@@ -1,7 +1,7 @@
 """Convert structured models and their fits to arrays and attributes for a file, and back."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.packing import pack
+from identification.structured.element_trials import ElementTrial
 from identification.structured.elements import NonlinearElement
 from identification.structured.fit import StructuredFit
 from identification.structured.laws import law_from_dict
@@ -47,6 +48,7 @@ def fit_arrays(fit: StructuredFit) -> tuple[dict[str, NDArray[Any]], dict[str, A
     attributes: dict[str, Any] = {
         "names": list(fit.names),
         **{name: getattr(fit, name) for name in ("training_error", "evaluations", "seconds", "stopped")},
+        "trials": [asdict(trial) for trial in fit.trials],
     }
     for name in _MODELS:
         inside, of_model = model_arrays(getattr(fit, name))
@@ -61,6 +63,7 @@ def fit_from(arrays: Arrays, attributes: Attributes) -> StructuredFit:
         values: dict[str, Any] = {name: attributes[name] for name in attributes if name not in _MODELS}
         values |= {name: np.asarray(arrays[name]) for name in ("values", "covariance")}
         values["names"] = tuple(values["names"])
+        values["trials"] = tuple(_trial_from(trial) for trial in values.get("trials", ()))
         for name in _MODELS:
             head = f"{name}/"
             inside = {key.removeprefix(head): array for key, array in arrays.items() if key.startswith(head)}
@@ -75,6 +78,12 @@ def fit_from(arrays: Arrays, attributes: Attributes) -> StructuredFit:
             f"{fit.covariance.shape}"
         )
     return fit
+
+
+def _trial_from(values: Mapping[str, Any]) -> ElementTrial:
+    """Return a trial from its attributes."""
+    texts = {name: tuple(values[name]) for name in ("laws", "between")}
+    return ElementTrial(**{**values, **texts, **{name: float(values[name]) for name in ("error", "gain", "at_least")}})
 
 
 def _as_dict(element: NonlinearElement) -> dict[str, Any]:

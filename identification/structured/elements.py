@@ -43,6 +43,8 @@ class NonlinearElement:
         Largest ``|x|`` of springs and dampers.
     largest
         Largest ``|x|`` in the training data; None if unknown.
+    between
+        Outputs between which, or at which, the element acts; empty if its direction was found.
 
     Raises
     ------
@@ -55,10 +57,12 @@ class NonlinearElement:
     laws: tuple[Law, ...]
     reach: float = 3.0
     largest: float | None = None
+    between: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", finite_array("element: direction", self.direction, np.float64, 1))
         object.__setattr__(self, "laws", tuple(self.laws))
+        object.__setattr__(self, "between", tuple(self.between))
         for name in ("scale_m", "reach"):
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
         if self.largest is not None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
 from identification.pnlss.experiment import Experiment, same_channels
 from identification.pnlss.fitting.threads import threads
+from identification.structured.element_trials import ElementTrial
+from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
@@ -64,6 +67,8 @@ class StructuredFit(Result):
         Number of simulations with derivatives of all experiments, and time.
     stopped
         Why the fit ended.
+    trials
+        Which elements were fitted, and what they brought.
     """
 
     model: StructuredModel
@@ -75,6 +80,7 @@ class StructuredFit(Result):
     evaluations: int
     seconds: float
     stopped: str
+    trials: tuple[ElementTrial, ...] = ()
 
 
 def fit_structured(
@@ -82,11 +88,13 @@ def fit_structured(
     experiments: Sequence[Experiment],
     *,
     laws: Sequence[Law] = (PolynomialSpring(), PolynomialDamper()),
+    elements: Sequence[ElementPlan] = (),
+    validation: Sequence[Experiment] = (),
     reach: float = 3.0,
     support: bool = True,
     steps: int = 2,
 ) -> StructuredFit:
-    """Fit a structured model with one nonlinear element whose direction is free.
+    """Fit a structured model with one nonlinear element whose direction is free, or with several.
 
     Derivatives of one experiment per thread are held at once: some 32 bytes for each counted sample, output and free number,
     15 MB for 8000 samples with three outputs.
@@ -100,6 +108,11 @@ def fit_structured(
     laws
         Laws of the element (`identification.structured.laws`): what they declare as linear and as tried gets initial values
         from the data.
+    elements
+        Elements in place of the one with ``laws``, fitted one after the other, each time all numbers.
+    validation
+        Data by which a further element has to pay (`ElementTrial`): the first that does not is left out, and those after it.
+        Without them all elements are kept.
     reach
         Largest displacement of the laws relative to the largest of the mode in the training data.
     support
@@ -125,17 +138,62 @@ def fit_structured(
             )
     if steps < 1:
         raise IdentificationError(f"steps: is {steps}, allowed is 1 or above")
-    if not laws:
-        raise IdentificationError("laws: is empty, needs one at least")
+    wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
     linear = linear_start(modes, first, steps)
+    linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     led = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
-    start = with_element(linear, experiments, led, laws, reach)
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
-    start = replace(start, support_largest_n=largest)
-    start = replace(start, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
-    tied = (find_role(first.output_channels, "drive"),)
+    found, trials, evaluations = replace(linear, support_largest_n=largest), [], 0
+    kept: _Fitted | None = None
+    for plan in wanted:
+        if found.elements or plan.between:
+            start = with_further_element(found, experiments, led, plan, reach)
+        else:
+            start = with_element(found, experiments, led, plan.laws, reach)
+        fitted = _fitted(start, linear, modes, experiments, led, support)
+        evaluations += fitted.evaluations
+        trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
+        trials.append(trial)
+        if not trial.kept:
+            break
+        kept, found = fitted, fitted.model
+    assert kept is not None  # the first element is always kept
+    return StructuredFit(
+        model=kept.model.trained_with(experiments),
+        start=kept.start,
+        names=kept.problem.parameters.names,
+        values=kept.vector,
+        covariance=kept.problem.covariance(kept.vector),
+        training_error=kept.problem.error,
+        evaluations=evaluations,
+        seconds=time.perf_counter() - began,
+        stopped=kept.problem.stopped,
+        trials=tuple(trials),
+    )
+
+
+class _Fitted(NamedTuple):
+    """A model with given elements, fitted."""
+
+    model: StructuredModel
+    start: StructuredModel
+    problem: "_Problem"
+    vector: Float
+    evaluations: int
+
+
+def _fitted(
+    start: StructuredModel,
+    linear: StructuredModel,
+    modes: LinearModes,
+    experiments: Sequence[Experiment],
+    led: int,
+    support: bool,
+) -> _Fitted:
+    """Fit all numbers, in stages with less and less of the leading forces."""
+    tied = (find_role(start.outputs, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
-    moves = int(np.argmax(np.abs(start.elements[0].direction)))
+    moves = [int(np.argmax(np.abs(element.direction[:led]))) for element in start.elements]
     found, evaluations = start, 0
     measured = np.arange(len(linear.omega)) < led
     slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
@@ -157,24 +215,11 @@ def fit_structured(
             for e, count in zip(settled, lengths, strict=True)
         ]
         parameters = Parameters(start, tied, free)
-        problem = _Problem(parameters, settled, leads, parameters.expected(modes, moves))
+        problem = _Problem(parameters, settled, leads, parameters.expected(modes, linear, moves))
         vector, more = problem.solve(parameters.vector(found), _ROUGH if ratio else _FINE)
         found, evaluations = parameters.model(vector), evaluations + more
-    triangle = problem.triangle(vector)
-    jacobian, residual = triangle[:, :-1], triangle[:, -1]
-    freedom = max(problem.count - vector.size, 1)
-    covariance = np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom
-    return StructuredFit(
-        model=problem.parameters.model(vector).trained_with(experiments),
-        start=start,
-        names=problem.parameters.names,
-        values=vector,
-        covariance=covariance,
-        training_error=problem.error,
-        evaluations=evaluations,
-        seconds=time.perf_counter() - began,
-        stopped=problem.stopped,
-    )
+    problem.triangle(vector)
+    return _Fitted(found, start, problem, vector, evaluations)
 
 
 class _Problem:
@@ -217,6 +262,13 @@ class _Problem:
             self._known = vector.tobytes(), _triangle(np.concatenate([*parts, prior]))
             self.error = float(np.sqrt(sum(part[:, -1] @ part[:, -1] for part in parts) / self.count))
         return self._known[1]
+
+    def covariance(self, vector: Float) -> Float:
+        """float[P, P]: covariance of the numbers, as if the residual were white."""
+        triangle = self.triangle(vector)
+        jacobian, residual = triangle[:, :-1], triangle[:, -1]
+        freedom = max(self.count - vector.size, 1)
+        return np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom)
 
     def _of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
         weight = np.sqrt(experiment.weight) / self._scale

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.channels import MOTION_ORDER, Channel
+from identification.channels import MOTION_ORDER, Channel, find_name
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement, tables_of
@@ -252,6 +252,16 @@ class StructuredModel(Result):
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         names = ("outputs", "displacement", "velocity", "acceleration")
         return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})
+
+    def place_of(self, between: Sequence[str]) -> Float:
+        """float[n_outputs]: the displacement at an output, or of one relative to another, as a sum of those of all outputs.
+
+        Raises `IdentificationError` if a channel is not among the outputs.
+        """
+        found = np.zeros(len(self.outputs))
+        for name, sign in zip(between, (1.0, -1.0), strict=False):
+            found[find_name(self.outputs, name)] = sign
+        return found
 
     def trained_with(self, experiments: Sequence[Experiment]) -> "StructuredModel":
         """Return the model with the largest displacements of its elements in ``experiments``."""

@@ -1,5 +1,6 @@
 """Free parameters of a structured model in one vector, and derivatives by them from those of the kernels."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,7 +66,9 @@ class Parameters:
         return [o for o in range(len(self.start.outputs)) if o not in self.tied]
 
     def _kept(self, element: NonlinearElement) -> list[int]:
-        """Free components of a direction."""
+        """Free components of a direction; none if it is that of a place."""
+        if element.between:
+            return []
         return [i for i in range(element.direction.size) if i != int(np.argmax(np.abs(element.direction)))]
 
     def vector(self, model: StructuredModel) -> Float:
@@ -79,22 +82,23 @@ class Parameters:
         parts += [model.output_shapes[self._untied].ravel(), model.direct.ravel()]
         return np.concatenate(parts)
 
-    def expected(self, modes: LinearModes, mode: int) -> tuple[Float, Float]:
+    def expected(self, modes: LinearModes, linear: StructuredModel, free: Sequence[int]) -> tuple[Float, Float]:
         """Return what a modal test says of the numbers, and its standard deviations; infinite where it says nothing.
 
-        Frequency and damping of ``mode``, that of the element, are left to the data: a joint changes them. The last mode is the
-        residual of the modes above, of which little is known.
+        ``linear`` is the model of the test. Frequency and damping of the modes ``free``, those of the elements, are left to the
+        data: a joint changes them. The last mode is the residual of the modes above, of which little is known.
         """
         count, measured = len(self.start.frequency_hz), len(modes.frequency_hz)
         inputs, at = len(self.start.inputs), self.names.index
-        vector = self.vector(self.start)
+        names = ("frequency_hz", "damping_ratio", "input_shapes", "output_shapes")
+        vector = self.vector(replace(self.start, **{name: getattr(linear, name) for name in names}))
         std = np.full(vector.size, np.inf)
         known = np.arange(count) < measured
         frequency = np.full(count, _RESIDUAL_STD)
         damping = np.ones(count)
         frequency[:measured] = np.hypot(modes.frequency_std_hz / modes.frequency_hz, _FREQUENCY_STD)
         damping[:measured] = np.hypot(modes.damping_ratio_std / modes.damping_ratio, _DAMPING_STD)
-        frequency[mode] = damping[mode] = np.inf
+        frequency[list(free)] = damping[list(free)] = np.inf
         std[:count], std[count : 2 * count] = frequency, damping
         largest = np.max(np.abs(self.start.output_shapes), axis=0)
         shapes = np.where(known, _SHAPE_STD, _RESIDUAL_STD) * largest
@@ -140,14 +144,18 @@ class Parameters:
         laws = [list(element.laws) for element in start.elements]
         for e, law in laws_in_order(start.elements):
             laws[e][law] = laws[e][law].moved(take(laws[e][law].vector.size))
-        elements = tuple(
-            replace(element, direction=direction, laws=tuple(found))
-            for element, direction, found in zip(start.elements, directions, laws, strict=True)
-        )
         stiffness = max(float(take(1)[0]), 0.0) if self.support else start.support_n_m
         outputs = np.empty_like(start.output_shapes)
         outputs[list(self.tied)] = shapes[:, 0]
         outputs[self._untied] = take(len(self._untied) * modes).reshape(-1, modes)
+        elements = tuple(
+            replace(
+                element,
+                direction=start.place_of(element.between) @ outputs if element.between else direction,
+                laws=tuple(found),
+            )
+            for element, direction, found in zip(start.elements, directions, laws, strict=True)
+        )
         return replace(
             start,
             frequency_hz=frequency,
@@ -208,15 +216,21 @@ class Parameters:
             shapes[:, output, ::inputs] += motions[:, output]
         columns.append(shapes)
         at = 2 * modes + modes * inputs
+        of_places = np.zeros((*raw.shape[:2], len(self.start.outputs), modes))
         for element in self.start.elements:
             columns.append(raw[..., at + np.array(self._kept(element), dtype=int)] / element.scale_m)
+            if element.between:
+                by_direction = raw[..., None, at : at + modes] / element.scale_m
+                of_places += self.start.place_of(element.between)[:, None] * by_direction
             at += modes
+        for output in self.tied:
+            shapes[..., ::inputs] += of_places[:, :, output]
         columns.append(raw[..., at:-1])
         if self.support:
             columns.append(raw[..., -1:])
         for output in self._untied:
-            part = np.zeros((*raw.shape[:2], modes))
-            part[:, output] = motions[:, output]
+            part = of_places[:, :, output].copy()
+            part[:, output] += motions[:, output]
             columns.append(part)
         direct = np.zeros((*raw.shape[:2], model.direct.size))
         for output in range(raw.shape[1]):

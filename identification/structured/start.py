@@ -18,12 +18,12 @@ from identification.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, L
 from identification.structured.modal_motion import LOWEST, modal_spectra
 from identification.structured.model import StructuredModel
 
-__all__ = ["linear_start", "with_element"]
+__all__ = ["HIGHEST", "linear_start", "softened", "started", "with_element"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_HIGHEST = 6.0
+HIGHEST = 6.0
 """Highest line of the regression, relative to the frequency of the mode."""
 _POSITIONS = np.linspace(-1.0, 1.0, 21)
 """Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
@@ -99,27 +99,34 @@ def with_element(
     scale = float(np.max(np.abs(np.concatenate(times)))) * abs(shape)
     parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
     places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
-    omega = linear.omega.copy()
     found = [
-        _regression(parts, list(tried), places, omega[mode]) for tried in product(*(law.candidates() for law in laws))
+        _regression(parts, list(tried), places, linear.omega[mode])
+        for tried in product(*(law.candidates() for law in laws))
     ]
     best = min(found, key=lambda one: one.residual)
-    own = omega[mode]
-    omega[mode] = np.sqrt(max(own**2 + best.stiffness, _LEAST_STIFFNESS * own**2))
-    damping = linear.damping_ratio.copy()
-    damping[mode] = max(damping[mode] * own + 0.5 * best.damping, _LEAST_DAMPING * damping[mode] * own) / omega[mode]
-    direction = np.zeros(len(omega))
+    direction = np.zeros(len(linear.omega))
     direction[mode] = shape
     element = NonlinearElement(
         direction=direction,
         scale_m=scale,
-        laws=tuple(_started(law, numbers, scale) for law, numbers in zip(best.laws, best.numbers, strict=True)),
+        laws=tuple(started(law, numbers, scale) for law, numbers in zip(best.laws, best.numbers, strict=True)),
         reach=reach,
     )
-    return replace(linear, frequency_hz=omega / (2.0 * np.pi), damping_ratio=damping, elements=(element,))
+    return replace(softened(linear, [mode], [best.stiffness], [best.damping]), elements=(element,))
 
 
-def _started(law: Law, numbers: Float, scale: float) -> Law:
+def softened(
+    model: StructuredModel, modes: Sequence[int], stiffness: Sequence[float] | Float, damping: Sequence[float] | Float
+) -> StructuredModel:
+    """Return the model with changes of squared frequencies and of twice damping ratio times frequency (rad/s), limited."""
+    omega, rate = model.omega.copy(), model.damping_ratio * model.omega
+    for mode, softer, less in zip(modes, stiffness, damping, strict=True):
+        omega[mode] = np.sqrt(max(omega[mode] ** 2 + softer, _LEAST_STIFFNESS * omega[mode] ** 2))
+        rate[mode] = max(rate[mode] + 0.5 * less, _LEAST_DAMPING * rate[mode])
+    return replace(model, frequency_hz=omega / (2.0 * np.pi), damping_ratio=rate / omega)
+
+
+def started(law: Law, numbers: Float, scale: float) -> Law:
     """Return a law with the linear numbers that the regression found in J or J s."""
     if not law.linear:
         return law
@@ -156,7 +163,7 @@ class _Equation:
     ) -> None:
         coordinates, inputs, omega = spectra
         own = linear.omega[mode]
-        self.lines = (omega > LOWEST * own) & (omega < _HIGHEST * own)
+        self.lines = (omega > LOWEST * own) & (omega < HIGHEST * own)
         dynamic = own**2 - omega**2 + 2j * linear.damping_ratio[mode] * own * omega
         left = linear.input_shapes[mode] @ inputs - dynamic * coordinates[mode]
         self.left, self.phi, self.q = left[self.lines], phi, q
