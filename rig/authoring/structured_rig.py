@@ -14,6 +14,7 @@ from rig.bench.bench import DriverChoice
 from rig.bench.channels import Channel
 from rig.bench.configuration import validated
 from rig.bench.cross_checks import refuse
+from rig.bench.user_code import refuse_code
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
 from rig.measurements import bench_of_recording
@@ -50,12 +51,18 @@ def structured_model(path: Path, *, trust_code: bool = False) -> StructuredModel
     return model
 
 
-def bench_like(name_or_path: str) -> Bench:
-    """Return a shipped bench, that of a .toml file, or the bench of a recording (.h5)."""
+def bench_like(name_or_path: str, *, trust_code: bool = False) -> Bench:
+    """Return a shipped bench, that of a .toml file, or the bench of a recording (.h5).
+
+    Raises `ConfigurationError` if the bench of a recording names code that is not trusted.
+    """
     if Path(name_or_path).suffix != ".h5":
         return load_bench(name_or_path)
     with Recording(Path(name_or_path)) as recording:
-        return bench_of_recording(recording)
+        bench = bench_of_recording(recording)
+    if not trust_code:
+        refuse_code(bench, name_or_path)
+    return bench
 
 
 def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -> dict[str, Any]:

@@ -88,4 +88,5 @@ def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_c
         raise ConfigurationError(
             "`bench`: is missing, a bench or a recording of one, whose limits, sensors and exciter the rig has"
         )
-    return structured_bench(structured_model(source, trust_code=trust_code), bench_like(bench), shaker=shaker)
+    model = structured_model(source, trust_code=trust_code)
+    return structured_bench(model, bench_like(bench, trust_code=trust_code), shaker=shaker)
