@@ -64,7 +64,7 @@ def new(
         raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig, sensors or driver")
     if source is None and (shaker or trust_code):
         raise ConfigurationError(
-            f"`{'shaker' if shaker else 'trust_code'}`: is for a rig that begins with a model, `from`"
+            f"`{'shaker' if shaker else 'trust_code'}`: is for a rig that begins with a model, `source`"
         )
     table = None if source is None else _identified(what, source, bench, shaker, trust_code)
     beside = new_file(
@@ -83,7 +83,7 @@ def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_c
     from rig.errors import ConfigurationError
 
     if what != "rig":
-        raise ConfigurationError(f"`from` = {source}: a model becomes a rig, allowed is `rig new rig`")
+        raise ConfigurationError(f"`source` = {source}: a model becomes a rig, allowed is `rig new rig`")
     if bench is None:
         raise ConfigurationError(
             "`bench`: is missing, a bench or a recording of one, whose limits, sensors and exciter the rig has"
