@@ -27,7 +27,7 @@ __all__ = ["bench_like", "structured_bench", "structured_model"]
 Float = NDArray[np.float64]
 
 _FAITHFUL = 1e-6
-"""Largest error of a spline through fewer nodes, over the largest force in the range of the training data."""
+"""Largest error of a spline through fewer nodes, over the largest force, in the range of the training data and up to the reach."""
 _FAITHFUL_DAMPING = 1e-3
 """The same of straight lines through a damping."""
 _STRIDES = (32, 16, 8, 4, 2, 1)
@@ -236,15 +236,16 @@ def _force_table(at: str, element: NonlinearElement, force_n: Float, beyond_n_m:
 
 
 def _kept(element: NonlinearElement, values: Float, tolerance: float, *, smooth: bool) -> slice:
-    """Return every so-manieth node of a table, as few as follow it in the range of the training data."""
+    """Return every so-manieth node of a table, as few as follow it in the range of the training data and up to the reach."""
     from scipy.interpolate import CubicSpline  # only on use: it takes long to load
 
     x = element.nodes
-    inside = np.abs(x) <= (element.largest or element.reach)
+    ranges = [np.abs(x) <= (element.largest or element.reach), np.abs(x) <= element.reach]
     for stride in _STRIDES:
         kept = slice(None, None, stride)
         found = CubicSpline(x[kept], values[kept])(x) if smooth else np.interp(x, x[kept], values[kept])
-        if np.max(np.abs(found - values)[inside]) <= tolerance * np.max(np.abs(values[inside])):
+        missed = np.abs(found - values)
+        if all(np.max(missed[inside]) <= tolerance * np.max(np.abs(values[inside])) for inside in ranges):
             break
     return kept
 
