@@ -27,7 +27,7 @@ __all__ = ["bench_like", "structured_bench", "structured_model"]
 Float = NDArray[np.float64]
 
 _FAITHFUL = 1e-6
-"""Largest error of a spline through fewer nodes, over the largest force, in the range of the training data and up to the reach."""
+"""Largest error of a spline through fewer nodes, over the largest force, in the range of the training data and in the reach."""
 _FAITHFUL_DAMPING = 1e-3
 """The same of straight lines through a damping."""
 _STRIDES = (32, 16, 8, 4, 2, 1)
