@@ -33,6 +33,8 @@ _FAITHFUL_DAMPING = 1e-3
 _STRIDES = (32, 16, 8, 4, 2, 1)
 """Distances of the nodes that are kept, in nodes of the model's tables."""
 _DIGITS = 10
+_LEAST_FREE = 0.01
+"""Mass line below the band, over that of the modes, from which on it becomes a mode."""
 _LEAST_SLIDER = 1e-12
 """Stiffness of a slider below which it is none, over that of all."""
 
@@ -81,8 +83,10 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
     shaker
         A shaker by its name (`rig list`) in place of the bench's; a bench that is not virtual needs one.
 
-    All outputs become accelerometers. The support of the model is left out, as the exciter's suspension stands there itself; so
-    is the feed-through ``direct``, which is no motion. Beyond the reach forces are straight lines, and samples are flagged.
+    All outputs become accelerometers. The support of the model is left out, as the exciter's suspension stands there itself. A
+    feed-through from the force to its acceleration, ``direct``, is the mass line of modes below the band: above a hundredth of
+    that of the modes, it becomes a free mode that only the exciter holds; else it is left out. Beyond the reach forces are
+    straight lines, and samples are flagged.
 
     Raises
     ------
@@ -94,16 +98,8 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
     drive = _drive_of(model)
     points = {f"element_{number}": element for number, element in enumerate(model.elements, 1)}
     sensors = _channels(model, like)
-    order = np.argsort(model.frequency_hz, kind="stable")
-    shapes = {c.name: model.output_shapes[row] for row, c in enumerate(model.outputs)}
-    shapes |= {name: element.direction for name, element in points.items()}
     options: dict[str, Any] = {
-        "structure": {
-            "kind": "modal",
-            "frequency_hz": model.frequency_hz[order].tolist(),
-            "damping_ratio": model.damping_ratio[order].tolist(),
-            "shapes": {name: shape[order].tolist() for name, shape in shapes.items()},
-        },
+        "structure": _structure(model, {name: element.direction for name, element in points.items()}),
         **_nonlinear(model, list(points)),
         **_exciter(like, shaker, drive),
         "sensors": [_sensor(channel) for channel in sensors],
@@ -118,6 +114,38 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
         }
     )
     return _with_modes(bench, model)
+
+
+def _structure(model: StructuredModel, directions: dict[str, Float]) -> dict[str, Any]:
+    """Return the modes at the places of outputs and elements, with a free mode for what lies below the band."""
+    order = np.argsort(model.frequency_hz, kind="stable")
+    shapes = {c.name: model.output_shapes[row, order] for row, c in enumerate(model.outputs)}
+    shapes |= {name: direction[order] for name, direction in directions.items()}
+    hertz, damping = model.frequency_hz[order], model.damping_ratio[order]
+    free = _free_mode(model)
+    if free:
+        hertz, damping = np.append(0.0, hertz), np.append(0.0, damping)
+        shapes = {name: np.append(free.get(name, 0.0), shape) for name, shape in shapes.items()}
+    return {
+        "kind": "modal",
+        "frequency_hz": hertz.tolist(),
+        "damping_ratio": damping.tolist(),
+        "shapes": {name: shape.tolist() for name, shape in shapes.items()},
+    }
+
+
+def _free_mode(model: StructuredModel) -> dict[str, float]:
+    """Return the shape of a mode at 0 Hz with the acceleration ``direct`` per force, or none where that is small."""
+    row = find_role(model.outputs, "drive")
+    at_drive = float(model.direct[row, 0]) if model.outputs[row].motion == "acceleration" else 0.0
+    if at_drive < _LEAST_FREE * float(np.sum(model.input_shapes[:, 0] ** 2)):
+        return {}
+    moving = [
+        (c.name, value)
+        for c, value in zip(model.outputs, model.direct[:, 0], strict=True)
+        if c.motion == "acceleration"
+    ]
+    return {name: float(value) / math.sqrt(at_drive) for name, value in moving}
 
 
 def _drive_of(model: StructuredModel) -> str:
@@ -264,7 +292,7 @@ def _description(model: StructuredModel, like: Bench) -> str:
     feeds = [
         f"{value:.2g} {c.unit} per N to {c.name}" for c, value in zip(model.outputs, model.direct[:, 0], strict=True)
     ]
-    left = f"; left out, as it is no motion: {', '.join(feeds)}" if np.any(model.direct) else ""
+    left = f"; left out: {', '.join(feeds)}" if np.any(model.direct) and not _free_mode(model) else ""
     return f"structured model of {model.specimen or 'a specimen'} behind the exciter of the bench {like.name}{left}"
 
 

@@ -74,6 +74,22 @@ def test_the_rig_moves_as_the_model_does_under_the_same_force(make):
         assert np.sqrt(np.mean((moved - simulated) ** 2) / np.mean(moved**2)) < 2e-4, channel.name
 
 
+def test_a_large_feed_through_is_a_free_mode_with_this_mass_line_and_a_small_one_is_left_out():
+    outputs = tuple(replace(channel, unit="m/s2") for channel in beam().outputs)
+    model = beam(outputs=outputs, direct=[[0.3], [0.2], [-0.1]])
+    table = structured_bench(model, load_bench("magnet-beam"))
+    structure = table["driver"]["options"]["structure"]
+    assert structure["frequency_hz"][0] == 0.0
+    assert "left out" not in table["description"]
+    shapes = {name: shape[0] for name, shape in structure["shapes"].items()}
+    for channel, direct in zip(outputs, model.direct[:, 0], strict=True):
+        assert shapes[channel.name] * shapes["drive"] == pytest.approx(direct)
+    assert shapes["element_1"] == shapes["element_2"] == 0.0
+    small = structured_bench(beam(outputs=outputs), load_bench("magnet-beam"))
+    assert "left out: 0.01 m/s2 per N to drive" in small["description"]
+    assert len(small["driver"]["options"]["structure"]["frequency_hz"]) == 2
+
+
 def test_phase_resonance_of_rig_and_model_agree_by_harmonic_balance():
     # Two programs: one of voltage, exciter and structure in physical sites, one of modal coordinates.
     model = replace(jointed(), support_n_m=0.0)
