@@ -41,10 +41,16 @@ class SiteKind(IntEnum):
     CLEARANCE = 3
     USER = 4
     DROOP = 5
+    FORCE_TABLE = 6
+    DAMPING_TABLE = 7
 
 
-MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER, DROOP = (int(kind) for kind in SiteKind)
+MAGNET_ONE_SIDED, MAGNET_SYMMETRIC, CUBIC, CLEARANCE, USER, DROOP, FORCE_TABLE, DAMPING_TABLE = (
+    int(kind) for kind in SiteKind
+)
 N_PARAMETER = 8
+N_NODE = 513
+"""Nodes of a table."""
 
 PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_joint", "i8"), ("substeps", "i8"), ("input_limit_v", "f8")])
 """Sizes, and the voltage beyond which the amplifier clips (one record)."""
@@ -62,13 +68,17 @@ SITE = np.dtype(
         ("partner", "i8"),
         ("address", "i8"),
         ("parameters", "f8", (N_PARAMETER,)),
+        ("table", "f8", (2, N_NODE)),
     ]
 )
 """A local site. ``limit``: limit of validity (m). ``stiffness``: linear stiffness that the linear plant already contains (N/m).
 ``strength``: K0 (N m^4), k3 (N/m^3) or k (N/m). ``quadratic``: quadratic stiffness k2 (N/m^2). ``gap``, ``other_gap`` (m).
-``offset``: force at rest that is subtracted (N). For a droop, ``quadratic`` is G b_1, ``strength`` is G b_2, and ``partner``
-says how many sites before stands the position that the droop depends on. ``address``: address of a user's function, valid in
-the process that made the table; ``parameters``: the numbers passed to it."""
+``offset``: force at rest that is subtracted (N). For a droop, ``quadratic`` is G b_1 and ``strength`` is G b_2. ``partner``
+says how many sites before (negative: behind) stands the position that a droop or a damping depends on. ``address``: address
+of a user's function, valid in the process that made the table; ``parameters``: the numbers passed to it.
+
+``table``: of a force table, force (N) and its slope times the distance of the nodes, evenly from ``gap`` to ``other_gap``, with
+the slopes ``quadratic`` below and ``strength`` above (N/m); of a damping table, the damping (N s/m) in the first row."""
 
 CHANNEL = np.dtype(
     [

@@ -32,22 +32,23 @@ def new_file(
     kind: str = "backbone",
     bench: str | None = None,
     schema_file: Path | None = None,
+    table: dict[str, Any] | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Write a new ``"bench"``, ``"plan"``, ``"rig"`` or ``"sensors"`` and its schema; return the path of the schema's file.
 
     A plan is of a ``kind`` and for a ``bench``; its numbers are those of the shipped plan of that kind, for this bench where
-    there is one. A ``"rig"`` is a bench with a virtual rig of all parts. The schema is written beside the file, or to
-    ``schema_file``.
+    there is one. A ``"rig"`` is a bench with a virtual rig of all parts. ``table`` replaces what a file begins with. The schema
+    is written beside the file, or to ``schema_file``.
 
     Raises `ConfigurationError` for another kind, `rig.errors.RecordingError` if a file exists and ``overwrite`` is false.
     """
     name = {"plan": kind, "sensors": "sensors"}.get(what, "bench")
     named = {} if what == "sensors" else {"name": output.stem}
-    table = _plan(kind, bench) if what == "plan" else {**_start(what), **named}
+    begun = _plan(kind, bench) if what == "plan" else {**(table or _start(what)), **named}
     schema = schema_of(name)
     beside = schema_file or output.with_name(f"{name}.schema.json")
-    text = f"#:schema {_reference(beside, output)}\n{commented(table, schema)}"
+    text = f"#:schema {_reference(beside, output)}\n{commented(begun, schema)}"
     written({output: text, beside: schema_text(schema)}, overwrite)
     return beside
 

@@ -88,7 +88,7 @@ def _parts_of_a_virtual_rig() -> dict[str, type[BaseModel]]:
     from simulators.exciter import Exciter, Stinger
     from simulators.scatter import Deviation, Scatter
     from simulators.sensing.parts import Converter, Sensor
-    from simulators.sites.elements import Clearance, Cubic, Magnet, User
+    from simulators.sites.elements import Clearance, Cubic, DampingTable, ForceTable, Magnet, User
     from simulators.sites.friction import IwanSite, JenkinsSite
     from simulators.structures.meshed import LumpedMass, Support
     from simulators.structures.structure import BeamStructure, LapJointedBeam, ModalStructure
@@ -105,6 +105,8 @@ def _parts_of_a_virtual_rig() -> dict[str, type[BaseModel]]:
         "magnet": Magnet,
         "cubic": Cubic,
         "clearance": Clearance,
+        "force-table": ForceTable,
+        "damping-table": DampingTable,
         "user": User,
         "jenkins": JenkinsSite,
         "iwan": IwanSite,

@@ -21,7 +21,9 @@ from simulators.layout import (
     AMPLIFIER_CLIPPED,
     CLEARANCE,
     CUBIC,
+    DAMPING_TABLE,
     DROOP,
+    FORCE_TABLE,
     LAW_RANGE,
     MAGNET_ONE_SIDED,
     MAGNET_SYMMETRIC,
@@ -71,6 +73,36 @@ def magnet_force(site: Record, z: float) -> float:
 
 
 @kernel
+def table_force(site: Record, z: float) -> float:
+    """Return the restoring force (N) of a force table at deflection ``z`` (m): cubics between nodes, straight lines beyond."""
+    last = site.table.shape[1] - 1
+    if z <= site.gap:
+        return float(site.table[0, 0] + site.quadratic * (z - site.gap))
+    if z >= site.other_gap:
+        return float(site.table[0, last] + site.strength * (z - site.other_gap))
+    at = (z - site.gap) / (site.other_gap - site.gap) * last
+    i = min(int(at), last - 1)
+    t = at - i
+    begin, rise, first, second = (
+        site.table[0, i],
+        site.table[0, i + 1] - site.table[0, i],
+        site.table[1, i],
+        site.table[1, i + 1],
+    )
+    square, cube = 3.0 * rise - 2.0 * first - second, first + second - 2.0 * rise
+    return float(begin + t * (first + t * (square + t * cube)))
+
+
+@kernel
+def table_damping(site: Record, z: float) -> float:
+    """Return the damping (N s/m) of a damping table at deflection ``z`` (m): lines between nodes, constant beyond."""
+    last = site.table.shape[1] - 1
+    at = (min(max(z, site.gap), site.other_gap) - site.gap) / (site.other_gap - site.gap) * last
+    i = min(int(at), last - 1)
+    return float(site.table[0, i] + (at - i) * (site.table[0, i + 1] - site.table[0, i]))
+
+
+@kernel
 def local_force(site: Record, z: float) -> float:
     """Return the force (N) of one site without memory at coordinate ``z`` (m or m/s), minus its linear part.
 
@@ -82,6 +114,8 @@ def local_force(site: Record, z: float) -> float:
         force = -(site.quadratic + site.strength * z) * z * z
     elif site.kind == CLEARANCE:
         force = -site.strength * (max(z - site.gap, 0.0) + min(z + site.other_gap, 0.0))
+    elif site.kind == FORCE_TABLE:
+        force = -table_force(site, z)
     else:
         force = call_at(site.address, z, site.parameters.ctypes.data)
     return float(force + site.stiffness * z)
@@ -93,8 +127,8 @@ def local_forces(
 ) -> bool:
     """Fill ``forces`` of the sites without memory; return whether the coordinate of a site is beyond its limit.
 
-    ``first`` is the index of the sites' first coordinate in ``coordinates``. The force by droop of the force factor depends on
-    two coordinates: the site's own, and the one that is ``partner`` places before it.
+    ``first`` is the index of the sites' first coordinate in ``coordinates``. The force by droop of the force factor, and that
+    of a damping table, depend on two coordinates: the site's own, and the one that is ``partner`` places before it.
     """
     beyond = False
     for s in range(sites.size):
@@ -102,6 +136,8 @@ def local_forces(
         if sites[s].kind == DROOP:
             x = coordinates[first + s - sites[s].partner]
             forces[s] = (sites[s].quadratic + sites[s].strength * x) * x * z
+        elif sites[s].kind == DAMPING_TABLE:
+            forces[s] = -table_damping(sites[s], coordinates[first + s - sites[s].partner]) * z
         else:
             forces[s] = local_force(sites[s], z)
             beyond |= abs(z) > sites[s].limit

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from simulators.exciter import Exciter
 from simulators.layout import SITE, SiteKind
-from simulators.sites.elements import Clearance, Cubic, Element, Magnet
+from simulators.sites.elements import Clearance, Cubic, DampingTable, Element, ForceTable, Magnet
 from simulators.sites.functions import loaded
 from simulators.structures.structure import Structure
 
@@ -29,17 +29,24 @@ class Place(NamedTuple):
 
 
 def element_places(structure: Structure, elements: Sequence[Element], signs: Matrix) -> list[Place]:
-    """Return one place per element; ``signs`` [n_mode] multiply the mode shapes."""
-    return [_element_place(structure, element, signs) for element in elements]
+    """Return one place per element, then one per damping table for the deflection that its damping depends on.
+
+    ``signs`` [n_mode] multiply the mode shapes.
+    """
+    dampers = [element for element in elements if isinstance(element, DampingTable)]
+    return [
+        *(_element_place(structure, element, signs, element.moves_with) for element in elements),
+        *(_element_place(structure, element, signs, "deflection") for element in dampers),
+    ]
 
 
-def _element_place(structure: Structure, element: Element, signs: Matrix) -> Place:
+def _element_place(structure: Structure, element: Element, signs: Matrix, moves_with: str) -> Place:
     shape = signs * structure.shape(element.at)
     if element.to is not None:
         shape = shape - signs * structure.shape(element.to)
     m = shape.size
     row, column = np.zeros((2, 2 * m + 3))
-    first = m if element.moves_with == "velocity" else 0
+    first = m if moves_with == "velocity" else 0
     row[first : first + m] = shape
     column[m : 2 * m] = shape
     return Place(row, column, element.stiffness_n_m)
@@ -70,13 +77,22 @@ def _exciter_records(exciter: Exciter) -> list[dict[str, Any]]:
 
 def local_sites(elements: Sequence[Element], exciter: Exciter) -> NDArray[Any]:
     """Return the table for the kernels, one `simulators.layout.SITE` record per site."""
-    records = [*(_record(element) for element in elements), *_exciter_records(exciter)]
+    records = [*_element_records(elements), *_exciter_records(exciter)]
     table = np.zeros(len(records), SITE)
     table["limit"] = np.inf
     for row, record in zip(table, records, strict=True):
         for name, value in record.items():
             row[name] = value
     return table
+
+
+def _element_records(elements: Sequence[Element]) -> list[dict[str, Any]]:
+    """Return the records of `element_places`; a deflection that a damping depends on has no force."""
+    records = [_record(element) for element in elements]
+    dampers = [place for place, element in enumerate(elements) if isinstance(element, DampingTable)]
+    for count, place in enumerate(dampers):
+        records[place]["partner"] = place - len(elements) - count
+    return [*records, *({"kind": SiteKind.CUBIC} for _ in dampers)]
 
 
 def _record(element: Element) -> dict[str, Any]:
@@ -97,6 +113,25 @@ def _record(element: Element) -> dict[str, Any]:
             "strength": element.contact_stiffness_n_m,
             "gap": element.gap_m,
             "other_gap": np.inf if element.other_gap_m is None else element.other_gap_m,
+        }
+    if isinstance(element, ForceTable):
+        below, above = element.ends_n_m
+        return {
+            "kind": SiteKind.FORCE_TABLE,
+            "limit": element.limit_m,
+            "stiffness": element.stiffness_n_m,
+            "gap": element.deflection_m[0],
+            "other_gap": element.deflection_m[-1],
+            "quadratic": below,
+            "strength": above,
+            "table": element.table,
+        }
+    if isinstance(element, DampingTable):
+        return {
+            "kind": SiteKind.DAMPING_TABLE,
+            "gap": element.deflection_m[0],
+            "other_gap": element.deflection_m[-1],
+            "table": element.table,
         }
     return {
         "kind": SiteKind.USER,

@@ -1,18 +1,21 @@
-"""Local nonlinear elements without memory: magnets, polynomial springs, stops, and functions of the user's own.
+"""Local nonlinear elements without memory: magnets, springs, stops, tables, and functions of the user's own.
 
 Each acts on a coordinate z of the structure: the deflection of a named point, or of one point relative to another, or
 its rate. The force on the structure is along z. What is linear in it belongs to the linear plant.
 """
 
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_serializer, field_validator, model_validator
 
-from simulators.layout import N_PARAMETER
+from simulators.layout import N_NODE, N_PARAMETER
 from simulators.part import Part, Positive, Several
 from simulators.sites.functions import loaded, named, portable
 
-__all__ = ["Clearance", "Cubic", "Element", "LocalElement", "Magnet", "User"]
+__all__ = ["Clearance", "Cubic", "DampingTable", "Element", "ForceTable", "LocalElement", "Magnet", "User"]
 
 VALID_SHARE_OF_GAP = 0.7
 LARGEST_FORCE_AT_REST_N = 1e-9
@@ -120,6 +123,127 @@ class Clearance(LocalElement):
         return self.contact_stiffness_n_m
 
 
+class _Table(LocalElement):
+    """What elements given by numbers over the deflection have in common."""
+
+    deflection_m: Annotated[Several[float], Field(min_length=5)]
+    """Deflections z at which it is given, rising, from below 0 to above 0, with 0 itself."""
+
+    @model_validator(mode="after")
+    def _over_both_sides(self) -> "_Table":
+        z = np.array(self.deflection_m)
+        if not (z[0] < 0.0 < z[-1] and 0.0 in self.deflection_m and np.all(np.diff(z) > 0.0)):
+            shown = f"{z[0]:g} to {z[-1]:g}"
+            raise ValueError(
+                f"deflection_m = {shown}: allowed are rising numbers from below 0 to above 0, with 0 itself"
+            )
+        return self
+
+    def _check_length(self, name: str) -> None:
+        values = getattr(self, name)
+        if len(values) != len(self.deflection_m):
+            raise ValueError(
+                f"{name}: has {len(values)} values, allowed is {len(self.deflection_m)}, one per deflection_m"
+            )
+
+    @property
+    def nodes_m(self) -> NDArray[np.float64]:
+        """Evenly spaced deflections [`simulators.layout.N_NODE`] of the table that the integrator reads."""
+        return np.linspace(self.deflection_m[0], self.deflection_m[-1], N_NODE)
+
+
+class ForceTable(_Table):
+    """A spring whose force is given at some deflections: measured, computed elsewhere, or of an identified model.
+
+    Between them the force follows a cubic spline (not-a-knot; C. de Boor, A Practical Guide to Splines, 1978), beyond them
+    straight lines; a sample beyond them is flagged. The integrator reads the spline at 513 even deflections with cubics
+    between, which is exact where the given ones are 513, 257, 129, ... even ones.
+    """
+
+    kind: Literal["force-table"]
+    """This kind of element."""
+    force_n: Several[float]
+    """Restoring force at each deflection; 0 at deflection 0."""
+    beyond_n_m: float | None = None
+    """Slope of the force beyond the first and the last deflection (N/m); if left out, that of the spline at each end."""
+
+    @model_validator(mode="after")
+    def _rests(self) -> "ForceTable":
+        self._check_length("force_n")
+        at_rest_n = self.force_n[self.deflection_m.index(0.0)]
+        if at_rest_n != 0.0:
+            raise ValueError(f"force_n = {at_rest_n:g} at deflection 0: allowed is 0, z counts from equilibrium")
+        return self
+
+    @cached_property
+    def table(self) -> NDArray[np.float64]:
+        """Force (N), and its slope times the distance of the nodes (N), at the nodes [2, N_NODE]."""
+        z = self.nodes_m
+        return np.array([self._spline(z), self._spline(z, 1) * (z[1] - z[0])])
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline  # only on use: it takes long to load
+
+        return CubicSpline(self.deflection_m, self.force_n)
+
+    @property
+    def ends_n_m(self) -> tuple[float, float]:
+        """Slopes below the first and above the last deflection."""
+        if self.beyond_n_m is not None:
+            return self.beyond_n_m, self.beyond_n_m
+        first, last = self._spline(np.array([self.deflection_m[0], self.deflection_m[-1]]), 1).tolist()
+        return first, last
+
+    @property
+    def limit_m(self) -> float:
+        """Smallest size of deflection that the table does not show to both sides."""
+        return min(-self.deflection_m[0], self.deflection_m[-1])
+
+    @cached_property
+    def stiffness_n_m(self) -> float:
+        """Slope at rest."""
+        return float(self._spline(0.0, 1))
+
+    @property
+    def steepest_n_m(self) -> float:
+        """Largest slope, less that at rest."""
+        slopes = self._spline(self.nodes_m, 1)
+        return float(np.max(np.abs(np.array([*slopes, *self.ends_n_m]) - self.stiffness_n_m)))
+
+
+class DampingTable(_Table):
+    """A damper whose damping depends on the deflection, ``f = -c(z) dz/dt``, and is given at some deflections.
+
+    Between them the damping is a straight line, beyond them constant.
+    """
+
+    kind: Literal["damping-table"]
+    """This kind of element."""
+    damping_n_s_m: Several[Annotated[float, Field(ge=0.0)]]
+    """Damping c at each deflection."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> "DampingTable":
+        self._check_length("damping_n_s_m")
+        return self
+
+    @property
+    def table(self) -> NDArray[np.float64]:
+        """Damping (N s/m) at the nodes [N_NODE]."""
+        return np.interp(self.nodes_m, self.deflection_m, self.damping_n_s_m)
+
+    @property
+    def steepest_n_m(self) -> float:
+        """Largest damping (N s/m)."""
+        return max(self.damping_n_s_m)
+
+    @property
+    def moves_with(self) -> Literal["deflection", "velocity"]:
+        """Its force goes with the velocity."""
+        return "velocity"
+
+
 class User(LocalElement):
     """A force law of the user's own: a compiled C function ``double f(double z, const double *parameters)``.
 
@@ -197,5 +321,5 @@ class User(LocalElement):
         return self.of
 
 
-Element = Annotated[Magnet | Cubic | Clearance | User, Field(discriminator="kind")]
+Element = Annotated[Magnet | Cubic | Clearance | ForceTable | DampingTable | User, Field(discriminator="kind")]
 """Any local element."""

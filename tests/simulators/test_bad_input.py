@@ -81,7 +81,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     (table(elements=[MAGNET | {"to": "magnet"}]), r"elements\[0\].to = 'magnet': allowed is another point"),
     (
         table(elements=[MAGNET | {"kind": "magnet"}]),
-        "'magnet-one-sided', 'magnet-symmetric', 'cubic', 'clearance', 'user'",
+        "'magnet-one-sided', 'magnet-symmetric', 'cubic', 'clearance', 'force-table', 'damping-table', 'user'",
     ),
     (table(elements=[MAGNET, STOP | {"gap_m": 0.011}]), r"elements\[1\].gap_m = 0.011: allowed is below 0.011, where"),
     (

@@ -56,6 +56,15 @@ def there(command, recordings, monkeypatch):
     return typed
 
 
+def test_a_model_becomes_a_rig_like_the_bench_of_its_recording(there, recordings):
+    there("new rig --from S.h5 --bench lines.h5 -o mine.toml")
+    there("new rig --from S.h5 --bench magnet-beam -o other.toml")
+    mine, other = (rig.load_bench(recordings / f"{name}.toml") for name in ("mine", "other"))
+    assert mine.model_copy(update={"name": "other"}) == other
+    assert [channel.name for channel in mine.channels] == ["force", "drive"]
+    assert mine.driver.options["exciter"]["force_factor_n_a"] == 5.3
+
+
 def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(there):
     told = json.loads(there("show S.h5 --json").out)
     assert (told["kind"], told["sample_rate_hz"], told["outputs"]) == ("structured", 200.0, ["drive"])
