@@ -41,8 +41,9 @@ Responses and errors of PNLSS models
     ErrorSpectra, output_stretch, OutputStretch, ErrorTable, identify_many, ModelJob, IdentifiedModel,
     realisation_combinations
 Structured models
-    fit_structured, StructuredModel, StructuredFit, NonlinearElement, structured_backbone,
-    structured_frequency_response, structured_response, structured_steady_state, bound_of, Bound
+    fit_structured, StructuredModel, StructuredFit, NonlinearElement, ElementPlan, ElementTrial,
+    structured_backbone, structured_frequency_response, structured_response, structured_steady_state,
+    bound_of, Bound
 Changes from run to run
     fit_with_scatter, RunScatter, OutputBand
 Measurements of others
@@ -131,8 +132,10 @@ if TYPE_CHECKING:
     from identification.slow_flows.short_points import ShortPoint, short_point
     from identification.slow_flows.slow_flow import SlowFlow, slow_flow
     from identification.structured.bound import Bound, bound_of
+    from identification.structured.element_trials import ElementTrial
     from identification.structured.elements import NonlinearElement
     from identification.structured.fit import StructuredFit, fit_structured
+    from identification.structured.further import ElementPlan
     from identification.structured.model import StructuredModel
     from identification.structured.steady.backbone import structured_backbone
     from identification.structured.steady.response import (
@@ -178,6 +181,8 @@ else:
             "ModelJob": "pnlss.many",
             "MultisineDesign": "multisine.design",
             "MultisineMapping": "mapping.multisine",
+            "ElementPlan": "structured.further",
+            "ElementTrial": "structured.element_trials",
             "NonlinearElement": "structured.elements",
             "NonlinearMode": "nonlinear.nonlinear_modes",
             "NonlinearModeMapping": "mapping.nonlinear_mode",
@@ -288,6 +293,8 @@ __all__ = [
     "ContinuousBackbone",
     "CoupledRun",
     "DistortionLevels",
+    "ElementPlan",
+    "ElementTrial",
     "ErrorSpectra",
     "ErrorTable",
     "Exciter",

@@ -38,7 +38,8 @@ _STAGES = {
 }
 """Damping ratio of the leading forces in each fit, and whether the support is free; by whether it is asked for."""
 _MISFIT = 0.01
-"""Relative misfit of the samples against which the errors of the modal test are weighed."""
+"""Relative misfit of the samples against which the errors of the modal test are weighed at first; later that of the fit before,
+if it is smaller."""
 _LARGEST_STATIC = 10.0
 """Largest static force relative to the largest RMS of the training forces."""
 _SUPPORT = 0.01
@@ -194,7 +195,7 @@ def _fitted(
     tied = (find_role(start.outputs, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     moves = [int(np.argmax(np.abs(element.direction[:led]))) for element in start.elements]
-    found, evaluations = start, 0
+    found, evaluations, misfit = start, 0, _MISFIT
     measured = np.arange(len(linear.omega)) < led
     slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
     for ratio, free in _STAGES[support]:
@@ -215,10 +216,11 @@ def _fitted(
             for e, count in zip(settled, lengths, strict=True)
         ]
         parameters = Parameters(start, tied, free)
-        problem = _Problem(parameters, settled, leads, parameters.expected(modes, linear, moves))
+        problem = _Problem(parameters, settled, leads, parameters.expected(modes, linear, moves), misfit)
         vector, more = problem.solve(parameters.vector(found), _ROUGH if ratio else _FINE)
         found, evaluations = parameters.model(vector), evaluations + more
-    problem.triangle(vector)
+        problem.triangle(vector)
+        misfit = min(_MISFIT, problem.error)
     return _Fitted(found, start, problem, vector, evaluations)
 
 
@@ -235,10 +237,11 @@ class _Problem:
         experiments: Sequence[Experiment],
         leads: Sequence[Lead | None],
         expected: tuple[Float, Float],
+        misfit: float,
     ) -> None:
         self.parameters, self.experiments, self.stopped = parameters, experiments, ""
         self._expected, std = expected
-        self._trust = _MISFIT / std
+        self._trust = misfit / std
         self.leads = leads
         outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
         self.count = outputs.size

@@ -118,10 +118,11 @@ def identify(
         ),
     ] = None,
     laws: Annotated[
-        str | None,
+        list[str] | None,
         typer.Option(
             metavar="LIST",
-            help="Laws of a structured model's element.",
+            help="Laws of a structured model's element, with @OUTPUT or @OUTPUT:OUTPUT where it acts; repeated for further "
+            "elements, which are kept while they pay.",
             show_default="polynomial-spring,polynomial-damper",
         ),
     ] = None,
@@ -158,7 +159,7 @@ def identify(
             iterations=iterations,
             resume=output if resume else None,
         ),
-        structured=StructuredOptions(laws=laws),
+        structured=StructuredOptions(laws=tuple(laws or ())),
         data=DataOptions(
             rate_hz=rate_hz,
             input=input,

@@ -1,12 +1,13 @@
 """Options for the identification of a structured model."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.errors import ConfigurationError
 from rig.models.identify.data_request import Options
 
 if TYPE_CHECKING:
+    from identification.structured.further import ElementPlan
     from identification.structured.laws import Law
 
 __all__ = ["MODES_OF_A_STRUCTURE", "StructuredOptions"]
@@ -25,20 +26,30 @@ class StructuredOptions(Options):
     Raises `ConfigurationError` for values that are not allowed.
     """
 
-    laws: str | None = None
-    """Kinds of the laws of the element, separated by commas; ``polynomial-spring,polynomial-damper`` if None."""
+    laws: tuple[str, ...] = ()
+    """Elements, each as kinds of its laws with commas: ``polynomial-spring,masing``; after ``@`` the output at which it acts,
+    or two with a colon between them. One element with ``polynomial-spring,polynomial-damper`` if empty."""
 
     def __post_init__(self) -> None:
-        self.for_fit()  # refused here, not when it is asked for
+        self.elements()  # refused here, not when it is asked for
 
-    def for_fit(self) -> dict[str, Any]:
-        """Return what `identification.fit_structured` takes."""
-        if self.laws is None:
-            return {}
+    def elements(self) -> "tuple[ElementPlan, ...]":
+        """Return the elements as `identification.fit_structured` takes them."""
+        if not self.laws:
+            return ()
+        from identification.structured.further import ElementPlan
         from identification.structured.laws import LAWS
 
-        names = [name.strip() for name in self.laws.split(",")]
         ready: dict[str, type[Law]] = {name: law for name, law in LAWS.items() if name != "user-spring"}
-        if any(name not in ready for name in names) or len(set(names)) < len(names):
-            raise ConfigurationError(f"`laws` = {self.laws!r}: allowed are {', '.join(ready)}, each once, with commas")
-        return {"laws": tuple(ready[name]() for name in names)}
+        found = []
+        for text in self.laws:
+            kinds, at, place = text.partition("@")
+            names, between = [name.strip() for name in kinds.split(",")], [name.strip() for name in place.split(":")]
+            if any(name not in ready for name in names) or len(set(names)) < len(names):
+                raise ConfigurationError(f"`laws` = {text!r}: allowed are {', '.join(ready)}, each once, with commas")
+            if at and (not all(between) or len(between) > 2 or len(set(between)) < len(between)):
+                raise ConfigurationError(
+                    f"`laws` = {text!r}: after @ allowed is an output, or two with a colon between them"
+                )
+            found.append(ElementPlan(tuple(ready[name]() for name in names), tuple(between) if at else ()))
+        return tuple(found)

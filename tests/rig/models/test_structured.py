@@ -38,7 +38,7 @@ def recordings(tmp_path_factory) -> Path:
     request = Request(
         kind="structured",
         modes=folder / "modes.h5",
-        structured=StructuredOptions(laws="polynomial-spring"),
+        structured=StructuredOptions(laws=("polynomial-spring",)),
         data=DataOptions(rate_hz=200.0, outputs="drive"),
     )
     save(identify_model([folder / "lines.h5"], request), folder / "S.h5")
@@ -247,7 +247,7 @@ def test_a_file_that_lacks_an_array_is_named(tmp_path):
 def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
     page = (Path(__file__).parents[3] / "docs/how-to/identify-a-structured-model.md").read_text(encoding="utf-8")
     for name in sorted(set(LAWS) - {"user-spring"}):
-        (law,) = StructuredOptions(laws=name).for_fit()["laws"]
+        ((law,),) = [plan.laws for plan in StructuredOptions(laws=(name,)).elements()]
         assert isinstance(law, LAWS[name])
         assert f"`{name}`" in page
 
@@ -287,6 +287,14 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
         (
             "identify S.h5 --model structured --modes modes.h5",
             "S.h5: is a file of kind structured; a structured model comes from recordings: multisine, sweep",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws iwan@drive:drive",
+            "--laws = 'iwan@drive:drive': after @ allowed is an output, or two with a colon",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws iwan@nowhere",
+            "nowhere",
         ),
         (
             "identify lines.h5 --model structured --modes modes.h5 --scatter mass",
