@@ -11,6 +11,7 @@ from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement, tables_of
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
+from identification.structured.small_vibrations import linearised
 from identification.structured.steps import Room, System, led, run
 from identification.validation import finite_array, positive
 from vibrolock.results import Result
@@ -252,6 +253,20 @@ class StructuredModel(Result):
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         names = ("outputs", "displacement", "velocity", "acceleration")
         return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})
+
+    def linearised(self) -> "StructuredModel":
+        """Return the modes of small vibrations about rest, as a model without elements.
+
+        Springs have their slope at rest, and all sliders stick. Frequencies and damping ratios are those of the poles, shapes
+        those without damping. Not modelled: the damping that couples these modes, and what time steps do to the elements,
+        which lowers the frequencies of a simulation by up to ``(pi f h)^2 / 3`` of themselves.
+
+        Raises
+        ------
+        IdentificationError
+            If a mode does not oscillate and fade at rest.
+        """
+        return linearised(self)
 
     def trained_with(self, experiments: Sequence[Experiment]) -> "StructuredModel":
         """Return the model with the largest displacements of its elements in ``experiments``."""

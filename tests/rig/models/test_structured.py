@@ -71,6 +71,32 @@ def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(ther
     assert "polynomial-spring" in there("show S.h5").out
 
 
+def test_small_vibrations_are_shown_with_stuck_joints_and_what_was_fitted_beside_them(there, recordings):
+    sliding = json.loads(there("show S.h5 --json").out)
+    assert sliding["linear_part"] is None  # a polynomial spring has no slope at rest
+    found = load(recordings / "S.h5")
+    (element,) = found.model.elements
+    joint = replace(element, laws=(*element.laws, Jenkins(0.05, 0.2)))
+    save(replace(found.model, elements=(joint,)), recordings / "joint.h5")
+    stuck = json.loads(there("show joint.h5 --json").out)
+    own = (2.0 * np.pi * found.model.frequency_hz) ** 2
+    matrix = np.diag(own) + 0.05 / element.scale_m * np.outer(element.direction, element.direction)
+    matrix_hz = np.sqrt(np.linalg.eigvalsh(matrix)) / (2.0 * np.pi)
+    assert [mode["frequency_hz"] for mode in stuck["modes"]] == pytest.approx(matrix_hz, rel=1e-3)
+    assert [mode["frequency_hz"] for mode in stuck["linear_part"]] == pytest.approx(found.model.frequency_hz)
+    said = there("show joint.h5").out
+    assert said.index("small vibrations, all joints stuck") < said.index("fitted linear part, all joints slipping")
+
+
+def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recordings):
+    fit = load(recordings / "S.h5").fit
+    errors = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)), strict=True))
+    for index, mode in enumerate(json.loads(there("show S.h5 --json").out)["modes"], 1):
+        of_frequency, of_damping = errors[f"frequency {index}"], errors[f"damping {index}"]
+        assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-3)
+        assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-3)
+
+
 def test_multisines_have_the_errors_of_the_file(there):
     told = json.loads(there("predict S.h5 --multisine lines.h5 -o P.h5 --overwrite --json").out)
     shown = json.loads(there("show S.h5 --json").out)
