@@ -42,7 +42,8 @@ Responses and errors of PNLSS models
     realisation_combinations
 Structured models
     fit_structured, StructuredModel, StructuredFit, NonlinearElement, structured_backbone,
-    structured_frequency_response, structured_response, structured_steady_state, bound_of, Bound
+    structured_frequency_response, structured_response, structured_steady_state, structured_coupled_run, CoupledMotion,
+    bound_of, Bound
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
@@ -127,6 +128,7 @@ if TYPE_CHECKING:
     from identification.slow_flows.short_points import ShortPoint, short_point
     from identification.slow_flows.slow_flow import SlowFlow, slow_flow
     from identification.structured.bound import Bound, bound_of
+    from identification.structured.coupled.run import CoupledMotion, structured_coupled_run
     from identification.structured.elements import NonlinearElement
     from identification.structured.fit import StructuredFit, fit_structured
     from identification.structured.model import StructuredModel
@@ -147,6 +149,7 @@ else:
             "Comparison": "prediction.comparison",
             "ConstantForceCurve": "response_control.curves",
             "ContinuousBackbone": "slow_flows.continuous",
+            "CoupledMotion": "structured.coupled.run",
             "CoupledRun": "pnlss.coupled.run",
             "DistortionLevels": "multisine.distortion",
             "ErrorSpectra": "prediction.simulated_runs",
@@ -262,6 +265,7 @@ else:
             "steady_predictions": "prediction.frequency_response",
             "stepped_sine_mode": "nonlinear.stepped_sine",
             "structured_backbone": "structured.steady.backbone",
+            "structured_coupled_run": "structured.coupled.run",
             "structured_frequency_response": "structured.steady.response",
             "structured_response": "structured.steady.response",
             "structured_steady_state": "structured.steady.response",
@@ -279,6 +283,7 @@ __all__ = [
     "Comparison",
     "ConstantForceCurve",
     "ContinuousBackbone",
+    "CoupledMotion",
     "CoupledRun",
     "DistortionLevels",
     "ErrorSpectra",
@@ -394,6 +399,7 @@ __all__ = [
     "steady_predictions",
     "stepped_sine_mode",
     "structured_backbone",
+    "structured_coupled_run",
     "structured_frequency_response",
     "structured_response",
     "structured_steady_state",

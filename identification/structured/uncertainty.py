@@ -29,11 +29,11 @@ def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> 
     size = np.sqrt(np.diag(fit.covariance))
     unit = np.where(size > 0.0, size, 1.0)
     values, axes = np.linalg.eigh(fit.covariance / np.outer(unit, unit))
-    square = 0.0
+    parts = []
     for value, axis in zip(values.tolist(), axes.T, strict=True):
         if value <= 0.0:
             continue
         step = _SHARE * np.sqrt(value) * axis * size
         more, less = (quantity(parameters.model(fit.values + sign * step)) for sign in (1.0, -1.0))
-        square = square + ((more - less) / (2.0 * _SHARE)) ** 2
-    return np.asarray(np.sqrt(square))
+        parts.append((more - less) / (2.0 * _SHARE))
+    return np.asarray(np.linalg.norm(parts, axis=0))

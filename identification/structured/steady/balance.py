@@ -156,7 +156,7 @@ class StructuredBalance(DrivenBalance):
         return distinct(np.exp(2.0 * np.pi * values[order]), self.order, 1.0)
 
     def state_use(self, z: Float, to_time: Float) -> Float:
-        """float[n_elements]: largest displacement of each element over that in training, or over its reach if that is unknown."""
+        """float[n_elements]: largest displacement of each element over that in training, or its reach if that is unknown."""
         x = np.abs(to_time @ self.states(z) @ self._system.phi.T)
         return np.asarray(np.max(x, axis=0, initial=0.0) / self._range)
 

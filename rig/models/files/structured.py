@@ -1,5 +1,6 @@
 """Files of structured models: the model, its fit, its errors by experiment, and the spectra of one experiment."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,11 +92,15 @@ def _small_vibrations(model: StructuredModel, fit: StructuredFit | None) -> _Mod
     """Return the same at rest, where joints stick; None if the model does not vibrate there, or names code."""
     if functions_of(model):
         return None
+    std = np.full(2 * len(model.frequency_hz), np.nan)
     try:
-        std = np.full(2 * len(model.frequency_hz), np.nan) if fit is None else std_of(fit, _numbers_at_rest)
-        return _rows(model.linearised(), std)
+        at_rest = model.linearised()
     except IdentificationError:
         return None
+    if fit is not None:
+        with suppress(IdentificationError):  # at a distance of the standard errors the model may not exist
+            std = std_of(fit, _numbers_at_rest)
+    return _rows(at_rest, std)
 
 
 def _numbers_at_rest(model: StructuredModel) -> np.ndarray:
