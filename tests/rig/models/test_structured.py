@@ -289,10 +289,23 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
         ),
         ("identify lines.h5 --model structured --modes modes.h5 --hold-out 2", "no level has more than 2 realisations"),
         (
-            "predict S.h5 --frequency-response 1",
-            "--frequency-response: means nothing to a structured model, which answers",
+            "predict S.h5 --frequency-response 1 --modes modes.h5",
+            "--modes: means nothing to a structured model, which answers",
         ),
-        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to a structured model"),
+        (
+            "predict S.h5 --frequency-response 1 --allow-extrapolation",
+            "--allow-extrapolation: means nothing to a structu",
+        ),
+        ("predict S.h5 --frequency-response 1 --force rms", "'rms' of a model driven by a force needs an exciter"),
+        (
+            "predict S.h5 --voltage-response 1",
+            "--voltage-response: gives a voltage, and S.h5 is driven by a force; add --e",
+        ),
+        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to --multisine"),
+        (
+            "predict S.h5 --frequency-response 1 --exciter S.h5",
+            "S.h5: is a file of kind structured, wanted is one of kin",
+        ),
         ("predict S.h5 --multisine modes.h5", "modes.h5: "),
         ("predict modes.h5 --multisine lines.h5", "predictions are made with a nonlinear-mode, pnlss, structured, "),
     ],
