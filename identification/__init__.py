@@ -43,7 +43,7 @@ Responses and errors of PNLSS models
 Structured models
     fit_structured, StructuredModel, StructuredFit, NonlinearElement, structured_backbone,
     structured_frequency_response, structured_response, structured_steady_state, structured_coupled_run, CoupledMotion,
-    bound_of, Bound
+    structured_mode, bound_of, Bound
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
@@ -133,6 +133,7 @@ if TYPE_CHECKING:
     from identification.structured.fit import StructuredFit, fit_structured
     from identification.structured.model import StructuredModel
     from identification.structured.steady.backbone import structured_backbone
+    from identification.structured.steady.mode import structured_mode
     from identification.structured.steady.response import (
         structured_frequency_response,
         structured_response,
@@ -267,6 +268,7 @@ else:
             "structured_backbone": "structured.steady.backbone",
             "structured_coupled_run": "structured.coupled.run",
             "structured_frequency_response": "structured.steady.response",
+            "structured_mode": "structured.steady.mode",
             "structured_response": "structured.steady.response",
             "structured_steady_state": "structured.steady.response",
             "subspace": "linear.subspace",
@@ -401,6 +403,7 @@ __all__ = [
     "structured_backbone",
     "structured_coupled_run",
     "structured_frequency_response",
+    "structured_mode",
     "structured_response",
     "structured_steady_state",
     "subspace",

@@ -47,6 +47,10 @@ class StructuredBalance(DrivenBalance):
         shape = (self.ranges, basis.samples)
         self._room = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
 
+    def like(self, model: StructuredModel) -> "StructuredBalance":
+        """Return the same equations of another model."""
+        return StructuredBalance(model, self.drive, self.basis, self._mean_supported > 0.0)
+
     def angle(self, frequency_hz: float) -> float:
         """Phase advance of a period, rad."""
         return 2.0 * np.pi

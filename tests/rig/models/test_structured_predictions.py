@@ -83,3 +83,20 @@ def test_figures_are_drawn_and_other_responses_refused(told, command, model, mon
     monkeypatch.chdir(model.parent)
     assert command("plot OUT.h5 -o OUT.png").status == 0
     assert "elements reach" in command("predict ST.h5 --frequency-response 0.9 -o BIG.h5 --overwrite").out
+
+
+def test_its_backbone_lies_on_that_which_is_measured(model, command, monkeypatch):
+    from identification import structured_mode
+    from rig.models.files.files import load
+
+    monkeypatch.chdir(model.parent)
+    done = command("plot ST.h5 backbone.h5 NM.h5 -o over.png")
+    assert done.status == 0, done.err
+    measured, found = load(model.parent / "NM.h5"), structured_mode(load(model).fit)
+    assert found.modal_frequency_std_hz.max() < 0.01
+    inside = measured.amplitude_m < found.amplitude_m.max()
+    assert inside.sum() > 3
+    at = measured.amplitude_m[inside]
+    for name, share in (("modal_frequency_hz", 5e-4), ("damping_ratio", 0.02)):
+        own = np.interp(at, found.amplitude_m, getattr(found, name))
+        np.testing.assert_allclose(own, getattr(measured, name)[inside], rtol=share)
