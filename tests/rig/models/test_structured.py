@@ -201,6 +201,9 @@ def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_t
     refused = there("predict own.h5 --multisine lines.h5 -o O.h5")
     assert "own.h5: function = 'own_law_of_a_test:cubic': is code that the model names" in refused.err
     assert refused.err.endswith("--trust-code\n")
+    over = there("plot own.h5 S.h5 -o over.png")
+    assert "own.h5: names a function, own_law_of_a_test:cubic, which is not imported to draw" in over.err
+    assert json.loads(there("show own.h5 --json").out)["modes"] is None
     assert "own_law_of_a_test" not in sys.modules
     done = there("predict own.h5 --multisine lines.h5 --trust-code -o O.h5 --overwrite --json")
     assert done.status == 0, done.err

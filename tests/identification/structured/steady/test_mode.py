@@ -8,6 +8,7 @@ import pytest
 from identification import IdentificationError, NonlinearElement, StructuredFit, structured_backbone, structured_mode
 from identification.structured.laws import Jenkins, PolynomialSpring
 from identification.structured.parameters import Parameters
+from tests.identification.pnlss.steady.oscillators import shaker
 from tests.identification.structured.steady.beams import beam, friction
 
 CUBIC_N = 0.4
@@ -104,3 +105,13 @@ def test_what_has_no_mode_is_refused():
         IdentificationError, match="force_n: is missing; the model does not know the range of its train"
     ):
         structured_mode(unknown)
+
+
+def test_with_an_exciter_the_damping_is_that_of_the_same_amplitude():
+    model = duffing()
+    alone = structured_mode(model, 1.0)
+    driven = structured_mode(fit_of(model, {"damping 1": 0.05}), 1.0, force="fundamental", exciter=shaker())
+    at = np.interp(driven.amplitude_m, alone.amplitude_m, alone.damping_ratio)
+    np.testing.assert_allclose(driven.damping_ratio, at, rtol=5e-3)
+    np.testing.assert_allclose(driven.damping_ratio_std / driven.damping_ratio, 0.05, rtol=0.02)
+    assert np.max(driven.force_harmonic_ratio(3)) > 1e-4
