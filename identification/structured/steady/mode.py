@@ -27,6 +27,8 @@ _POINTS = 25
 """Largest number of points; they are spread over the backbone."""
 _TRIES = 12
 """Doublings of the force until an element moves as far as in the training data."""
+_REACHED = 0.8
+"""Share of the training range below which a backbone that ends for another reason counts as cut off."""
 _CORRECTIONS, _EXACT = 8, 1e-9
 
 
@@ -108,7 +110,10 @@ def structured_mode(
         response_harmonics_m=displacement[..., 0],
         source="structured model",
         specimen=model.specimen,
-        notes=_notes(isinstance(found, StructuredFit), force, support and model.support_n_m > 0.0),
+        notes=(
+            *_notes(isinstance(found, StructuredFit), force, support and model.support_n_m > 0.0),
+            *([f"the backbone ends early ({path.reason})"] if float(path.use()[-1]) < _REACHED and path.reason else []),
+        ),
         drive_mode_shape=shape,
         drive_mode_shape_source="small vibrations of the structured model",
     )
@@ -129,8 +134,7 @@ def _within_training(
     if not model.elements or not all(element.largest for element in model.elements):
         raise IdentificationError("force_n: is missing; the model does not know the range of its training data")
     at_rest = model.linearised()
-    hz = resonance_hz(model, near_hz)
-    mode = int(np.argmin(np.abs(at_rest.frequency_hz - hz)))
+    mode = int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz(model, near_hz))))
     shape = abs(at_rest.output_shapes[row, mode])
     least = min(float(e.largest or 1.0) * e.scale_m / np.linalg.norm(e.direction) for e in model.elements)
     force_n = float(2.0 * at_rest.damping_ratio[mode] * at_rest.omega[mode] ** 2 * least / shape)
