@@ -43,7 +43,7 @@ Responses and errors of PNLSS models
 Structured models
     fit_structured, StructuredModel, StructuredFit, NonlinearElement, ElementPlan, ElementTrial,
     structured_backbone, structured_frequency_response, structured_response, structured_steady_state,
-    bound_of, Bound
+    structured_coupled_run, CoupledMotion, structured_mode, bound_of, Bound
 Changes from run to run
     fit_with_scatter, RunScatter, OutputBand
 Measurements of others
@@ -132,12 +132,14 @@ if TYPE_CHECKING:
     from identification.slow_flows.short_points import ShortPoint, short_point
     from identification.slow_flows.slow_flow import SlowFlow, slow_flow
     from identification.structured.bound import Bound, bound_of
+    from identification.structured.coupled.run import CoupledMotion, structured_coupled_run
     from identification.structured.element_trials import ElementTrial
     from identification.structured.elements import NonlinearElement
     from identification.structured.fit import StructuredFit, fit_structured
     from identification.structured.further import ElementPlan
     from identification.structured.model import StructuredModel
     from identification.structured.steady.backbone import structured_backbone
+    from identification.structured.steady.mode import structured_mode
     from identification.structured.steady.response import (
         structured_frequency_response,
         structured_response,
@@ -154,6 +156,7 @@ else:
             "Comparison": "prediction.comparison",
             "ConstantForceCurve": "response_control.curves",
             "ContinuousBackbone": "slow_flows.continuous",
+            "CoupledMotion": "structured.coupled.run",
             "CoupledRun": "pnlss.coupled.run",
             "DistortionLevels": "multisine.distortion",
             "ErrorSpectra": "prediction.simulated_runs",
@@ -274,7 +277,9 @@ else:
             "steady_predictions": "prediction.frequency_response",
             "stepped_sine_mode": "nonlinear.stepped_sine",
             "structured_backbone": "structured.steady.backbone",
+            "structured_coupled_run": "structured.coupled.run",
             "structured_frequency_response": "structured.steady.response",
+            "structured_mode": "structured.steady.mode",
             "structured_response": "structured.steady.response",
             "structured_steady_state": "structured.steady.response",
             "subspace": "linear.subspace",
@@ -291,6 +296,7 @@ __all__ = [
     "Comparison",
     "ConstantForceCurve",
     "ContinuousBackbone",
+    "CoupledMotion",
     "CoupledRun",
     "DistortionLevels",
     "ElementPlan",
@@ -411,7 +417,9 @@ __all__ = [
     "steady_predictions",
     "stepped_sine_mode",
     "structured_backbone",
+    "structured_coupled_run",
     "structured_frequency_response",
+    "structured_mode",
     "structured_response",
     "structured_steady_state",
     "subspace",

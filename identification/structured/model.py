@@ -11,11 +11,12 @@ from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement, tables_of
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
+from identification.structured.small_vibrations import small_vibrations
 from identification.structured.steps import Room, System, led, run
 from identification.validation import finite_array, positive
 from vibrolock.results import Result
 
-__all__ = ["Motion", "StructuredModel", "ends_of_steps", "room_for"]
+__all__ = ["Motion", "StructuredModel", "ends_of_steps", "motion_of", "outputs_of", "room_for"]
 
 Float = NDArray[np.float64]
 
@@ -219,19 +220,7 @@ class StructuredModel(Result):
             room = room_for(part)
             run(part, room, ends[first * self.steps : last * self.steps + 1], state, states[first:last])
             unsolved += int(room.unsolved[0])
-        largest = np.max(np.abs(states[:, 0] @ system.phi.T), axis=0, initial=0.0)
-        return Motion(
-            outputs=outputs_of(self, u, states),
-            displacement=states[:, 0].T,
-            velocity=states[:, 1].T,
-            acceleration=states[:, 2].T,
-            reach_use=np.asarray(largest / system.tables.limits[:, 0]),
-            unsolved_steps=unsolved,
-            range_use=max(
-                (float(x / e.largest) for x, e in zip(largest, self.elements, strict=True) if e.largest),
-                default=float("nan"),
-            ),
-        )
+        return motion_of(self, u, states, unsolved)
 
     def simulate_experiment(self, experiment: Experiment) -> Motion:
         """Return the motion under the inputs of an experiment.
@@ -263,6 +252,31 @@ class StructuredModel(Result):
             found[find_name(self.outputs, name)] = sign
         return found
 
+    def linearised(self) -> "StructuredModel":
+        """Return the modes of small vibrations about rest, as a model without elements.
+
+        Springs have their slope at rest, and all sliders stick. Frequencies and damping ratios are those of the poles, shapes
+        those without damping. Not modelled: the damping that couples these modes, and what time steps do to the elements,
+        which lowers the frequencies of a simulation by up to ``(pi f h)^2 / 3`` of themselves.
+
+        Raises
+        ------
+        IdentificationError
+            If a mode does not oscillate and fade at rest.
+        """
+        if not self.elements:
+            return self
+        system = self.system
+        poles, shapes = small_vibrations(self.omega, self.damping_ratio, system.phi, system.tables)
+        return replace(
+            self,
+            frequency_hz=np.abs(poles) / (2.0 * np.pi),
+            damping_ratio=-poles.real / np.abs(poles),
+            input_shapes=shapes.T @ self.input_shapes,
+            output_shapes=self.output_shapes @ shapes,
+            elements=(),
+        )
+
     def trained_with(self, experiments: Sequence[Experiment]) -> "StructuredModel":
         """Return the model with the largest displacements of its elements in ``experiments``."""
         use = np.max([self.simulate_experiment(one).reach_use for one in experiments], axis=0)
@@ -278,6 +292,25 @@ def outputs_of(model: StructuredModel, u: Float, states: Float) -> Float:
     """float[n_outputs, n] from inputs and states [n, 3, n_modes]."""
     motions = states[:, model.motions]  # [n, n_outputs, n_modes]
     return np.asarray(np.einsum("kom,om->ok", motions, model.output_shapes) + model.direct @ u)
+
+
+def motion_of(model: StructuredModel, u: Float, states: Float, unsolved: int) -> Motion:
+    """Return the run with inputs and states [n, 3, n_modes]."""
+    phi = np.array([element.phi for element in model.elements]).reshape(len(model.elements), len(model.omega))
+    largest = np.max(np.abs(states[:, 0] @ phi.T), axis=0, initial=0.0)
+    reach = np.array([element.reach for element in model.elements])
+    return Motion(
+        outputs=outputs_of(model, u, states),
+        displacement=states[:, 0].T,
+        velocity=states[:, 1].T,
+        acceleration=states[:, 2].T,
+        reach_use=np.asarray(largest / reach),
+        unsolved_steps=unsolved,
+        range_use=max(
+            (float(x / e.largest) for x, e in zip(largest, model.elements, strict=True) if e.largest),
+            default=float("nan"),
+        ),
+    )
 
 
 def room_for(system: System, columns: int = 0) -> Room:

@@ -26,16 +26,16 @@ def predict(
         typer.Option(
             "--voltage-response",
             metavar="VOLT",
-            help="Predict a PNLSS model's frequency response at this constant voltage (peak), of its input or of the "
-            "exciter; may be repeated.",
+            help="Predict the frequency response of a PNLSS or structured model at this constant voltage (peak), of its input "
+            "or of the exciter; may be repeated.",
         ),
     ] = None,
     held: Annotated[
         str | None,
         typer.Option(
             "--force",
-            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS model "
-            "driven by a force, and without an exciter, pure-sine.",
+            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS or structured "
+            "model driven by a force, and without an exciter, pure-sine.",
         ),
     ] = None,
     sweeps: Annotated[
@@ -57,9 +57,9 @@ def predict(
     exciter: Annotated[
         Path | None,
         typer.Option(
-            help="Exciter model: sweeps are predicted from the voltage, recorded ones and planned ones. With a PNLSS model "
-            "driven by a force also responses and references at constant fundamental, RMS or voltage, with the harmonics that "
-            "the exciter makes; one driven by the voltage has its own."
+            help="Exciter model: sweeps are predicted from the voltage, recorded ones and planned ones. With a PNLSS or "
+            "structured model driven by a force also responses and references at constant fundamental, RMS or voltage, with "
+            "the harmonics that the exciter makes; one driven by the voltage has its own."
         ),
     ] = None,
     zero_crossings: Annotated[

@@ -14,6 +14,7 @@ from identification import (
     IdentificationError,
     NonlinearMode,
     nonlinear_mode,
+    structured_mode,
 )
 from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.frequency_responses import passes_of
@@ -31,6 +32,7 @@ from rig.drawing.style import unit_text
 from rig.errors import RecordingError
 from rig.figures.curves import Curves, Line, Panel, Quantity, Trace, View, channel_of, peak
 from rig.models.files.files import KINDS, load
+from rig.models.files.structured import IdentifiedStructured, functions_of
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
@@ -85,7 +87,7 @@ def family_of(path: Path) -> _Family:
     raise RecordingError(f"{path}: is of kind {kind}, which has no curves to lay over others; {known} have some")
 
 
-def _backbones(source: Recording | NonlinearMode | Backbone, view: View) -> Curves:
+def _backbones(source: Recording | NonlinearMode | Backbone | IdentifiedStructured, view: View) -> Curves:
     """Modal frequency and damping over the amplitude, with 95 % intervals; a continuous backbone has one curve per repeat."""
     traces, across, modes = [], DISPLACEMENT, _modes(source)
     for number, (measured, mode) in enumerate(modes, 1):
@@ -109,10 +111,18 @@ def _backbones(source: Recording | NonlinearMode | Backbone, view: View) -> Curv
     return Curves(panels, tuple(traces), modes[0][1].specimen, omitted)
 
 
-def _modes(source: Recording | NonlinearMode | Backbone) -> list[tuple[Backbone | None, NonlinearMode]]:
+def _modes(
+    source: Recording | NonlinearMode | Backbone | IdentifiedStructured,
+) -> list[tuple[Backbone | None, NonlinearMode]]:
     """Return the modes of a file, with the backbones that they were identified from where the file holds these."""
     if isinstance(source, NonlinearMode):
         return [(None, source)]
+    if isinstance(source, IdentifiedStructured):
+        if functions := functions_of(source.model):
+            raise RecordingError(
+                f"names a function, {functions[0]}, which is not imported to draw; use structured_mode"
+            )
+        return [(None, structured_mode(source.model if source.fit is None else source.fit))]
     if isinstance(source, Backbone):
         return [(source, nonlinear_mode(source))]
     measurements = CAMPAIGNS[source.kind].measurements
@@ -232,7 +242,11 @@ def _sweeps(source: Recording, view: View) -> Curves:
 
 
 FAMILIES = (
-    _Family("backbones", ("backbone", "continuous-backbone", "nonlinear-mode", "measured-backbone"), _backbones),
+    _Family(
+        "backbones",
+        ("backbone", "continuous-backbone", "nonlinear-mode", "measured-backbone", "structured"),
+        _backbones,
+    ),
     _Family("frequency responses", ("stepped-sine", "stepped-phase", "frequency-responses"), _responses),
     _Family("response-controlled tests", ("response-controlled",), _responses),
     _Family("frequency response functions", ("multisine", "frequency-response-matrix"), _transfer),

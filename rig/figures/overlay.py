@@ -48,7 +48,8 @@ def overlay(
     ----------
     sources
         Recordings of one kind, or recordings and models with the same axes: backbones (recorded, continuous, measured
-        elsewhere, or a nonlinear mode), stepped sines and stepped phase, response-controlled tests, multisines, sweeps.
+        elsewhere, a nonlinear mode, or that of a structured model), stepped sines and stepped phase, response-controlled
+        tests, multisines, sweeps.
     labels
         Names in the legend, one for each file; none: the names of the files.
     view

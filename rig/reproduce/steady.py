@@ -9,12 +9,9 @@ import numpy as np
 from identification import (
     Exciter,
     IdentificationError,
-    PnlssModel,
     SteadyPrediction,
-    StructuredModel,
-    pnlss_frequency_response,
-    structured_frequency_response,
 )
+from rig.models.predict.driven_models import DrivenModel, frequency_response_at
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.true_responses import Truth, truths
@@ -78,7 +75,7 @@ class Steady:
 
 
 def steady(
-    options: Options, models: Mapping[str, tuple[str, PnlssModel | StructuredModel]], say: Callable[[str], None]
+    options: Options, models: Mapping[str, tuple[str, DrivenModel]], say: Callable[[str], None]
 ) -> tuple[list[Steady], tuple[Truth, ...]]:
     """Return the predictions of the selected models (by training set), and the true responses of the rig.
 
@@ -97,13 +94,12 @@ def steady(
 
 
 def _predicted(
-    options: Options, model: PnlssModel | StructuredModel, truth: Truth, exciter: Exciter | None
+    options: Options, model: DrivenModel, truth: Truth, exciter: Exciter | None
 ) -> tuple[SteadyPrediction | None, str]:
     low, high = options.specimen.band_hz
     used = exciter if truth.held == "fundamental" else None
-    respond: Any = structured_frequency_response if isinstance(model, StructuredModel) else pnlss_frequency_response
     try:
-        found: SteadyPrediction = respond(
+        found = frequency_response_at(
             model, truth.level, force=truth.held, exciter=used, lowest_hz=low, highest_hz=high
         )
     except IdentificationError as error:

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Exciter, Experiment, PnlssModel, StructuredModel, pnlss_coupled_run
+from identification import Exciter, Experiment
 from identification.channels import find_role
 from identification.pnlss.simulators import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
+from rig.models.predict.driven_models import DrivenModel, coupled_run
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded, training_data
@@ -73,11 +74,11 @@ class SweepResult:
 
 
 def simulated_sweeps(
-    options: Options, models: Mapping[str, tuple[str, PnlssModel | StructuredModel]], say: Callable[[str], None]
+    options: Options, models: Mapping[str, tuple[str, DrivenModel]], say: Callable[[str], None]
 ) -> list[SweepResult]:
     """Simulate every sweep of the specimen with every selected model, from the measured input of the model.
 
-    PNLSS models with the force as input are also simulated from the voltage, with the exciter coupled.
+    Models with the force as input are also simulated from the voltage, with the exciter coupled.
     """
     found = []
     exciter = exciter_of(options, say) if options.input == "force" else None
@@ -89,7 +90,7 @@ def simulated_sweeps(
             (driven,) = training_data(options, recorded(options, sweep, say), given="voltage")
         for training_set, (name, model) in models.items():
             found.append(_simulated(sweep, plan, training_set, name, model, experiment))
-            if exciter is not None and isinstance(model, PnlssModel):
+            if exciter is not None:
                 found.append(_simulated(sweep, plan, training_set, name, model, driven, exciter))
     return found
 
@@ -99,16 +100,16 @@ def _simulated(
     plan: SweepPlan,
     training_set: str,
     name: str,
-    model: PnlssModel | StructuredModel,
+    model: DrivenModel,
     experiment: Experiment,
     exciter: Exciter | None = None,
 ) -> SweepResult:
     run: SimulatedMotion
-    if exciter is None or isinstance(model, StructuredModel):
+    if exciter is None:
         run = model.simulate(experiment.inputs)
     else:
         lowest_hz = _LOWEST * min(plan.start_hz, plan.stop_hz)
-        run = pnlss_coupled_run(model, exciter, experiment.inputs[0], lowest_hz=lowest_hz)
+        run = coupled_run(model, exciter, experiment.inputs[0], lowest_hz=lowest_hz)
     there = experiment.counted_outputs[find_role(experiment.output_channels, "drive")]
     here = run.outputs[find_role(model.outputs, "drive"), experiment.counted_from :]
     at = (

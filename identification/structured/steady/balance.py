@@ -33,18 +33,23 @@ class StructuredBalance(DrivenBalance):
     acts: it does work, which the damping found by a fit offsets. The multipliers do not include the memory of the filter.
     """
 
-    beyond = "elements are beyond {:g} times the reach of their laws"
+    beyond = "elements are beyond {:g} times their range"
 
     def __init__(self, model: StructuredModel, drive: Drive, basis: Basis, support: bool = True) -> None:
         modes, self.ranges = len(model.omega), len(model.elements)
         super().__init__(model, modes, drive, basis)
         self.model, self.order, self._system = model, 2 * modes, model.system
         self.kinks = len(self._system.tables.sliders) > 0
+        self._range = np.array([element.largest or element.reach for element in model.elements])
         self._mean_supported = float(support)
         self._turning = basis.turned(0.0)[1]
         self._to_rate = basis.to_time @ self._turning
         shape = (self.ranges, basis.samples)
         self._room = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
+
+    def like(self, model: StructuredModel) -> "StructuredBalance":
+        """Return the same equations of another model."""
+        return StructuredBalance(model, self.drive, self.basis, self._mean_supported > 0.0)
 
     def angle(self, frequency_hz: float) -> float:
         """Phase advance of a period, rad."""
@@ -121,16 +126,6 @@ class StructuredBalance(DrivenBalance):
         size = self.basis.size
         return self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
 
-    def small_vibrations(self) -> tuple[Float, Float]:
-        """float[n_modes, n_modes] each: stiffness and damping at rest, where sliders stick, without the support."""
-        phi = self._system.phi
-        zero = np.zeros((self.basis.size, self.n_states))
-        _, damping, by = self._elements(zero, 1.0)
-        slope = by[:, 0, 0]  # of a constant displacement
-        stiffness = np.diag(self.model.omega**2) + phi.T @ (slope[:, None] * phi)
-        own = np.diag(2.0 * self.model.damping_ratio * self.model.omega)
-        return stiffness, own + phi.T @ (damping[:, :1] * phi)
-
     def linear_response(self, frequency_hz: float, row: int) -> tuple[Complex, Complex]:
         """Return modal coordinates and outputs of small vibrations."""
         at, n, count = self._at_rest(frequency_hz), self.n_states, self.state_unknowns
@@ -165,9 +160,9 @@ class StructuredBalance(DrivenBalance):
         return distinct(np.exp(2.0 * np.pi * values[order]), self.order, 1.0)
 
     def state_use(self, z: Float, to_time: Float) -> Float:
-        """float[n_elements]: largest displacement of each element over its reach."""
+        """float[n_elements]: largest displacement of each element over that in training, or its reach if that is unknown."""
         x = np.abs(to_time @ self.states(z) @ self._system.phi.T)
-        return np.asarray(np.max(x, axis=0, initial=0.0) / self._system.tables.limits[:, 0])
+        return np.asarray(np.max(x, axis=0, initial=0.0) / self._range)
 
     def input_use(self, inputs: Float, to_time: Float) -> Float:
         """NaN: a structured model does not know the range of its inputs."""

@@ -5,7 +5,6 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.pnlss.steady.assembly import response_of, steady_state_of
 from identification.pnlss.steady.basis import Basis
-from identification.pnlss.steady.drives import Sine
 from identification.pnlss.steady.notes import harmonics_notes, held_notes, loss_notes
 from identification.pnlss.steady.setting_up import Held, band_around, drive_of, held_values
 from identification.pnlss.steady.states import PnlssResponse, SteadyStates, largest_use
@@ -74,9 +73,10 @@ def structured_response(
 ) -> PnlssResponse:
     """Compute the steady response of a model to a constant force, by harmonic balance and arc-length continuation.
 
-    The balance is that of the continuous equation of motion. Result and notes are those
-    of `pnlss_response`; ``states`` are the modal coordinates, ``state_use`` the largest displacement of each element over its
-    reach, and the multipliers are those over a period. Stability does not consider the memory of the support's filter.
+    The balance is that of the continuous equation of motion. Result and notes are those of `pnlss_response`; ``states`` are the
+    modal coordinates, ``state_use`` the largest displacement of each element over its largest in the training data (over its
+    reach if that is unknown), and the multipliers are those over a period. Stability does not consider the memory of the
+    support's filter.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def structured_response(
     points
         Largest number of points on a branch.
     largest_range_use
-        Largest displacement of an element over its reach; a path that exceeds it ends there, with a note.
+        Largest ``state_use``; a path that exceeds it ends there, with a note.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def structured_response(
         notes=lambda every: [
             *held_notes(model, force, exciter),
             *harmonics_notes(every),
-            *_reach_notes(every),
+            *_range_notes(model, every),
             *loss_notes(every),
         ],
     )
@@ -172,17 +172,15 @@ def balance_of(
 
 def resonance_hz(model: StructuredModel, near_hz: float | None = None) -> float:
     """Frequency of a mode of small vibrations: the nearest one, or that which moves most at the first input."""
-    drive = Sine(1.0, 0, len(model.inputs))
-    stiffness, damping = StructuredBalance(model, drive, Basis(1, _LEAST_SAMPLES)).small_vibrations()
-    squares, vectors = np.linalg.eigh(stiffness)
-    omega = np.sqrt(np.maximum(squares, 0.0))
+    at_rest = model.linearised()
     if near_hz is not None:
-        return float(omega[np.argmin(np.abs(omega - 2.0 * np.pi * near_hz))] / (2.0 * np.pi))
-    width = np.sum(vectors * (damping @ vectors), axis=0)
-    compliance = (model.input_shapes[:, 0] @ vectors) ** 2 / np.maximum(width * omega, 1e-300)
-    return float(omega[int(np.argmax(compliance))] / (2.0 * np.pi))
+        return float(at_rest.frequency_hz[np.argmin(np.abs(at_rest.frequency_hz - near_hz))])
+    compliance = at_rest.input_shapes[:, 0] ** 2 / (at_rest.damping_ratio * at_rest.omega**2)
+    return float(at_rest.frequency_hz[int(np.argmax(compliance))])
 
 
-def _reach_notes(points: SteadyStates) -> list[str]:
+def _range_notes(model: StructuredModel, points: SteadyStates) -> list[str]:
     largest = float(np.max(largest_use(points.state_use), initial=0.0))
-    return [f"elements reach {largest:.2f} times the reach of their laws: extrapolated"] if largest > 1.0 else []
+    known = all(element.largest for element in model.elements)
+    of = "the training data" if known else "the reach of their laws"
+    return [f"elements reach {largest:.2f} times {of}: extrapolated"] if largest > 1.0 else []

@@ -1,5 +1,6 @@
 """Files of structured models: the model, its fit, its errors by experiment, and the spectra of one experiment."""
 
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
 from identification.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
 from identification.structured.laws import Joint, UserSpring
+from identification.structured.uncertainty import std_of
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.models.files.simulated import (
     SimulatedModel,
@@ -81,21 +83,52 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedStructured:
     return IdentifiedStructured(**parts, **unpacked_errors(arrays, attributes))
 
 
-def _modes(model: StructuredModel, fit: StructuredFit | None) -> list[dict[str, float | None]]:
-    """Natural frequencies (Hz) and damping ratios of the linear part with their standard errors, None where unknown."""
+_Modes = list[dict[str, float | None]]
+_SAME = 1e-6
+"""Relative difference of frequencies below which small vibrations are those of the linear part."""
+
+
+def _linear_part(model: StructuredModel, fit: StructuredFit | None) -> _Modes:
+    """Natural frequencies (Hz) and damping ratios as they were fitted with their standard errors, None where unknown."""
     errors = {} if fit is None else dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
-    rows: list[dict[str, float | None]] = []
-    for index, (frequency, damping) in enumerate(zip(model.frequency_hz, model.damping_ratio, strict=True), 1):
-        of_frequency, of_damping = (errors.get(f"{name} {index}") for name in ("frequency", "damping"))
-        rows.append(
-            {
-                "frequency_hz": float(frequency),
-                "frequency_std_hz": None if of_frequency is None else of_frequency * float(frequency),
-                "damping_ratio": float(damping),
-                "damping_ratio_std": None if of_damping is None else of_damping * float(damping),
-            }
-        )
-    return rows
+    size = np.concatenate([model.frequency_hz, model.damping_ratio])
+    names = [f"{name} {index + 1}" for name in ("frequency", "damping") for index in range(len(model.frequency_hz))]
+    return _rows(model, size * np.array([errors.get(name, np.nan) for name in names]))
+
+
+def _small_vibrations(model: StructuredModel, fit: StructuredFit | None) -> _Modes | None:
+    """Return the same at rest, where joints stick; None if the model does not vibrate there, or names code."""
+    if functions_of(model):
+        return None
+    std = np.full(2 * len(model.frequency_hz), np.nan)
+    try:
+        at_rest = model.linearised()
+    except IdentificationError:
+        return None
+    if fit is not None:
+        with suppress(IdentificationError):  # at a distance of the standard errors the model may not exist
+            std = std_of(fit, _numbers_at_rest)
+    return _rows(at_rest, std)
+
+
+def _numbers_at_rest(model: StructuredModel) -> np.ndarray:
+    at_rest = model.linearised()
+    return np.concatenate([at_rest.frequency_hz, at_rest.damping_ratio])
+
+
+def _rows(model: StructuredModel, std: np.ndarray) -> _Modes:
+    """Rows of modes; ``std``: first those of the frequencies, then those of the damping ratios."""
+    values = np.array([model.frequency_hz, std[: std.size // 2], model.damping_ratio, std[std.size // 2 :]])
+    names = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std")
+    return [
+        {name: float(value) if np.isfinite(value) else None for name, value in zip(names, row, strict=True)}
+        for row in values.T
+    ]
+
+
+def _differ(one: _Modes, other: _Modes) -> bool:
+    pairs = [(a[name], b[name]) for a, b in zip(one, other, strict=True) for name in ("frequency_hz", "damping_ratio")]
+    return any(a is not None and b is not None and abs(a - b) > _SAME * abs(b) for a, b in pairs)
 
 
 def _element(element: NonlinearElement) -> dict[str, Any]:
@@ -118,13 +151,15 @@ def functions_of(model: StructuredModel) -> list[str]:
 
 def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
     model, fit = found.model, found.fit
+    fitted, at_rest = _linear_part(model, fit), _small_vibrations(model, fit)
     return {
         "specimen": model.specimen,
         "inputs": [channel.name for channel in model.inputs],
         "outputs": [channel.name for channel in model.outputs],
         "sample_rate_hz": model.sample_rate_hz,
         "steps": model.steps,
-        "modes": _modes(model, fit),
+        "modes": at_rest,
+        "linear_part": None if at_rest is not None and not _differ(fitted, at_rest) else fitted,
         "elements": [_element(element) for element in model.elements],
         "joints": any(isinstance(law, Joint) for element in model.elements for law in element.laws),
         "support_n_m": model.support_n_m,
@@ -158,23 +193,16 @@ def _say(summary: dict[str, Any]) -> None:
             f"{fit['numbers']} numbers fitted, error {number(fit['training_error'], '.3f', 100.0)} % in training, "
             f"{fit['evaluations']} simulations; {number(summary['seconds'], '.1f')} s in all; {fit['stopped']}"
         )
-    print("linear part, all joints slipping" if summary["joints"] else "linear part")
-    print_table(
-        ("mode", "frequency Hz", "+-", "damping %", "+-"),
-        [
-            (
-                str(index),
-                number(mode["frequency_hz"], ".4f"),
-                number(mode["frequency_std_hz"], ".2g", 1.96),
-                number(mode["damping_ratio"], ".4f", 100.0),
-                number(mode["damping_ratio_std"], ".2g", 196.0),
-            )
-            for index, mode in enumerate(summary["modes"], 1)
-        ],
-    )
+    if summary["modes"] is not None:
+        print("small vibrations, all joints stuck" if summary["joints"] else "small vibrations")
+        _say_modes(summary["modes"])
+    if summary["linear_part"] is not None:
+        print("fitted linear part, all joints slipping" if summary["joints"] else "fitted linear part")
+        _say_modes(summary["linear_part"])
     print("elements")
+    modes = len(summary["modes"] or summary["linear_part"])
     print_table(
-        ("element", "laws", "largest mm", "reach mm", *(f"direction {i + 1}" for i in range(len(summary["modes"])))),
+        ("element", "laws", "largest mm", "reach mm", *(f"direction {i + 1}" for i in range(modes))),
         [
             (
                 str(index),
@@ -201,6 +229,22 @@ def _say_trials(trials: list[dict[str, Any]]) -> None:
         print(
             f"element with {', '.join(trial['laws'])}: errors in validation {trial['gain']:.3g} times smaller{sure}; {what}"
         )
+
+
+def _say_modes(modes: _Modes) -> None:
+    print_table(
+        ("mode", "frequency Hz", "+-", "damping %", "+-"),
+        [
+            (
+                str(index),
+                number(mode["frequency_hz"], ".4f"),
+                number(mode["frequency_std_hz"], ".2g", 1.96),
+                number(mode["damping_ratio"], ".4f", 100.0),
+                number(mode["damping_ratio_std"], ".2g", 196.0),
+            )
+            for index, mode in enumerate(modes, 1)
+        ],
+    )
 
 
 STRUCTURED = FileKind(

@@ -37,10 +37,9 @@ from rig.models.files.nonlinear_mode import NONLINEAR_MODE
 from rig.models.files.pnlss import PNLSS
 from rig.models.files.structured import STRUCTURED
 from rig.models.identify.identify import modes_in
-from rig.models.predict.pnlss import pnlss_predictions
-from rig.models.predict.pnlss_steady import Reference
 from rig.models.predict.request import PredictionRequest
-from rig.models.predict.structured import structured_predictions
+from rig.models.predict.simulated import simulated_predictions
+from rig.models.predict.simulated_steady import Reference
 from rig.models.predict.surface import surface_predictions
 from rig.models.predict.sweeps import SweepModels, Swept, planned_sweeps, recorded_sweeps
 from rig.recording.arrays import kind_of
@@ -64,16 +63,14 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     kind = kind_of(model)
     if kind not in (known := (NONLINEAR_MODE.name, PNLSS.name, STRUCTURED.name, FORCE_SURFACE.name)):
         raise RecordingError(f"{model}: is a file of kind {kind}; predictions are made with a {', '.join(known)}")
-    if kind == STRUCTURED.name:
-        return structured_predictions(model, request)
-    if request.trust_code:
+    if request.trust_code and kind != STRUCTURED.name:
         raise ConfigurationError(f"`trust_code`: means nothing to a {kind}, which names no code; leave it out")
-    if kind == PNLSS.name:
-        return pnlss_predictions(
-            model, request, [one for path in request.references for one in _references(path, request)]
-        )
+    for simulated in (PNLSS, STRUCTURED):
+        if kind == simulated.name:
+            measured_ones = [one for path in request.references for one in _references(path, request)]
+            return simulated_predictions(model, simulated, request, measured_ones)
     if request.voltages_v:
-        raise ConfigurationError(f"`voltages_v`: means nothing to a {kind}; a PNLSS model answers it")
+        raise ConfigurationError(f"`voltages_v`: means nothing to a {kind}; a PNLSS or structured model answers it")
     if kind == FORCE_SURFACE.name:
         references = [measured for path in request.references for measured in _stepped_sines(path)]
         return surface_predictions(load_as(FORCE_SURFACE, model), request, references)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification import FrequencyResponse, pnlss_frequency_response
-from rig.models.predict.pnlss_steady import Reference, compared
+from rig.models.predict.simulated_steady import Reference, compared
 from tests.identification.pnlss.steady.oscillators import oscillator
 
 FORCE_N = 5.0

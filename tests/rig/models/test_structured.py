@@ -80,6 +80,32 @@ def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(ther
     assert "polynomial-spring" in there("show S.h5").out
 
 
+def test_small_vibrations_are_shown_with_stuck_joints_and_what_was_fitted_beside_them(there, recordings):
+    sliding = json.loads(there("show S.h5 --json").out)
+    assert sliding["linear_part"] is None  # a polynomial spring has no slope at rest
+    found = load(recordings / "S.h5")
+    (element,) = found.model.elements
+    joint = replace(element, laws=(*element.laws, Jenkins(0.05, 0.2)))
+    save(replace(found.model, elements=(joint,)), recordings / "joint.h5")
+    stuck = json.loads(there("show joint.h5 --json").out)
+    own = (2.0 * np.pi * found.model.frequency_hz) ** 2
+    matrix = np.diag(own) + 0.05 / element.scale_m * np.outer(element.direction, element.direction)
+    matrix_hz = np.sqrt(np.linalg.eigvalsh(matrix)) / (2.0 * np.pi)
+    assert [mode["frequency_hz"] for mode in stuck["modes"]] == pytest.approx(matrix_hz, rel=1e-3)
+    assert [mode["frequency_hz"] for mode in stuck["linear_part"]] == pytest.approx(found.model.frequency_hz)
+    said = there("show joint.h5").out
+    assert said.index("small vibrations, all joints stuck") < said.index("fitted linear part, all joints slipping")
+
+
+def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recordings):
+    fit = load(recordings / "S.h5").fit
+    errors = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)), strict=True))
+    for index, mode in enumerate(json.loads(there("show S.h5 --json").out)["modes"], 1):
+        of_frequency, of_damping = errors[f"frequency {index}"], errors[f"damping {index}"]
+        assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-3)
+        assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-3)
+
+
 def test_multisines_have_the_errors_of_the_file(there):
     told = json.loads(there("predict S.h5 --multisine lines.h5 -o P.h5 --overwrite --json").out)
     shown = json.loads(there("show S.h5 --json").out)
@@ -202,6 +228,9 @@ def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_t
     refused = there("predict own.h5 --multisine lines.h5 -o O.h5")
     assert "own.h5: function = 'own_law_of_a_test:cubic': is code that the model names" in refused.err
     assert refused.err.endswith("--trust-code\n")
+    over = there("plot own.h5 S.h5 -o over.png")
+    assert "own.h5: names a function, own_law_of_a_test:cubic, which is not imported to draw" in over.err
+    assert json.loads(there("show own.h5 --json").out)["modes"] is None
     assert "own_law_of_a_test" not in sys.modules
     done = there("predict own.h5 --multisine lines.h5 --trust-code -o O.h5 --overwrite --json")
     assert done.status == 0, done.err
@@ -307,10 +336,23 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
         ("identify lines.h5 --model linear --scatter gain", "--scatter: means nothing to --model linear"),
         ("identify lines.h5 --model structured --modes modes.h5 --hold-out 2", "no level has more than 2 realisations"),
         (
-            "predict S.h5 --frequency-response 1",
-            "--frequency-response: means nothing to a structured model, which answers",
+            "predict S.h5 --frequency-response 1 --modes modes.h5",
+            "--modes: means nothing to a structured model, which answers",
         ),
-        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to a structured model"),
+        (
+            "predict S.h5 --frequency-response 1 --allow-extrapolation",
+            "--allow-extrapolation: means nothing to a structu",
+        ),
+        ("predict S.h5 --frequency-response 1 --force rms", "'rms' of a model driven by a force needs an exciter"),
+        (
+            "predict S.h5 --voltage-response 1",
+            "--voltage-response: gives a voltage, and S.h5 is driven by a force; add --e",
+        ),
+        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to --multisine"),
+        (
+            "predict S.h5 --frequency-response 1 --exciter S.h5",
+            "S.h5: is a file of kind structured, wanted is one of kin",
+        ),
         ("predict S.h5 --multisine modes.h5", "modes.h5: "),
         ("predict modes.h5 --multisine lines.h5", "predictions are made with a nonlinear-mode, pnlss, structured, "),
     ],

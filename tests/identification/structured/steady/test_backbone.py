@@ -63,7 +63,7 @@ def test_a_backbone_begins_at_the_mode_that_is_asked_for():
     ("options", "message"),
     [
         ({"force": "voltage", "exciter": shaker()}, "force: is 'voltage', allowed are pure-sine, fundamental, rms"),
-        ({"largest_range_use": 0.05}, r"the backbone ends at .* N \(elements are beyond 0.05 times the reach"),
+        ({"largest_range_use": 0.05}, r"the backbone ends at .* N \(elements are beyond 0.05 times their range"),
     ],
 )
 def test_what_has_no_backbone_is_refused(options, message):

@@ -1,5 +1,7 @@
 """Frequency responses of structured models: folds, stability, exciters, notes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -99,7 +101,17 @@ def test_notes_say_what_is_held_and_what_is_extrapolated():
     assert not any("training data" in note for note in found.notes)
     short = structured_response(duffing(0.5), 3.0, lowest_hz=22.0, highest_hz=32.0, largest_range_use=0.5)
     assert not short.complete
-    assert any("elements are beyond 0.5 times the reach of their laws" in note for note in short.notes)
+    assert any("elements are beyond 0.5 times their range" in note for note in short.notes)
+
+
+def test_the_range_is_that_of_the_training_data_if_it_is_known():
+    model = duffing(0.5)
+    (element,) = model.elements
+    known = replace(model, elements=(replace(element, largest=0.5 * element.reach),))
+    options = {"lowest_hz": 22.0, "highest_hz": 32.0, "largest_range_use": 10.0}
+    one, other = (structured_response(each, 3.0, **options) for each in (model, known))
+    assert np.max(other.prediction.range_use) == pytest.approx(2.0 * np.max(one.prediction.range_use))
+    assert any("times the training data: extrapolated" in note for note in other.notes)
 
 
 def test_the_default_band_is_that_of_the_mode_that_moves_most():

@@ -1,4 +1,4 @@
-"""Recorded and planned sweeps, simulated by a nonlinear state-space model from force or voltage."""
+"""Recorded and planned sweeps, simulated by a PNLSS or structured model from force or voltage."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -26,17 +26,18 @@ from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD, rows_f
 from rig.measurements.experiments.records import sweep_pieces
 from rig.measurements.experiments.signals import Signals
 from rig.measurements.points_left_out import points_left_out
-from rig.models.predict.pnlss_sweep_models import PnlssSweepModels, SweepGiven
+from rig.models.predict.driven_models import DrivenModel
+from rig.models.predict.simulated_sweep_models import SimulatedSweepModels, SweepGiven
 from rig.models.predict.sweeps import Swept, force_and_drive, planned, strangers
 from rig.recording.reader import Recording
 from rig.tick.layout import SAMPLE_LOST
 
-__all__ = ["planned_pnlss_sweeps", "recorded_pnlss_sweeps"]
+__all__ = ["planned_simulated_sweeps", "recorded_simulated_sweeps"]
 
 Float = NDArray[np.float64]
 
 
-def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swept]:
+def recorded_simulated_sweeps(path: Path, models: SimulatedSweepModels) -> Iterator[Swept]:
     """Simulate every accepted sweep of a recording, from its force or from its voltage.
 
     The simulation starts from rest where the data does. Raises `RecordingError` if the file has other contents,
@@ -57,7 +58,7 @@ def recorded_pnlss_sweeps(path: Path, models: PnlssSweepModels) -> Iterator[Swep
             yield Swept(predicted, force_and_drive(sweep), compare_sweep(predicted, sweep, name=name), (*notes, *more))
 
 
-def planned_pnlss_sweeps(plan_source: str, models: PnlssSweepModels) -> Iterator[Swept]:
+def planned_simulated_sweeps(plan_source: str, models: SimulatedSweepModels) -> Iterator[Swept]:
     """Simulate every level of a planned sweep.
 
     Raises `ConfigurationError` if the plan is no sweep at constant voltage, or too fast for the sample rate of the model.
@@ -102,13 +103,15 @@ def _waveform(plan: SweepPlan, rate_hz: float) -> tuple[Float, Float, int]:
     return before + 2.0 * np.pi * turned, 0.5 - 0.5 * np.cos(np.pi * risen), first
 
 
-def _largest_in_training(model: PnlssModel, row: int) -> float:
+def _largest_in_training(model: DrivenModel, row: int) -> float:
     """Estimate the largest value of an output within the range of the training data; infinite if that is unknown."""
+    if not isinstance(model, PnlssModel):
+        return float("inf")  # bounded, and shown whatever it is
     found = float(np.sum(np.abs(model.c[row]) * model.state_range) + np.sum(np.abs(model.d[row]) * model.input_range))
     return found if np.isfinite(found) and found > 0.0 else float("inf")
 
 
-def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
+def _recorded(recording: Recording, number: int, models: SimulatedSweepModels) -> tuple[SweepGiven, tuple[str, ...]]:
     """Return the sweep with a stored number at the model's rate, and the oscillator's phase at the compared samples."""
     bench, model, name = bench_of_recording(recording), models.model, f"sweep {number + 1}"
     try:
@@ -142,7 +145,7 @@ def _recorded(recording: Recording, number: int, models: PnlssSweepModels) -> tu
     said = [f"{recording.path}: {lost} samples of {name} were lost and are bridged"] if lost else []
     begin = None
     if found.initial_state == "estimated":
-        if models.exciter is None:
+        if models.exciter is None and isinstance(model, PnlssModel):
             begin = estimated_initial_state(model, found)
         else:
             said.append(f"{recording.path}: {name} does not begin at rest, but is simulated as if it did")

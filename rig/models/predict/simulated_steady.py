@@ -1,4 +1,4 @@
-"""Steady vibrations of nonlinear state-space models, compared with stepped sines."""
+"""Steady vibrations of PNLSS and structured models, compared with stepped sines."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -9,15 +9,13 @@ from identification import (
     Exciter,
     FrequencyResponse,
     IdentificationError,
-    PnlssModel,
     PredictionError,
     SteadyPrediction,
     SteadyStates,
     compare,
-    pnlss_frequency_response,
-    pnlss_steady_state,
 )
 from identification.prediction.comparison import Over
+from rig.models.predict.driven_models import DrivenModel, frequency_response_at, steady_state_at
 
 __all__ = ["Held", "Reference", "compared", "default_held"]
 
@@ -46,14 +44,14 @@ class Reference:
     """Second harmonic of the force over its fundamental at the largest response; None if unknown."""
 
 
-def default_held(model: PnlssModel, exciter: Exciter | None) -> Held:
+def default_held(model: DrivenModel, exciter: Exciter | None) -> Held:
     """Return the quantity of the force that the model can hold constant."""
     force_driven = any(channel.role == "force" for channel in model.inputs)
     return "pure-sine" if force_driven and exciter is None else "fundamental"
 
 
 def compared(
-    model: PnlssModel, exciter: Exciter | None, reference: Reference, *, whole: bool = False
+    model: DrivenModel, exciter: Exciter | None, reference: Reference, *, whole: bool = False
 ) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
     """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare.
 
@@ -64,11 +62,11 @@ def compared(
     low: float | None = None if whole else (1.0 - _MARGIN) * float(measured.frequency_hz.min())
     high: float | None = None if whole else (1.0 + _MARGIN) * float(measured.frequency_hz.max())
     if measured.controlled == "force":
-        predicted = pnlss_frequency_response(
+        predicted = frequency_response_at(
             model, measured.level, force=held, exciter=exciter, lowest_hz=low, highest_hz=high
         )
     elif measured.controlled == "voltage" and held == "fundamental":
-        predicted = pnlss_frequency_response(
+        predicted = frequency_response_at(
             model, measured.level, force="voltage", exciter=exciter, lowest_hz=low, highest_hz=high
         )
     else:
@@ -86,7 +84,7 @@ def compared(
 
 
 def _point_by_point(
-    model: PnlssModel, exciter: Exciter | None, held: Held, measured: FrequencyResponse
+    model: DrivenModel, exciter: Exciter | None, held: Held, measured: FrequencyResponse
 ) -> SteadyPrediction:
     """Predict the vibration at the force of each point.
 
@@ -109,7 +107,7 @@ def _point_by_point(
         for start, way in ways:
             try:
                 for frequency_hz, force_n in way:
-                    start = pnlss_steady_state(model, force_n, frequency_hz, force=held, exciter=exciter, near=start)
+                    start = steady_state_at(model, force_n, frequency_hz, force=held, exciter=exciter, near=start)
             except IdentificationError:
                 continue
             tried += [] if start is None else [start]

@@ -1,4 +1,4 @@
-"""Predictions by nonlinear state-space models: steady vibrations, recorded sweeps, recorded multisines."""
+"""Predictions by PNLSS and structured models: steady vibrations, recorded sweeps, recorded multisines."""
 
 import math
 from collections.abc import Sequence
@@ -8,47 +8,56 @@ from typing import cast
 from identification import (
     Exciter,
     FrequencyResponse,
-    PnlssModel,
     PredictionError,
     Predictions,
     SteadyPrediction,
-    pnlss_frequency_response,
+    StructuredModel,
 )
 from rig.errors import ConfigurationError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.files import load_as
-from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.files.kind import FileKind
+from rig.models.files.pnlss import IdentifiedPnlss
+from rig.models.files.structured import IdentifiedStructured, functions_of
+from rig.models.predict.driven_models import DrivenModel, frequency_response_at
 from rig.models.predict.multisines import simulated_multisines
-from rig.models.predict.pnlss_steady import Held, Reference, compared, default_held
-from rig.models.predict.pnlss_sweep_models import PnlssSweepModels
-from rig.models.predict.pnlss_sweeps import planned_pnlss_sweeps, recorded_pnlss_sweeps
 from rig.models.predict.request import PredictionRequest
+from rig.models.predict.simulated_steady import Held, Reference, compared, default_held
+from rig.models.predict.simulated_sweep_models import SimulatedSweepModels
+from rig.models.predict.simulated_sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
 
-__all__ = ["pnlss_predictions"]
+__all__ = ["simulated_predictions"]
 
 
-def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequence[Reference]) -> Predictions:
+def simulated_predictions(
+    path: Path, kind: FileKind, request: PredictionRequest, references: Sequence[Reference]
+) -> Predictions:
     """Return the requested predictions, with errors where there is a reference. Unbounded runs are also results.
 
-    Raises `ConfigurationError` for requests that a nonlinear state-space model cannot answer,
+    Raises `ConfigurationError` for requests that such a model cannot answer and for code that is not trusted,
     `identification.IdentificationError` if it has no periodic vibration or its channels do not fit.
     """
-    found: IdentifiedPnlss = load_as(PNLSS, path)
+    found: IdentifiedPnlss | IdentifiedStructured = load_as(kind, path)
     model = found.model
+    if isinstance(model, StructuredModel) and (functions := functions_of(model)) and not request.trust_code:
+        raise ConfigurationError(
+            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
+            "`trust_code`"
+        )
     _check(request, model, path)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
     held = cast(Held, request.held or default_held(model, exciter))
     references_held = default_held(model, exciter)
     alone = request.forces_without_reference([one.measured for one in references], references_held)
     steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
-        (pnlss_frequency_response(model, level, force=one, exciter=exciter), None, None)
+        (frequency_response_at(model, level, force=one, exciter=exciter), None, None)
         for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
     steady += [compared(model, exciter, one, whole=_asked(request, alone, one.measured)) for one in references]
-    models = PnlssSweepModels(model, exciter)
-    swept = [one for recording in request.sweeps for one in recorded_pnlss_sweeps(recording, models)]
-    swept += [one for plan in request.planned for one in planned_pnlss_sweeps(plan, models)]
+    models = SimulatedSweepModels(model, exciter)
+    swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
+    swept += [one for plan in request.planned for one in planned_simulated_sweeps(plan, models)]
     runs, said = simulated_multisines(request.multisines, found, model.specimen)
     notes = [*(_default(request, held) if request.forces_n else ()), *said]
     notes += _strangers(model, [reference.measured for reference in references])
@@ -66,17 +75,18 @@ def pnlss_predictions(path: Path, request: PredictionRequest, references: Sequen
     )
 
 
-def _check(request: PredictionRequest, model: PnlssModel, path: Path) -> None:
+def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
     """Refuse options that only a nonlinear mode understands, and requests that the model's channels do not allow."""
     given = {
         "zero_crossings": request.zero_crossings is not None,
         "modes": request.modes is not None,
         "allow_extrapolation": request.allow_extrapolation,
     }
+    which = "structured" if isinstance(model, StructuredModel) else "PNLSS"
     for name in (name for name, is_given in given.items() if is_given):
         raise ConfigurationError(
-            f"`{name}`: means nothing to a PNLSS model, which answers `forces_n`, `voltages_v`, `references`, "
-            "`sweeps`, `planned` and `multisines`"
+            f"`{name}`: means nothing to a {which} model, which answers `forces_n`, `voltages_v`, `references`, `sweeps`, "
+            "`planned` and `multisines`"
         )
     steady = bool(request.forces_n or request.voltages_v or request.references)
     swept = bool(request.sweeps or request.planned)
@@ -120,7 +130,7 @@ def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
     )
 
 
-def _strangers(model: PnlssModel, references: Sequence[FrequencyResponse]) -> list[str]:
+def _strangers(model: DrivenModel, references: Sequence[FrequencyResponse]) -> list[str]:
     """Return a note on each specimen of the references other than the model's."""
     others = {one.specimen for one in references} - {"", model.specimen}
     return [f"the model is of {model.specimen}, a reference of {one}: not the same specimen" for one in sorted(others)]

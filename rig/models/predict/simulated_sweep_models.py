@@ -1,4 +1,4 @@
-"""Sweeps of a nonlinear state-space model, alone or with its exciter: simulated, then demodulated."""
+"""Sweeps of a PNLSS or structured model, alone or with its exciter: simulated, then demodulated."""
 
 from dataclasses import dataclass
 
@@ -10,16 +10,16 @@ from identification import (
     Exciter,
     IdentificationError,
     PnlssModel,
-    Simulation,
     SweepPrediction,
     Transient,
     demodulate,
-    pnlss_coupled_run,
 )
 from identification.channels import MOTION_ORDER, find_role
+from identification.pnlss.simulators import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
+from rig.models.predict.driven_models import DrivenModel, coupled_run
 
-__all__ = ["PnlssSweepModels", "SweepGiven"]
+__all__ = ["SimulatedSweepModels", "SweepGiven"]
 
 Float = NDArray[np.float64]
 
@@ -47,11 +47,11 @@ class SweepGiven:
 
 
 @dataclass(frozen=True, eq=False)
-class PnlssSweepModels:
+class SimulatedSweepModels:
     """Models with which sweeps are simulated."""
 
-    model: PnlssModel
-    """The nonlinear state-space model."""
+    model: DrivenModel
+    """The model."""
     exciter: Exciter | None
     """Exciter that drives a force-driven model from the voltage; without it, the recorded force drives the model."""
 
@@ -73,7 +73,8 @@ class PnlssSweepModels:
             stop = int(beyond[0]) if beyond.size else stop
             notes.append(f"the run left all bounds {unbounded_at_s:.2f} s into the sweep: no errors are given")
         elif run.range_use > 1.0:
-            notes.append(f"states or input reach {run.range_use:.2f} times the training data: extrapolated")
+            what = "states or input" if isinstance(model, PnlssModel) else "elements"
+            notes.append(f"{what} reach {run.range_use:.2f} times the training data: extrapolated")
         notes += self._outside(given)
         found = _fundamentals(
             given.theta[:stop], signals[:, :stop], (force_channel, model.outputs[row]), rate_hz, given.frequencies_hz[0]
@@ -96,19 +97,23 @@ class PnlssSweepModels:
             unbounded_at_s=unbounded_at_s,
         )
 
-    def _simulated(self, given: SweepGiven) -> tuple[Float, Channel, Simulation, list[str]]:
+    def _simulated(self, given: SweepGiven) -> tuple[Float, Channel, SimulatedMotion, list[str]]:
         """Return the force at the drive point (imposed or predicted), its channel, the run, and notes."""
         model = self.model
         channels = {channel.role: (row, channel) for row, channel in enumerate(model.outputs)}
         if self.exciter is not None:
             channel = next(channel for channel in model.inputs if channel.role == "force")
-            lowest = min(
-                _LOWEST * min(given.frequencies_hz), *([_LOWEST * model.excited_hz[0]] if model.excited_hz else [])
-            )
-            coupled = pnlss_coupled_run(model, self.exciter, given.inputs[0], lowest_hz=lowest)
+            lowest = _LOWEST * min(given.frequencies_hz)
+            if isinstance(model, PnlssModel) and model.excited_hz:
+                lowest = min(lowest, _LOWEST * model.excited_hz[0])
+            coupled = coupled_run(model, self.exciter, given.inputs[0], lowest_hz=lowest)
             source = self.exciter.source
             return coupled.force_n, channel, coupled, [f"holds for the exciter of {source} alone", *coupled.notes]
-        run = model.simulate(given.inputs, initial_state=given.initial_state)
+        run: SimulatedMotion
+        if isinstance(model, PnlssModel):
+            run = model.simulate(given.inputs, initial_state=given.initial_state)
+        else:
+            run = model.simulate(given.inputs)
         for channel, imposed in zip(model.inputs, given.inputs, strict=True):
             if channel.role == "force":
                 return imposed, channel, run, []
@@ -117,7 +122,7 @@ class PnlssSweepModels:
 
     def _outside(self, given: SweepGiven) -> list[str]:
         """Return a note if the sweep covers frequencies outside the training data."""
-        band = self.model.excited_hz
+        band = self.model.excited_hz if isinstance(self.model, PnlssModel) else None
         if not band or (band[0] * 0.999 <= min(given.frequencies_hz) and max(given.frequencies_hz) <= band[1] * 1.001):
             return []
         low, high = sorted(given.frequencies_hz)

@@ -1,0 +1,1 @@
+"""Simulation of structured models together with an exciter, from its voltage."""
