@@ -1,5 +1,6 @@
 """Fit of a structured model to experiments in the time domain, by least squares with exact derivatives."""
 
+import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment, excited_band, same_channels
 from identification.pnlss.fitting.threads import threads
 from identification.structured.element_trials import ElementTrial
 from identification.structured.further import ElementPlan, with_further_element
@@ -40,6 +41,8 @@ _STAGES = {
 _MISFIT = 0.01
 """Relative misfit of the samples against which the errors of the modal test are weighed at first; later that of the fit before,
 if it is smaller."""
+_LEAST, _PER_PERIOD = 2, 100.0
+"""Fewest steps in a sample, and in a period of the highest excited frequency."""
 _LARGEST_STATIC = 10.0
 """Largest static force relative to the largest RMS of the training forces."""
 _SUPPORT = 0.01
@@ -61,7 +64,8 @@ class StructuredFit(Result):
     values
         float[P], the free numbers.
     covariance
-        float[P, P], of the free numbers, as if the residual were white: a misfit that repeats makes it too small.
+        float[P, P], of the free numbers, as if the residual of each experiment were white: a misfit that repeats makes it too
+        small. What the steps of the simulation get wrong is not in it.
     training_error
         RMS of the residual over that of the outputs, every output relative to its own RMS.
     evaluations, seconds
@@ -93,7 +97,7 @@ def fit_structured(
     validation: Sequence[Experiment] = (),
     reach: float = 3.0,
     support: bool = True,
-    steps: int = 2,
+    steps: int | None = None,
 ) -> StructuredFit:
     """Fit a structured model with one nonlinear element whose direction is free, or with several.
 
@@ -119,7 +123,8 @@ def fit_structured(
     support
         Whether the exciter's static force is fitted (`StructuredModel`).
     steps
-        Steps in a sample.
+        Steps in a sample; None for a hundred in a period of the highest excited frequency, two in a sample at least. Errors of
+        the simulation fall with their square: with 23 in a period they were 1.3 % of a response of the magnet beam.
 
     Raises
     ------
@@ -137,6 +142,9 @@ def fit_structured(
             raise IdentificationError(
                 f"experiments[{number}].initial_state: is '{experiment.initial_state}', allowed is zero, a run from rest"
             )
+    if steps is None:
+        band = excited_band(experiments)
+        steps = _LEAST if band is None else max(_LEAST, math.ceil(_PER_PERIOD * band[1] / first.sample_rate_hz))
     if steps < 1:
         raise IdentificationError(f"steps: is {steps}, allowed is 1 or above")
     wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
@@ -252,6 +260,7 @@ class _Problem:
                     f"output '{channel.name}': is zero throughout the training data; leave it out"
                 )
         self._known: tuple[bytes, Float] | None = None
+        self._parts: list[Float] = []
         self.error = np.nan
         """RMS of the residual of the last vector over that of the outputs."""
 
@@ -261,17 +270,25 @@ class _Problem:
             model = self.parameters.model(vector)
             with threads() as count, ThreadPoolExecutor(count) as pool:
                 parts = list(pool.map(partial(self._of_one, model), self.experiments, self.leads))
+            self._parts = parts
             prior = np.column_stack([np.diag(self._trust), self._trust * (vector - self._expected)])
             self._known = vector.tobytes(), _triangle(np.concatenate([*parts, prior]))
             self.error = float(np.sqrt(sum(part[:, -1] @ part[:, -1] for part in parts) / self.count))
         return self._known[1]
 
     def covariance(self, vector: Float) -> Float:
-        """float[P, P]: covariance of the numbers, as if the residual were white."""
-        triangle = self.triangle(vector)
-        jacobian, residual = triangle[:, :-1], triangle[:, -1]
-        freedom = max(self.count - vector.size, 1)
-        return np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * float(residual @ residual) / freedom)
+        """float[P, P]: covariance of the numbers, as if the residual of each experiment were white, with a size of its own.
+
+        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment.
+        """
+        jacobian = self.triangle(vector)[:, :-1]
+        inverse = np.linalg.pinv(jacobian.T @ jacobian)
+        freedom = max(1.0 - vector.size / self.count, 0.5)
+        middle = np.diag((self._trust * self.error) ** 2)
+        for part, one in zip(self._parts, self.experiments, strict=True):
+            variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
+            middle = middle + variance * part[:, :-1].T @ part[:, :-1]
+        return np.asarray(inverse @ middle @ inverse / freedom)
 
     def _of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
         weight = np.sqrt(experiment.weight) / self._scale

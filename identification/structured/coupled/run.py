@@ -25,6 +25,8 @@ __all__ = ["CoupledMotion", "structured_coupled_run"]
 
 Float = NDArray[np.float64]
 
+_COARSER = (6, 4, 3, 2)
+"""Numbers of steps in a sample that are tried where the model's own allows no filter for the reaction."""
 _GUESSED = 0.5
 """Default lowest frequency relative to the resonance of small vibrations."""
 
@@ -75,14 +77,11 @@ def structured_coupled_run(
     """
     v = finite_array("voltage_v", voltage_v, np.float64, 1)
     row, output = driven_rows(model)
-    rate_hz = model.sample_rate_hz * model.steps
     low = _GUESSED * resonance_hz(model) if lowest_hz is None else positive("lowest_hz", lowest_hz, "Hz")
     if low >= 0.45 * model.sample_rate_hz:
         raise IdentificationError(f"lowest_hz: is {low:g} Hz, must be well below half of {model.sample_rate_hz:g} Hz")
     order = MOTION_ORDER[model.outputs[output].motion]
-    linear = _linear_part(model)
-    fine = np.ascontiguousarray(ends_of_steps(v[None], model.steps)[:-1, 0])
-    passes = Passes(Reaction(exciter, order, low, rate_hz), linear, row, output, fine)
+    model, linear, passes, coarser = _with_filter(model, exciter, v, low, row, output)
 
     system, count, loop = model.system, passes.count, passes.loop
     system = system._replace(steps=1)
@@ -98,13 +97,42 @@ def structured_coupled_run(
         )
 
     reached, repeats, change = passes.run(simulate, u[:, 0], motion)
-    states, force = states[: fine.size : model.steps], u[: fine.size : model.steps, 0]
+    states, force = states[: passes.n : model.steps], u[: passes.n : model.steps, 0]
     valid = -(-reached // model.steps)
     states[valid:], force[valid:] = np.nan, np.nan
     found = motion_of(model, force[None], states, int(room.unsolved[0]))
     return CoupledMotion(
-        **vars(found), force_n=force, passes=repeats, change=change, notes=tuple(passes.notes(reached, repeats, change))
+        **vars(found),
+        force_n=force,
+        passes=repeats,
+        change=change,
+        notes=(*coarser, *passes.notes(reached, repeats, change)),
     )
+
+
+def _with_filter(
+    model: StructuredModel, exciter: Exciter, voltage_v: Float, lowest_hz: float, row: int, output: int
+) -> tuple[StructuredModel, StateSpace, Passes, tuple[str, ...]]:
+    """Return the model, its linear part, and the passes with a filter for the reaction at the rate of the model's steps.
+
+    Where there is none, steps are longer. Raises `IdentificationError` if that does not help.
+    """
+    order = MOTION_ORDER[model.outputs[output].motion]
+    failed: IdentificationError | None = None
+    for steps in (model.steps, *(fewer for fewer in _COARSER if fewer < model.steps)):
+        coarse = model.with_steps(steps)
+        linear = _linear_part(coarse)
+        fine = np.ascontiguousarray(ends_of_steps(voltage_v[None], steps)[:-1, 0])
+        reaction = Reaction(exciter, order, lowest_hz, model.sample_rate_hz * steps)
+        try:
+            passes = Passes(reaction, linear, row, output, fine)
+        except IdentificationError as error:
+            failed = failed or error
+        else:
+            said = () if steps == model.steps else (f"simulated with {steps} steps in a sample, not {model.steps}",)
+            return coarse, linear, passes, said
+    assert failed is not None
+    raise failed
 
 
 def _linear_part(model: StructuredModel) -> StateSpace:

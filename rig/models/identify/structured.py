@@ -1,13 +1,11 @@
 """Identify structured models from recordings: modes, data, fit and errors."""
 
-import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from identification import LinearModes, ModalAnalysis, fit_structured
-from identification.pnlss.experiment import excited_band
 from identification.structured.start import linear_start
 from identification.validation import one_specimen
 from rig.errors import RecordingError
@@ -24,9 +22,6 @@ __all__ = ["identified_structured"]
 
 _KINDS = ("multisine", "sweep")
 """Recordings that begin at rest."""
-_LEAST, _PER_PERIOD = 2, 100.0
-"""Fewest steps in a sample, and in a period of the highest excited frequency. Errors fall with their square: with 23 in a
-period they were 1.3 % of a response of the magnet beam, which its laws took up."""
 
 
 def identified_structured(
@@ -41,21 +36,18 @@ def identified_structured(
     found = _modes_in(modes)
     data = fit_data(paths, of_data, "structured", kinds=_KINDS)
     one_specimen(**{str(modes): found.specimen, str(paths[0]): data.training[0].specimen})
-    highest = excited_band(data.training)
-    steps = (
-        _LEAST
-        if highest is None
-        else max(_LEAST, math.ceil(_PER_PERIOD * highest[1] / data.training[0].sample_rate_hz))
-    )
-    how: dict[str, Any] = {"steps": steps, "elements": options.elements()}
     fit, scatter = fitted(
-        lambda training, validation: fit_structured(found, training, validation=validation, **how), data, of_data
+        lambda training, validation: fit_structured(
+            found, training, validation=validation, elements=options.elements()
+        ),
+        data,
+        of_data,
     )
     identified = IdentifiedStructured(
         model=fit.model,
         fit=fit,
         scatter=scatter,
-        linear=linear_start(found, data.training[0], steps),
+        linear=linear_start(found, data.training[0], fit.model.steps),
         seconds=time.perf_counter() - begun,
         notes=data.notes,
         data=data.fingerprint,

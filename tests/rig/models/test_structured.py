@@ -102,8 +102,8 @@ def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recording
     errors = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)), strict=True))
     for index, mode in enumerate(json.loads(there("show S.h5 --json").out)["modes"], 1):
         of_frequency, of_damping = errors[f"frequency {index}"], errors[f"damping {index}"]
-        assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-3)
-        assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-3)
+        assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-2)
+        assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-2)
 
 
 def test_multisines_have_the_errors_of_the_file(there):
