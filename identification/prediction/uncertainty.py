@@ -5,6 +5,7 @@ mass-normalised drive shape is common to all levels and cancels at the drive poi
 predicted displacement per force remains the same.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.frequency_response import HeldForce, frequency_response
+from identification.prediction.steady_prediction import SteadyPrediction
 from vibrolock.results import Result
 
-__all__ = ["ResponseBand", "response_band"]
+__all__ = ["ResponseBand", "band_of_responses", "response_band"]
 
 Float = NDArray[np.float64]
 
@@ -79,19 +81,25 @@ def response_band(
         if not np.all(np.isfinite(getattr(mode, name))):
             raise IdentificationError(f"{name}: unknown at some level, the band cannot be had without it")
     random = np.random.default_rng(seed)
-    lags = np.linspace(10.0, 170.0, _POINTS)
-    amplitude, frequency = np.zeros((draws, _POINTS)), np.zeros((draws, _POINTS))
-    peaks = np.zeros((draws, 2))
-    for draw in range(draws):
-        found = frequency_response(
+    return band_of_responses(
+        frequency_response(
             _drawn(mode, random), force_n, force=force, points=_POINTS, allow_extrapolation=allow_extrapolation
         )
+        for _ in range(draws)
+    )
+
+
+def band_of_responses(responses: Iterable[SteadyPrediction]) -> ResponseBand:
+    """Return the band of several predictions of the same response, two at least, by their branches that begin at rest."""
+    lags = np.linspace(10.0, 170.0, _POINTS)
+    amplitude, frequency, peaks = [], [], []
+    for found in responses:
         main = found.branch == 0
         lag = found.phase_lag_deg()[main]
-        amplitude[draw] = np.interp(lags, lag, found.amplitude_m()[main])
-        frequency[draw] = np.interp(lags, lag, found.frequency_hz[main])
+        amplitude.append(np.interp(lags, lag, found.amplitude_m()[main]))
+        frequency.append(np.interp(lags, lag, found.frequency_hz[main]))
         peak = found.peak()
-        peaks[draw] = peak.amplitude_m, peak.frequency_hz
+        peaks.append((peak.amplitude_m, peak.frequency_hz))
     spread = np.std(peaks, axis=0, ddof=1)
     return ResponseBand(
         phase_lag_deg=lags,
@@ -99,7 +107,7 @@ def response_band(
         frequency_hz=np.percentile(frequency, _INTERVAL, axis=0),
         peak_amplitude_std_m=float(spread[0]),
         peak_frequency_std_hz=float(spread[1]),
-        draws=draws,
+        draws=len(peaks),
     )
 
 

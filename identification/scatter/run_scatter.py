@@ -22,6 +22,8 @@ __all__ = ["OutputBand", "RunScatter"]
 Float = NDArray[np.float64]
 Arrays = Mapping[str, NDArray[Any]]
 
+_LARGEST = 0.3
+"""Largest shift that is drawn: from few runs the distribution has long tails."""
 _ARRAYS = ("shifts", "estimates", "variances", "misfit")
 
 
@@ -91,13 +93,15 @@ class RunScatter(Result):
         """Yield models of ``count`` runs that nobody has measured.
 
         Shifts of n runs of which mean and width were estimated: a further one follows Student's t with n - 1 degrees of
-        freedom, times the width and ``sqrt(1 + 1/n)``. What the noise leaves open in the shared parameters is not drawn.
+        freedom, times the width and ``sqrt(1 + 1/n)``; at most 0.3. What the noise leaves open in the shared parameters is not
+        drawn.
         """
         generator = np.random.default_rng(seed)
         n = len(self.runs)
         size = np.array([width.width for width in self.widths]) * np.sqrt(1.0 + 1.0 / n)
         for _ in range(count):
-            yield shifted(model, self.effects, size * generator.standard_t(n - 1, len(size)))
+            drawn = size * generator.standard_t(n - 1, len(size))
+            yield shifted(model, self.effects, np.clip(drawn, -_LARGEST, _LARGEST))
 
     def band(
         self, model: Scattered, experiment: Experiment, *, share: float = 0.95, draws: int = 200, seed: int = 0

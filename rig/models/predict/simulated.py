@@ -2,17 +2,21 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import cast
 
 from identification import (
     Exciter,
     FrequencyResponse,
+    IdentificationError,
     PredictionError,
     Predictions,
+    ResponseBand,
     SteadyPrediction,
     StructuredModel,
 )
+from identification.prediction.uncertainty import band_of_responses
 from rig.errors import ConfigurationError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.files import load_as
@@ -27,6 +31,9 @@ from rig.models.predict.simulated_sweep_models import SimulatedSweepModels
 from rig.models.predict.simulated_sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
 
 __all__ = ["simulated_predictions"]
+
+_DRAWS = 40
+"""Fresh runs of a band."""
 
 
 def simulated_predictions(
@@ -54,16 +61,25 @@ def simulated_predictions(
         for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
+    bands = [_band(found, one, exciter) for one, _, _ in steady]
     steady += [compared(model, exciter, one, whole=_asked(request, alone, one.measured)) for one in references]
     models = SimulatedSweepModels(model, exciter)
     swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
     swept += [one for plan in request.planned for one in planned_simulated_sweeps(plan, models)]
     runs, said = simulated_multisines(request.multisines, found, model.specimen)
+    if any(bands):
+        said = (*said, "bands and +- of responses: of runs that nobody has measured, by the scatter of the model alone")
+    elif found.scatter is not None:
+        said = (
+            *said,
+            "the model is that of a run in the middle; its scatter from run to run is not in these predictions",
+        )
     notes = [*(_default(request, held) if request.forces_n else ()), *said]
     notes += _strangers(model, [reference.measured for reference in references])
     notes += [note for one in swept for note in one.notes]
     return Predictions(
         steady=tuple(one for one, _, _ in steady),
+        steady_bands=(*bands, *[None] * (len(steady) - len(bands))),
         steady_references=tuple(reference for _, reference, _ in steady),
         steady_errors=tuple(error for _, _, error in steady),
         sweeps=tuple(one.prediction for one in swept),
@@ -73,6 +89,21 @@ def simulated_predictions(
         specimen=model.specimen,
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _band(
+    found: IdentifiedPnlss | IdentifiedStructured, predicted: SteadyPrediction, exciter: Exciter | None
+) -> ResponseBand | None:
+    """Return the band of a response over fresh runs; None for a model without scatter, or if most have no such response."""
+    if found.scatter is None:
+        return None
+    drawn: list[SteadyPrediction] = []
+    for model in found.scatter.fresh(found.model, _DRAWS):
+        with suppress(IdentificationError):
+            drawn.append(
+                frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), exciter=exciter)
+            )
+    return band_of_responses(drawn) if len(drawn) > _DRAWS // 2 else None
 
 
 def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
