@@ -122,8 +122,9 @@ def _measured(index: int, count: int) -> str | None:
 
 
 def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, colour: Any) -> None:
-    """Draw the 95 % band as an area: between the limits of amplitude, and between the limits of frequency."""
-    middle_hz = band.frequency_hz.mean(axis=0)
+    """Draw the 95 % band as areas: between the limits of amplitude, and between the limits of frequency."""
+    middle_hz, middle_m = band.frequency_hz.mean(axis=0), band.amplitude_m.mean(axis=0)
+    peak = int(np.argmax(middle_m))
     size.fill(
         np.concatenate([middle_hz, middle_hz[::-1]]),
         scale * np.concatenate([band.amplitude_m[0], band.amplitude_m[1][::-1]]),
@@ -131,6 +132,8 @@ def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, 
         alpha=0.25,
         lw=0,
     )
+    for side in (slice(None, peak + 1), slice(peak, None)):  # one area of both would cross itself
+        size.fill_betweenx(scale * middle_m[side], *band.frequency_hz[:, side], color=colour, alpha=0.25, lw=0)
     phase.fill_betweenx(band.phase_lag_deg, *band.frequency_hz, color=colour, alpha=0.25, lw=0)
 
 
