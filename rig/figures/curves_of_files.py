@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from identification import (
     IdentificationError,
     NonlinearMode,
     nonlinear_mode,
-    structured_mode,
 )
 from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.frequency_responses import passes_of
@@ -32,9 +31,11 @@ from rig.drawing.style import unit_text
 from rig.errors import RecordingError
 from rig.figures.curves import Curves, Line, Panel, Quantity, Trace, View, channel_of, peak
 from rig.models.files.files import KINDS, load
-from rig.models.files.structured import IdentifiedStructured, functions_of
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
+
+if TYPE_CHECKING:
+    from rig.models.files.structured import IdentifiedStructured
 
 __all__ = ["FAMILIES", "curves_of", "family_of"]
 
@@ -87,7 +88,7 @@ def family_of(path: Path) -> _Family:
     raise RecordingError(f"{path}: is of kind {kind}, which has no curves to lay over others; {known} have some")
 
 
-def _backbones(source: Recording | NonlinearMode | Backbone | IdentifiedStructured, view: View) -> Curves:
+def _backbones(source: "Recording | NonlinearMode | Backbone | IdentifiedStructured", view: View) -> Curves:
     """Modal frequency and damping over the amplitude, with 95 % intervals; a continuous backbone has one curve per repeat."""
     traces, across, modes = [], DISPLACEMENT, _modes(source)
     for number, (measured, mode) in enumerate(modes, 1):
@@ -112,24 +113,30 @@ def _backbones(source: Recording | NonlinearMode | Backbone | IdentifiedStructur
 
 
 def _modes(
-    source: Recording | NonlinearMode | Backbone | IdentifiedStructured,
+    source: "Recording | NonlinearMode | Backbone | IdentifiedStructured",
 ) -> list[tuple[Backbone | None, NonlinearMode]]:
     """Return the modes of a file, with the backbones that they were identified from where the file holds these."""
     if isinstance(source, NonlinearMode):
         return [(None, source)]
-    if isinstance(source, IdentifiedStructured):
-        if functions := functions_of(source.model):
-            raise RecordingError(
-                f"names a function, {functions[0]}, which is not imported to draw; use structured_mode"
-            )
-        return [(None, structured_mode(source.model if source.fit is None else source.fit))]
     if isinstance(source, Backbone):
         return [(source, nonlinear_mode(source))]
+    if not isinstance(source, Recording):
+        return [(None, _structured_mode(source))]
     measurements = CAMPAIGNS[source.kind].measurements
     if ContinuousBackbone in measurements:  # half of what lies between its ways is in the standard errors
         return [(ways.backbone, ways.nonlinear_mode()) for ways in measurements[ContinuousBackbone](source)]
     measured = measurements[Backbone](source)
     return [(measured, nonlinear_mode(measured))]
+
+
+def _structured_mode(source: "IdentifiedStructured") -> NonlinearMode:
+    """Return the nonlinear mode of a structured model; refuse code that the model names."""
+    from identification import structured_mode  # a second, which other files need not wait for
+    from rig.models.files.structured import functions_of
+
+    if functions := functions_of(source.model):
+        raise RecordingError(f"names a function, {functions[0]}, which is not imported to draw; use structured_mode")
+    return structured_mode(source.model if source.fit is None else source.fit)
 
 
 def _responses(source: Recording | tuple[FrequencyResponse, ...], view: View) -> Curves:
