@@ -105,7 +105,7 @@ def test_width_and_shared_parameters_of_a_hundred_runs_and_bands_of_fresh_ones()
     fresh, _ = runs(100, first=5000)
     generator, covered = np.random.default_rng(3), 0
     for one in fresh:
-        band = scatter.band(found.model, one)
+        band = scatter.band(found.model, one, draws=100)
         output, sample = generator.integers(3), one.counted_from + generator.integers(one.counted)
         covered += band.low[output, sample] <= one.outputs[output, sample] <= band.high[output, sample]
     assert binom.cdf(covered, 100, 0.93) > 0.05
