@@ -38,7 +38,8 @@ class Motion:
     displacement, velocity, acceleration
         float[n_modes, n], modal coordinates (kg^1/2 m) and their derivatives by time.
     reach_use
-        float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
+        float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated. Of a periodic
+        experiment only the samples that count are taken, not the transient that leads to them.
     unsolved_steps
         Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold.
     range_use
@@ -212,7 +213,7 @@ class StructuredModel(Result):
         system = self.system
         return self._run([system, system], 0, u, ends_of_steps(u, self.steps))
 
-    def _run(self, systems: Sequence[System], until: int, u: Float, ends: Float) -> Motion:
+    def _run(self, systems: Sequence[System], until: int, u: Float, ends: Float, counted_from: int = 0) -> Motion:
         """Simulate from rest, up to sample ``until`` with the first system and then with the second."""
         system, n = systems[0], u.shape[1]
         states, state, unsolved = np.zeros((n, 3, len(self.omega))), np.zeros(system.size), 0
@@ -220,7 +221,7 @@ class StructuredModel(Result):
             room = room_for(part)
             run(part, room, ends[first * self.steps : last * self.steps + 1], state, states[first:last])
             unsolved += int(room.unsolved[0])
-        return motion_of(self, u, states, unsolved)
+        return motion_of(self, u, states, unsolved, counted_from)
 
     def simulate_experiment(self, experiment: Experiment) -> Motion:
         """Return the motion under the inputs of an experiment.
@@ -237,7 +238,8 @@ class StructuredModel(Result):
         rate = 2.0 * LEAD * self.omega * (np.arange(modes) < told)
         velocity, free = measured_velocity(self, longer, told), self.system
         ends = np.hstack([ends_of_steps(longer.inputs, self.steps), ends_of_steps(velocity, self.steps)])
-        run_of = self._run([led(free, rate), led(free, 0.0 * rate)], until, longer.inputs, np.ascontiguousarray(ends))
+        systems = [led(free, rate), led(free, 0.0 * rate)]
+        run_of = self._run(systems, until, longer.inputs, np.ascontiguousarray(ends), longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         names = ("outputs", "displacement", "velocity", "acceleration")
         return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})
@@ -294,10 +296,10 @@ def outputs_of(model: StructuredModel, u: Float, states: Float) -> Float:
     return np.asarray(np.einsum("kom,om->ok", motions, model.output_shapes) + model.direct @ u)
 
 
-def motion_of(model: StructuredModel, u: Float, states: Float, unsolved: int) -> Motion:
-    """Return the run with inputs and states [n, 3, n_modes]."""
+def motion_of(model: StructuredModel, u: Float, states: Float, unsolved: int, counted_from: int = 0) -> Motion:
+    """Return the run with inputs and states [n, 3, n_modes]; displacements of elements are taken from ``counted_from`` on."""
     phi = np.array([element.phi for element in model.elements]).reshape(len(model.elements), len(model.omega))
-    largest = np.max(np.abs(states[:, 0] @ phi.T), axis=0, initial=0.0)
+    largest = np.max(np.abs(states[counted_from:, 0] @ phi.T), axis=0, initial=0.0)
     reach = np.array([element.reach for element in model.elements])
     return Motion(
         outputs=outputs_of(model, u, states),
