@@ -78,7 +78,7 @@ class StructuredModel(Result):
     simulated with ``2/h tan(pi f h)``, which makes their frequencies and accelerations those of the continuous equation;
     harmonics have errors of that size.
 
-    Not modelled: damping that couples modes, elements with memory (friction), inputs between samples above half the rate.
+    Not modelled: damping that couples modes, inputs between samples above half the rate.
 
     Parameters
     ----------

@@ -53,3 +53,16 @@ def test_a_record_that_does_not_begin_at_rest_is_refused():
 def test_a_run_that_overflows_is_not_called_bounded():
     huge = replace(experiment(), inputs=1e308 * np.ones((1, 400)))
     assert simulated_run(MODEL, huge).unbounded_at_s is not None
+
+
+def test_range_use_leaves_out_the_transient_before_the_samples_that_count():
+    period, starting = 400, 40
+    force = np.tile(0.05 * FORCE, 3)
+    force[:, :starting] = 100.0  # of a first period that does not count
+    outputs = MODEL.simulate(force).outputs
+    measured = experiment(force, outputs=outputs, period_samples=period, counted_from=2 * period)
+    run = MODEL.simulate_experiment(measured)
+    counted = np.max(np.abs(run.outputs[:, measured.counted_from :])) / 1e-3
+    assert np.max(np.abs(run.outputs)) / 1e-3 > 10.0 * counted
+    assert run.reach_use == pytest.approx([counted], rel=1e-12)
+    assert MODEL.trained_with([measured]).elements[0].largest == pytest.approx(counted, rel=1e-12)
