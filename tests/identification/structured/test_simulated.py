@@ -64,5 +64,5 @@ def test_range_use_leaves_out_the_transient_before_the_samples_that_count():
     run = MODEL.simulate_experiment(measured)
     counted = np.max(np.abs(run.outputs[:, measured.counted_from :])) / 1e-3
     assert np.max(np.abs(run.outputs)) / 1e-3 > 10.0 * counted
-    assert run.reach_use == pytest.approx([counted], rel=1e-12)
+    assert run.reach_use == pytest.approx([counted / MODEL.elements[0].reach], rel=1e-12)
     assert MODEL.trained_with([measured]).elements[0].largest == pytest.approx(counted, rel=1e-12)
