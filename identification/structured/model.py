@@ -43,7 +43,7 @@ class Motion:
     unsolved_steps
         Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold.
     range_use
-        Largest displacement of any element over its largest in the training data; NaN if that is unknown.
+        Largest displacement of any element over its largest in the training data, of the same samples; NaN if unknown.
     """
 
     outputs: Float
