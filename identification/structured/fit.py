@@ -96,7 +96,7 @@ def fit_structured(
     elements: Sequence[ElementPlan] = (),
     validation: Sequence[Experiment] = (),
     reach: float = 3.0,
-    support: bool = True,
+    support: bool | float = True,
     steps: int | None = None,
 ) -> StructuredFit:
     """Fit a structured model with one nonlinear element whose direction is free, or with several.
@@ -121,7 +121,9 @@ def fit_structured(
     reach
         Largest displacement of the laws relative to the largest of the mode in the training data.
     support
-        Whether the exciter's static force is fitted (`StructuredModel`).
+        Stiffness of the exciter's suspension, N/m, if it is known (`Exciter.suspension_stiffness_n_m`). The suspension makes a
+        static force that force sensors do not show (`StructuredModel`). True: it is fitted, which takes experiments at several
+        levels, for at one level a spring does the same. False: there is none.
     steps
         Steps in a sample; None for a hundred in a period of the highest excited frequency, two in a sample at least. Errors of
         the simulation fall with their square: with 23 in a period they were 1.3 % of a response of the magnet beam.
@@ -152,14 +154,17 @@ def fit_structured(
     linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
     led = min(len(modes.frequency_hz), len(first.outputs))  # modes whose motion the outputs tell apart
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
-    found, trials, evaluations = replace(linear, support_largest_n=largest), [], 0
+    known = 0.0 if isinstance(support, bool) else float(support)
+    if not 0.0 <= known < math.inf:
+        raise IdentificationError(f"support: is {known:g} N/m, allowed is 0 or above, True or False")
+    found, trials, evaluations = replace(linear, support_largest_n=largest, support_n_m=known), [], 0
     kept: _Fitted | None = None
     for plan in wanted:
         if found.elements or plan.between:
             start = with_further_element(found, experiments, led, plan, reach)
         else:
             start = with_element(found, experiments, led, plan.laws, reach)
-        fitted = _fitted(start, linear, modes, experiments, led, support)
+        fitted = _fitted(start, linear, modes, experiments, led, support is True)
         evaluations += fitted.evaluations
         trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
         trials.append(trial)
@@ -218,6 +223,7 @@ def _fitted(
                 2.0 * ratio * linear.omega * measured,
                 measured_velocity(linear, e, int(measured.sum())),
                 e.counted_from - count * e.period_samples,
+                e.period_samples,
             )
             if e.period_samples
             else None

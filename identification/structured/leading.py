@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.structured.held_support import held, periods_of
 from identification.structured.model import ends_of_steps
-from identification.structured.steps import System
+from identification.structured.steps import System, led
 
 __all__ = ["Lead", "not_led", "own_shapes"]
 
@@ -30,12 +31,21 @@ class Lead:
         float[n_modes, n], measured modal velocities at the samples.
     until
         Number of samples that are led at the rate ``before``.
+    period
+        Samples of a period. Periods begin at ``until``.
     """
 
     before: Float
     rate: Float
     velocity: Float
     until: int
+    period: int
+
+    def stretches(self, system: System, samples: int) -> list[tuple[System, int, int]]:
+        """Return the system that is led, and first and last sample, of every period or part of one."""
+        systems = [held(led(system, self.before)), held(led(system, self.rate))]
+        ends = zip(systems, (0, self.until), (self.until, samples), strict=True)
+        return [(one, *at) for one, a, b in ends for at in periods_of(a, b, self.until, self.period)]
 
     def inputs(self, ends: Float, steps: int) -> Float:
         """Return inputs at the ends of steps with one more for each mode."""

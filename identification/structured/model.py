@@ -10,6 +10,7 @@ from identification.channels import MOTION_ORDER, Channel, find_name
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement, tables_of
+from identification.structured.held_support import held, periods_of, renew
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.small_vibrations import small_vibrations
 from identification.structured.steps import Room, System, led, run
@@ -210,17 +211,20 @@ class StructuredModel(Result):
         u = finite_array("inputs", inputs, np.float64, 2)
         if len(u) != len(self.inputs):
             raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
-        system = self.system
-        return self._run([system, system], 0, u, ends_of_steps(u, self.steps))
+        return self._run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
 
-    def _run(self, systems: Sequence[System], until: int, u: Float, ends: Float, counted_from: int = 0) -> Motion:
-        """Simulate from rest, up to sample ``until`` with the first system and then with the second."""
-        system, n = systems[0], u.shape[1]
-        states, state, unsolved = np.zeros((n, 3, len(self.omega))), np.zeros(system.size), 0
-        for part, first, last in zip(systems, (0, until), (until, n), strict=True):
+    def _run(
+        self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0
+    ) -> Motion:
+        """Simulate from rest, with a system from sample to sample; a support that is held is renewed after each stretch."""
+        states, state = np.zeros((u.shape[1], 3, len(self.omega))), np.zeros(self.system.size)
+        unsolved = 0
+        for part, first, last in stretches:
             room = room_for(part)
             run(part, room, ends[first * self.steps : last * self.steps + 1], state, states[first:last])
             unsolved += int(room.unsolved[0])
+            if not part.support[1]:
+                renew(part, (last - first) / self.sample_rate_hz, state)
         return motion_of(self, u, states, unsolved, counted_from)
 
     def simulate_experiment(self, experiment: Experiment) -> Motion:
@@ -236,10 +240,17 @@ class StructuredModel(Result):
         added = settling_periods(experiment, float(np.min((self.omega * self.damping_ratio)[:told])))
         longer, until = prolonged(experiment, added), experiment.counted_from
         rate = 2.0 * LEAD * self.omega * (np.arange(modes) < told)
-        velocity, free = measured_velocity(self, longer, told), self.system
+        velocity, free = measured_velocity(self, longer, told), held(self.system)
         ends = np.hstack([ends_of_steps(longer.inputs, self.steps), ends_of_steps(velocity, self.steps)])
-        systems = [led(free, rate), led(free, 0.0 * rate)]
-        run_of = self._run(systems, until, longer.inputs, np.ascontiguousarray(ends), longer.counted_from)
+        stretches = [
+            (system, first, last)
+            for system, begin, end in (
+                (led(free, rate), 0, until),
+                (led(free, 0.0 * rate), until, longer.inputs.shape[1]),
+            )
+            for first, last in periods_of(begin, end, until, experiment.period_samples)
+        ]
+        run_of = self._run(stretches, longer.inputs, np.ascontiguousarray(ends), longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         names = ("outputs", "displacement", "velocity", "acceleration")
         return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from identification.linear.modes import LinearModes
 from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
+from identification.structured.held_support import renew
 from identification.structured.leading import Lead, not_led, own_shapes
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
 from identification.structured.sensitivities import run_with_sensitivities
-from identification.structured.steps import led
 
 __all__ = ["Parameters"]
 
@@ -173,16 +173,16 @@ class Parameters:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
         system, modes = model.system, len(model.frequency_hz)
         inputs, ends = len(model.inputs), ends_of_steps(u, model.steps)
-        parts, until = [system, system], counted_from
+        stretches = [(system, 0, u.shape[1])]
         if lead is not None:
-            until = lead.until
-            parts, ends = [led(system, lead.before), led(system, lead.rate)], lead.inputs(ends, model.steps)
+            stretches = lead.stretches(system, u.shape[1])
+            ends = lead.inputs(ends, model.steps)
         changes = changes_of(model.elements, system.tables)
-        count = 2 * modes + modes * parts[0].b.shape[1] + system.phi.size + changes.element.size + 1
+        count = 2 * modes + modes * ends.shape[1] + system.phi.size + changes.element.size + 1
         states = np.zeros((u.shape[1], 3, modes))
         raw = np.zeros((u.shape[1] - counted_from, len(model.outputs), count))
         state, sens = np.zeros(system.size), np.zeros((system.size, count))
-        for part, first, last in zip(parts, (0, until), (until, u.shape[1]), strict=True):
+        for part, first, last in stretches:
             run_with_sensitivities(
                 part,
                 room_for(part, count),
@@ -198,8 +198,10 @@ class Parameters:
                 np.zeros((modes, count)),
                 raw,
             )
-            if lead is not None and first == 0:
-                sens = not_led(sens, system, lead.before)
+            if lead is not None and last == lead.until:
+                sens = not_led(sens, system, lead.before - lead.rate)  # what follows is led at the second rate
+            if lead is not None:
+                renew(part, (last - first) / model.sample_rate_hz, state, sens)
         if lead is not None:
             raw = own_shapes(not_led(raw, system, lead.rate), modes, inputs)
         found = outputs_of(model, u, states)[:, counted_from:].T

@@ -215,9 +215,15 @@ def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: n
             sens[i, c] += h * rhs[i, c]
             sens[n + i, c] = 2.0 * rhs[i, c] - sens[n + i, c]
         before = sens[last, c]
+        if alpha == 0.0:
+            sens[last, c] = before + h * moved
+            continue
         sens[last, c] = ((1.0 - alpha) * before + 2.0 * alpha * moved) / (1.0 + alpha)
         sens[2 * n, c] = ((1.0 - alpha) * sens[2 * n, c] + alpha * (before + sens[last, c])) / (1.0 + alpha)
     for i in range(n):
+        if alpha == 0.0:
+            sens[last, 2 * n + i * inputs] += h * half[i]
+            continue
         change = 2.0 * alpha * half[i] / (1.0 + alpha)
         sens[last, 2 * n + i * inputs] += change
         sens[2 * n, 2 * n + i * inputs] += alpha * change / (1.0 + alpha)

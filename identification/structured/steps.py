@@ -57,7 +57,7 @@ class System(NamedTuple):
     tables: Tables
     """Springs, dampers and sliders of the elements."""
     support: np.ndarray
-    """float[3]: stiffness (N/m), corner of its filter (rad/s) and largest force (N) of the unseen support."""
+    """float[3]: stiffness (N/m), corner of its filter (rad/s; 0: its force is held) and largest force (N) of the support."""
 
     @property
     def size(self) -> int:
@@ -229,7 +229,10 @@ def take_input(system: System, room: Room, u: np.ndarray, row: int, other: int, 
 
 @inner_kernel
 def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np.ndarray) -> None:
-    """Go to the end of the step; sliders slide, and the support's filter follows the displacement of the first input."""
+    """Go to the end of the step; sliders slide, and the support's filter follows the displacement of the first input.
+
+    While the force is held, the last state is the integral of that displacement (`identification.structured.held_support`).
+    """
     alpha, there = 0.5 * system.step_s * system.support[1], 0.0
     tables, n = system.tables, q.size
     for e in range(system.phi.shape[0]):
@@ -242,6 +245,9 @@ def end_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, state: np
         v[i] = 2.0 * room.mean[i] - v[i]
     last = state.size - 1
     before = state[last]
+    if alpha == 0.0:
+        state[last] = before + system.step_s * there
+        return
     state[last] = ((1.0 - alpha) * before + 2.0 * alpha * there) / (1.0 + alpha)
     state[2 * n] = ((1.0 - alpha) * state[2 * n] + alpha * (before + state[last])) / (1.0 + alpha)
 

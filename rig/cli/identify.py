@@ -126,6 +126,15 @@ def identify(
             show_default="polynomial-spring,polynomial-damper",
         ),
     ] = None,
+    suspension_stiffness_n_m: Annotated[
+        float | None,
+        typer.Option(
+            "--suspension-stiffness",
+            metavar="N_PER_M",
+            help="Of the exciter below a structured model, as in `rig show EXCITER`; 0 for none.",
+            show_default="fitted",
+        ),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the PNLSS model in OUTPUT, from the same files.")
     ] = False,
@@ -159,7 +168,7 @@ def identify(
             iterations=iterations,
             resume=output if resume else None,
         ),
-        structured=StructuredOptions(laws=tuple(laws or ())),
+        structured=StructuredOptions(laws=tuple(laws or ()), suspension_stiffness_n_m=suspension_stiffness_n_m),
         data=DataOptions(
             rate_hz=rate_hz,
             input=input,

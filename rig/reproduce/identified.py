@@ -30,6 +30,7 @@ from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
 from rig.models.files.structured import STRUCTURED, IdentifiedStructured
 from rig.models.identify.data_fingerprints import uses_of
 from rig.recording.reader import Recording
+from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded
 
@@ -151,11 +152,12 @@ def _pnlss(options: Options) -> Callable[..., PnlssFit]:
 
 
 def _structured(options: Options, say: Callable[[str], None]) -> Callable[..., StructuredFit]:
-    """Return the fit of structured models, with the modes of a recording of their own."""
+    """Return the fit of structured models, with modes and suspension from recordings of their own."""
     with Recording(recorded(options, options.specimen.modes_plan, say)) as recording:
         lowest = next(iter(response_matrices(recording).values()))
     modes = linear_modes(lowest, modes=options.specimen.modes)
-    return partial(_identify_structured, modes=modes, laws=options.specimen.laws, support=options.specimen.support)
+    known = exciter_of(options, say).suspension_stiffness_n_m if options.specimen.support else 0.0
+    return partial(_identify_structured, modes=modes, laws=options.specimen.laws, support=known)
 
 
 def _identify_structured(
@@ -164,7 +166,7 @@ def _identify_structured(
     validation: Sequence[Experiment],
     modes: LinearModes,
     laws: tuple[Law, ...],
-    support: bool,
+    support: float,
 ) -> StructuredFit:
     """Fit one model; a structured model needs no validation data."""
     return fit_structured(modes, training, laws=laws, support=support)

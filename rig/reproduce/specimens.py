@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identification.structured.laws import Law, Masing, PolynomialSpring
+from identification.structured.laws import Law, MagnetSpring, Masing
 from rig.errors import ConfigurationError
 
 __all__ = ["SPECIMENS", "Specimen", "specimen_of"]
@@ -46,7 +46,8 @@ class Specimen:
     laws: tuple[Law, ...]
     """Laws of the nonlinear element of a structured model."""
     support: bool
-    """Whether a structured model has the static force of the exciter. Only a spring that is not symmetric makes it visible."""
+    """Whether a structured model has the static force of the exciter, by the stiffness of its suspension as it was identified.
+    Only a spring that is not symmetric makes it visible."""
     beside: tuple[str, ...] = ("backbone-fine",)
     """Plans whose points can be used for training together with the multisines."""
     exciter: str = "exciter"
@@ -72,7 +73,7 @@ SPECIMENS = {
         sweeps=("sweep-1", "sweep-2", "sweep-3"),
         modes_plan="multisine-1",
         modes=1,
-        laws=(PolynomialSpring(), Masing()),
+        laws=(MagnetSpring(), Masing()),
         support=True,
         beside=("backbone-fine", "harmonics-varied"),
     ),

@@ -20,7 +20,7 @@ from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.lost_samples import lost_rows, rms_of
 from rig.campaigns.evaluation.point import Point, Quality, planned_point, result_of
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
-from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of, not_evaluated, skew_turn
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Column, Target
 from rig.daq import Channel
@@ -118,8 +118,8 @@ def _warnings(planned: int, periods: int) -> tuple[str, ...]:
 def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
     """Return the spectra of recorded rows, which are given by the number of the realisation.
 
-    Every period is rotated to begin where the signal begins. The skew of the channels is removed. Periods with lost samples are
-    left out.
+    Every period is rotated to begin where the signal begins. The skew of the channels and the high-pass of their sensors are
+    removed. Periods with lost samples are left out.
     """
     design = plan.design(bench.sample_rate_hz)
     channels = len(bench.channels) + 1
@@ -127,9 +127,9 @@ def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarr
     shortest = min(record.shape[1] for record in turned)  # all realisations get as many periods as the shortest has
     turned = [record[:, :shortest] for record in turned]
     spectra = periodic_spectra(turned, (*channels_of(bench), VOLTAGE), design)
-    without_skew = spectra.spectra.copy()
-    without_skew[:, :, :-1] *= skew_turn(bench, spectra.frequency_hz)
-    return replace(spectra, spectra=without_skew)
+    corrected = spectra.spectra.copy()
+    corrected[:, :, :-1] *= channel_factors(bench, spectra.frequency_hz)
+    return replace(spectra, spectra=corrected)
 
 
 def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarray) -> np.ndarray:

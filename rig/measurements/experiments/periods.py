@@ -8,7 +8,7 @@ import numpy as np
 from identification import Experiment, IdentificationError
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, result_of
-from rig.campaigns.evaluation.vibrations import skew_turn
+from rig.campaigns.evaluation.vibrations import channel_factors
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import MultisineResult, turned_periods
 from rig.measurements.experiments.signals import Signals
@@ -49,7 +49,11 @@ def realisation(
     size = samples_of_a_period(plan, bench, rate_hz)
     noise = None
     if wanted.periods == "mean":
-        noise = _noise(recorded[list(signals.outputs)], size)
+        noise = _noise(recorded, size)
+        if noise is not None:
+            hz = np.arange(1, noise.shape[1] + 1) * bench.sample_rate_hz / recorded.shape[-1]
+            noise[:-1] *= np.abs(channel_factors(bench, hz))
+            noise = noise[list(signals.outputs)]
         recorded = recorded.mean(axis=1, keepdims=True)
     slow = _resampled(recorded, bench, size, signals.offset)
     once = slow.reshape(slow.shape[0], -1)
@@ -72,9 +76,9 @@ def realisation(
 
 
 def _noise(periods: np.ndarray, size: int) -> np.ndarray | None:
-    """Return the standard errors of the mean's lines (peak) below half of ``size``, float[n_outputs, n_lines].
+    """Return the standard errors of the mean's lines (peak) below half of ``size``, float[n_channels + 1, n_lines].
 
-    ``periods`` are float[n_outputs, n_periods, n]. Returns None for a single period.
+    ``periods`` are float[n_channels + 1, n_periods, n]. Returns None for a single period.
     """
     count = periods.shape[1]
     if count < 2:
@@ -100,12 +104,12 @@ def _resampled(recorded: np.ndarray, bench: Bench, size: int, offset: np.ndarray
     """Resample to ``size`` samples per period, keeping only the lines below the new Nyquist frequency.
 
     The result is float[n_channels + 1, n_periods, n]. It is exact for these lines, and nothing aliases. The skew of the
-    channels is removed, and so is the mean of channels where it is a sensor offset.
+    channels and the high-pass of their sensors are removed, and so is the mean of channels where it is a sensor offset.
     """
     count = recorded.shape[-1]
     lines = np.fft.rfft(recorded, axis=-1)[..., : size // 2 + 1]
     frequency_hz = np.arange(lines.shape[-1]) * bench.sample_rate_hz / count
-    lines[:-1] *= skew_turn(bench, frequency_hz)[:, None]
+    lines[:-1] *= channel_factors(bench, frequency_hz)[:, None]
     lines[offset, :, 0] = 0.0
     if size % 2 == 0 and size < count:
         lines[..., -1] = 0.0  # half of the line at the Nyquist frequency would have aliased

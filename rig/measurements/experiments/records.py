@@ -69,7 +69,7 @@ def sweep_pieces(
         used = values[[*signals.inputs, *signals.outputs]]
         first = used[:, : int(fs / start_hz)].std(axis=1)
         rest = bool(np.all(first <= AT_REST * np.abs(used).max(axis=1)))
-        slow = _slower(signals, values, rate_hz, begins_at_rest=rest)
+        slow = _slower(signals, signals.without_high_pass(values), rate_hz, begins_at_rest=rest)
         called = name if len(pieces) == 1 else f"{name}, piece {number}"
         found = _experiment(signals, slow, rate_hz, "zero" if rest else "estimated", called, level)
         yield replace(found, counted_from=round(max(0, before - piece.start) * rate_hz / fs))

@@ -36,9 +36,14 @@ def identified_structured(
     found = _modes_in(modes)
     data = fit_data(paths, of_data, "structured", kinds=_KINDS)
     one_specimen(**{str(modes): found.specimen, str(paths[0]): data.training[0].specimen})
+    known = options.suspension_stiffness_n_m
     fit, scatter = fitted(
         lambda training, validation: fit_structured(
-            found, training, validation=validation, elements=options.elements()
+            found,
+            training,
+            validation=validation,
+            elements=options.elements(),
+            support=True if known is None else known,
         ),
         data,
         of_data,

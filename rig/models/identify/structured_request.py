@@ -1,5 +1,6 @@
 """Options for the identification of a structured model."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,13 @@ class StructuredOptions(Options):
     """Elements, each as kinds of its laws with commas: ``polynomial-spring,masing``; after ``@`` the output at which it acts,
     or two with a colon between them. One element with ``polynomial-spring,polynomial-damper`` if empty."""
 
+    suspension_stiffness_n_m: float | None = None
+    """Stiffness of the exciter's suspension, N/m, 0 for none; fitted if None."""
+
     def __post_init__(self) -> None:
+        stiffness = self.suspension_stiffness_n_m
+        if stiffness is not None and not 0.0 <= stiffness < math.inf:
+            raise ConfigurationError(f"`suspension_stiffness_n_m` = {stiffness:g}: allowed is 0 and above")
         self.elements()  # refused here, not when it is asked for
 
     def elements(self) -> "tuple[ElementPlan, ...]":

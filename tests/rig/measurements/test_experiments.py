@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import rig
 from identification import IdentificationError
@@ -186,3 +187,36 @@ def test_a_continuous_backbone_holds_no_experiments(multisine, monkeypatch):
     monkeypatch.setattr(type(multisine.recording), "kind", "continuous-backbone")
     with pytest.raises(RecordingError, match=r"holds a continuous-backbone, wanted is a .* a multisine"):
         experiments(multisine.recording)
+
+
+def test_the_high_pass_of_the_sensors_is_taken_out_of_a_multisine(multisine):
+    """The exact inverse of a first-order high-pass at every line; the phase of the lowest is 18 times that of the highest."""
+    part = multisine.recording
+    (made, _) = multisine.experiments(rate_hz=5000.0, outputs=["drive"])
+    rows = point_rows(part, 0)["inputs"][:30000].astype(float).reshape(3, 10000, -1).mean(axis=0)
+    lines = np.arange(4, 1000)
+    force, drive = (np.fft.rfft(rows[:, column])[lines] for column in (0, 1))
+    corrected = np.fft.rfft(made.counted_inputs[0])[lines], np.fft.rfft(made.counted_outputs[0])[lines]
+    inverse = 1.0 + 0.3 / (1j * lines * 0.5)
+    for raw, found in zip((force, drive), corrected, strict=True):
+        # the record begins somewhere in the period, the experiment where the signal begins
+        np.testing.assert_allclose(np.abs(found), np.abs(raw * inverse), rtol=1e-9)
+    np.testing.assert_allclose(corrected[1] / corrected[0], drive / force, rtol=1e-9)
+    turned = np.unwrap(np.angle(corrected[1][30:66] / (drive * inverse)[30:66]))
+    np.testing.assert_allclose(np.diff(turned, 2), 0.0, atol=1e-8)  # nothing is left but a shift in time
+
+
+def test_the_high_pass_of_the_sensors_is_taken_out_of_a_sweep(multisine):
+    rate_hz, corner_hz = 5000.0, 0.3
+    times = np.arange(0.0, 40.0, 1.0 / rate_hz)
+    true = np.sin(2.0 * np.pi * (10.0 + 0.4 * times) * times) * np.sin(np.pi * times / 40.0) ** 2
+    x = 2.0 * np.pi * corner_hz / rate_hz  # exact for straight lines between the samples
+    hold, held, late = np.exp(-x), -np.expm1(-x), 1.0 + np.expm1(-x) / x
+    passed = true - lfilter([late, held - late], [1.0, -hold], true)
+    bench = bench_with({"sample_rate_hz": rate_hz})
+    signals = Signals.chosen(bench, ["force"], ["drive"])
+    found = signals.without_high_pass(np.vstack([np.tile(passed, (len(bench.channels), 1)), true]))
+    assert {channel.high_pass_hz for channel in bench.channels} == {corner_hz}
+    assert np.linalg.norm(passed - true) > 0.01 * np.linalg.norm(true)
+    assert np.all(np.linalg.norm(found[:-1] - true, axis=1) < 1e-3 * np.linalg.norm(true))
+    assert np.array_equal(found[-1], true)  # the voltage has none
