@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from identification.mapping.base import ChannelMapping, MappingTable, Path
+from identification.mapping.csv_layout import CsvLayout
 
 __all__ = ["Axis", "SampledChannel", "Stretch", "TimeDataMapping"]
 
@@ -110,6 +111,8 @@ class TimeDataMapping(MappingTable):
     """Lower sample rate to which the records are filtered and decimated; left out, they keep theirs."""
     instrument: str = ""
     """Name of a noise-free channel, such as the voltage of the generator, for frequency responses; the force if left out."""
+    csv: CsvLayout | None = None
+    """Layout of a CSV file that does not begin with one line of names."""
     channels: Annotated[tuple[SampledChannel, ...], Field(min_length=2)]
     """The channels."""
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.units import file_units
 from rig.system.text_files import read_bytes
 

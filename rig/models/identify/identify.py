@@ -16,6 +16,7 @@ from identification import (
     ModalAnalysis,
     NonlinearMode,
     PeriodicSpectra,
+    TimeRecords,
     best_linear_approximation,
     combined,
     extrapolated_to_zero,
@@ -24,6 +25,8 @@ from identification import (
     nonlinear_mode,
     stabilisation,
     stepped_sine_mode,
+    time_responses,
+    time_spectra,
 )
 from identification.validation import one_specimen
 from rig.campaigns.kinds import kinds_that_yield
@@ -42,6 +45,8 @@ from rig.models.files.files import KINDS, load, load_as
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.files.linear_modes import LINEAR_MODES
+from rig.models.files.time_data import TIME_DATA
+from rig.models.identify.data_files import time_records_in
 from rig.models.identify.request import Request
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -200,15 +205,30 @@ def _matrices(
         shown = [best_linear_approximation(s, estimator=estimator, specimen=specimen) for s in measured]
         if estimator != "instrument":
             return [(matrix, matrix) for matrix in shown], missing
-        return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
+        return [(matrix, _over_instrument(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
     if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
         return [(matrix, matrix)], ()
-    raise RecordingError(f"{path}: holds a {kind}; a linear model comes from multisines or frequency response matrices")
+    if kind == TIME_DATA.name:
+        found = [_responses_over_time(records, estimator) for records in time_records_in(path).levels().values()]
+        return found, ()
+    raise RecordingError(
+        f"{path}: holds a {kind}; a linear model comes from multisines, time data or frequency response matrices"
+    )
 
 
-def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponseMatrix:
+def _responses_over_time(
+    records: TimeRecords, estimator: Estimator
+) -> tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]:
+    """Return the responses of one level of time data, as shown and as fitted: over the instrument, if there is one."""
+    shown = time_responses(records, estimator=estimator)
+    if not records.period_samples or not records.instrument or estimator != "instrument":
+        return shown, shown
+    return shown, _over_instrument(time_spectra(records), records.specimen, records.instrument)
+
+
+def _over_instrument(measured: PeriodicSpectra, specimen: str, instrument: str = "voltage") -> FrequencyResponseMatrix:
     names = [channel.name for channel in measured.channels if channel.role in ("force", "drive", "response")]
-    return best_linear_approximation(measured, inputs=("voltage",), outputs=names, specimen=specimen)
+    return best_linear_approximation(measured, inputs=(instrument,), outputs=names, specimen=specimen)
 
 
 def _exciter(paths: Sequence[Path], request: Request) -> Exciter:
