@@ -112,11 +112,18 @@ def _sep005(path: Path) -> dict[str, Any]:
 
 
 def _foreign(path: Path, format_: str) -> dict[str, Any]:
-    """Return what a child process reads; names within groups of HDF5 files also in full, joined by ``/``."""
+    """Return what a child process reads; names within groups of HDF5 files also in full, joined by ``/``.
+
+    The units of HDF5 files are attributes called ``units`` or ``unit``.
+    """
     from rig.exchange.foreign.process import NAMES
 
     data = read_in_child("rig.exchange.foreign.process", path, NAMES[format_], format_)
-    return {**_in_full(data, ""), **data} if format_ == "hdf5" else data
+    if format_ != "hdf5":
+        return data
+    full = {**_in_full(data, ""), **data}
+    units = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
+    return {**full, "file_units": {name: unit for name, unit in units.items() if isinstance(unit, str)}}
 
 
 def _in_full(group: Mapping[str, Any], before: str) -> dict[str, Any]:

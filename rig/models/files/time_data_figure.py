@@ -42,7 +42,9 @@ def draw_time_data(page: "Figure", data: TimeRecords) -> None:
             axes[row, 1].semilogy(*_spectrum(record, row, data), color=colour, lw=_THIN)
         axes[row, 0].set(xlabel="time, s", ylabel=f"{channel.name}, {unit}")
         density = unit if data.period_samples else f"{unit}/√Hz"
-        axes[row, 1].set(xlabel="frequency, Hz", ylabel=f"{channel.name}, {density}", xlim=(0.0, data.sample_rate_hz / 2))
+        axes[row, 1].set(
+            xlabel="frequency, Hz", ylabel=f"{channel.name}, {density}", xlim=(0.0, data.sample_rate_hz / 2)
+        )
         if data.excited_hz is not None:
             axes[row, 1].axvspan(*data.excited_hz, color="0.94", zorder=0)
     if len(levels) > 1:
