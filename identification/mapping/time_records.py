@@ -30,8 +30,8 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     Parameters
     ----------
     data
-        Nested dictionaries, lists and arrays. At the top, ``sample_rate_hz`` (float), or ``rates_hz`` and ``starts_s`` (by
-        path), tell what the file says of its own sampling.
+        Nested dictionaries, lists and arrays. At the top, ``sample_rate_hz`` (float), or ``__rates_hz__`` and
+        ``__starts_s__`` (by path), tell what the file says of its own sampling.
     mapping
         What is where, and what it means.
     files
@@ -146,7 +146,7 @@ def _sampling(
     if isinstance(file, Mapping):
         if isinstance(rate := file.get("sample_rate_hz"), float):
             told[of_file] = rate
-        rates, starts = file.get("rates_hz"), file.get("starts_s")
+        rates, starts = file.get("__rates_hz__"), file.get("__starts_s__")
         if isinstance(rates, Mapping) and isinstance(rate := rates.get(channel.value), float):
             told[f"{of_file} ({channel.value})"] = rate
         if isinstance(starts, Mapping) and isinstance(begin := starts.get(channel.value), float):

@@ -26,11 +26,12 @@ def import_(
 ) -> None:
     """Bring in measurements, time data and modes from elsewhere."""
     from rig.exchange.reading import import_file
+    from rig.exchange.time_data import TimeData, records_of_series
     from rig.models.files.files import save
 
     keep_existing([file], output, overwrite)
     found = import_file(file, format_, mapping, units=units, drive=drive, item=item)
-    save(found, output)
+    save(records_of_series(found) if isinstance(found, TimeData) else found, output)
     show_file(output, json)
 
 

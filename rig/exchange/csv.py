@@ -6,6 +6,7 @@ read back exactly.
 
 import csv
 import json
+import re
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["read_csv", "table_of_ours", "units_of_csv", "write_csv"]
 
 LARGEST_BYTES = 1_000_000_000
+_DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 _KIND, _OTHERS = "# vibrolock: ", "# others: "
 
 
@@ -165,9 +167,10 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _is_units(cells: Sequence[str], values: Sequence[float | None]) -> bool:
-    """Return whether a row holds units: texts, or a 1."""
+    """Return whether a row holds units: texts that do not begin like a number, or a 1."""
     return None in values and all(
-        value is None or cell.strip() == "1" for cell, value in zip(cells, values, strict=True)
+        cell.strip() == "1" if value is not None else not _DIGIT_FIRST.match(cell)
+        for cell, value in zip(cells, values, strict=True)
     )
 
 

@@ -160,7 +160,7 @@ def _check_units(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any]
 
     for channel in getattr(mapping, "channels", ()):
         of_file = files.get(getattr(channel, "file", ""), data)
-        for key in ("units", "file_units"):
+        for key in ("units", "__file_units__"):
             told = of_file[key].get(channel.value) if isinstance(of_file.get(key), dict) else None
             if not isinstance(told, str) or not told or getattr(channel, "scale", 1.0) != 1.0:
                 continue  # with a scale, the numbers are another quantity: volts of a sensor, for example

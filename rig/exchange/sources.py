@@ -44,8 +44,9 @@ def format_of(path: Path, given: str, option: str, known: tuple[str, ...] = tupl
 def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout | None" = None) -> dict[str, Any]:
     """Return what is in a file.
 
-    Besides the values by name, the dictionary may have ``sample_rate_hz`` (Hz) or, by name, ``rates_hz`` and ``starts_s`` (s);
-    ``units``, by name, of values that are in SI already, or ``file_units`` of values that are as the file has them.
+    Besides the values by name, the dictionary may have ``sample_rate_hz`` (Hz) or, by name, ``__rates_hz__`` and
+    ``__starts_s__`` (s); ``units``, by name, of values that are in SI already, or ``__file_units__`` of values that are as the
+    file has them.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def _csv(path: Path, layout: "CsvLayout | None") -> dict[str, Any]:
 
     if table_of_ours(path) is not None and layout is None:
         return read_csv(path)
-    return {**read_csv(path, layout), "file_units": units_of_csv(path) if layout is None else {}}
+    return {**read_csv(path, layout), "__file_units__": units_of_csv(path) if layout is None else {}}
 
 
 def _sep005(path: Path) -> dict[str, Any]:
@@ -123,7 +124,7 @@ def _foreign(path: Path, format_: str) -> dict[str, Any]:
         return data
     full = {**_in_full(data, ""), **data}
     units = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
-    return {**full, "file_units": {name: unit for name, unit in units.items() if isinstance(unit, str)}}
+    return {**full, "__file_units__": {name: unit for name, unit in units.items() if isinstance(unit, str)}}
 
 
 def _in_full(group: Mapping[str, Any], before: str) -> dict[str, Any]:

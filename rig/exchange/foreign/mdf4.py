@@ -48,7 +48,9 @@ def read_mdf4(path: Path) -> dict[str, Any]:
                     rates[called], starts[called] = 1.0 / step, float(signal.timestamps[0])
                 if signal.unit:
                     units[called] = str(signal.unit)
-    return {**out, "rates_hz": rates, "starts_s": starts, "file_units": units}
+    if not out:
+        raise ValueError("it holds no channel of numbers")
+    return {**out, "__rates_hz__": rates, "__starts_s__": starts, "__file_units__": units}
 
 
 def _by_formula(channel: Any) -> bool:

@@ -35,4 +35,6 @@ def read_tdms(path: Path) -> dict[str, Any]:
                 unit = told.get("unit_string") or told.get("NI_UnitDescription")
                 if isinstance(unit, str) and unit:
                     units[name] = unit
-    return {**out, "rates_hz": rates, "starts_s": starts, "file_units": units}
+    if not out:
+        raise ValueError("it holds no channel of numbers")
+    return {**out, "__rates_hz__": rates, "__starts_s__": starts, "__file_units__": units}

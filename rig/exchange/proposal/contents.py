@@ -13,7 +13,7 @@ from identification.mapping.units import si_of
 
 __all__ = ["FileContents", "Leaf", "contents_of"]
 
-_TOLD = ("sample_rate_hz", "rates_hz", "starts_s", "units", "file_units")
+_TOLD = ("sample_rate_hz", "__rates_hz__", "__starts_s__", "units", "__file_units__")
 """Keys by which readers tell of the data; they are no data."""
 _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]+)[\])]$")
 _DEEPEST = 8
@@ -77,7 +77,7 @@ def contents_of(data: Mapping[str, Any], file: str = "") -> FileContents:
     """Return the contents of what `rig.exchange.sources.read_data` has read; ``file`` is the name of a further file."""
     told = {key: data[key] for key in _TOLD if key in data}
     units: dict[str, Any] = {}
-    for key in ("units", "file_units"):
+    for key in ("units", "__file_units__"):
         units |= told[key] if isinstance(told.get(key), Mapping) else {}
     in_full = any("/" in key for key in data)
     top = {
@@ -142,6 +142,6 @@ def _what(value: Any) -> str:
 def _rate(told: Mapping[str, Any], paths: list[str]) -> float | None:
     if isinstance(rate := told.get("sample_rate_hz"), float):
         return rate
-    rates = told.get("rates_hz")
+    rates = told.get("__rates_hz__")
     known = [rates[path] for path in paths if path in rates] if isinstance(rates, Mapping) else []
     return max(set(known), key=known.count) if known else None

@@ -180,7 +180,13 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
             for shown, fitted in pairs
         ]
     pairs.sort(key=lambda pair: pair[0].input_rms or (0.0,))
-    one_specimen(**{f"{shown.input_rms[0]:.3g} N RMS": shown.specimen for shown, _ in pairs if shown.input_rms})
+    one_specimen(
+        **{
+            f"{shown.input_rms[0]:.3g} {shown.inputs[0].unit} RMS": shown.specimen
+            for shown, _ in pairs
+            if shown.input_rms
+        }
+    )
     lowest, fitted = pairs[0]
     diagram = stabilisation(fitted)
     found = [linear_modes(fitted, modes=request.count, diagram=diagram)]

@@ -52,7 +52,14 @@ def universal(path: Path) -> None:
         axes = {"abscissa": (17, "s"), "ordinate": (kind, unit), "orddenom": (0, "NONE"), "z_axis": (0, "NONE")}
         about: dict[str, Any] = {
             **{"type": 58, "func_type": 1, "func_id": 0, "binary": 0, "data": values, "x": INSTANTS, "num_pts": N},
-            **{"rsp_node": node, "rsp_dir": 3, "ref_node": 1, "ref_dir": 3, "rsp_ent_name": "NONE", "ref_ent_name": "NONE"},
+            **{
+                "rsp_node": node,
+                "rsp_dir": 3,
+                "ref_node": 1,
+                "ref_dir": 3,
+                "rsp_ent_name": "NONE",
+                "ref_ent_name": "NONE",
+            },
             **{"abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": 1.0 / RATE_HZ, "z_axis_value": 0.0},
             **{f"id{number}": "measured" for number in range(1, 6)},
             **{"ver_num": 0, "load_case_id": 0},
