@@ -75,6 +75,7 @@ class TimeDataMapping(MappingTable):
     """Where the samples are in the data, and which records they are."""
 
     kind: Literal["time-data"]
+    """Kind of the mapping."""
     specimen: str = ""
     """Name of what was tested."""
     source: str = ""
