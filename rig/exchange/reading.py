@@ -63,6 +63,8 @@ def import_file(
     try:
         if mapping is not None:
             return _read_with(mapping, path, form, units)
+        if form == "hdf5":
+            read_data(path, form)  # refuses files of ours and damaged ones
         if form not in readers:
             raise ImportFailed(f"{path}: {_PROPOSAL}")
         return readers[form](path, {"units": units, "drive": drive, "item": item})

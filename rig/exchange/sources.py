@@ -122,6 +122,8 @@ def _foreign(path: Path, format_: str) -> dict[str, Any]:
     data = read_in_child("rig.exchange.foreign.process", path, NAMES[format_], format_)
     if format_ != "hdf5":
         return data
+    if data.get("@format") == "vibrolock":
+        raise ImportFailed(f"{path}: is a file of this program, of kind {data.get('@kind')}; it needs no import")
     full = {**_in_full(data, ""), **data}
     units = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
     return {**full, "__file_units__": {name: unit for name, unit in units.items() if isinstance(unit, str)}}

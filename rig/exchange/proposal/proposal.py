@@ -50,8 +50,9 @@ def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") 
         layout = layout or guessed
         found.append(contents_of(read_data(path, form, units=units, layout=guessed), path.name if number else ""))
     proposal = _proposal(found, first, layout)
-    wav = format_of(first, format_, "`format`") == "wav"
-    return text_of(proposal, found, [path.name for path in paths], full_scale=wav), proposal.missing
+    forms = [format_of(path, format_ if not number else "", "`format`") for number, path in enumerate(paths)]
+    relative = {path.name if number else "" for number, path in enumerate(paths) if forms[number] == "wav"}
+    return text_of(proposal, found, [path.name for path in paths], relative), proposal.missing
 
 
 def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | None) -> Proposal:
@@ -144,19 +145,16 @@ def _with_roles(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
     out = list(channels)
     if not any(channel.role == "force" for channel in out):
         at = next((i for i, c in enumerate(out) if c.role == "monitor"), None)
-        at = next((i for i, c in enumerate(out) if not c.role), 0) if at is None else at
+        if at is None:  # by the names: V1 before V2
+            open_ = [i for i, c in enumerate(out) if not c.role] or list(range(len(out)))
+            at = min(open_, key=lambda i: out[i].name)
         out[at] = out[at].played("force")
-    forces = drives = 0
-    for number, channel in enumerate(out):
-        role = channel.role
-        if role == "force":
-            forces += 1
-            role = "force" if forces == 1 else "monitor"
-        elif role in ("motion", ""):
-            drives += 1
-            role = "drive" if drives == 1 else "response"
-        out[number] = channel.played(role)
-    return out
+    forces = [number for number, channel in enumerate(out) if channel.role == "force"]
+    motions = [number for number, channel in enumerate(out) if channel.role == "motion"]
+    motions += [number for number, channel in enumerate(out) if not channel.role]
+    roles = {**dict.fromkeys(forces[1:], "monitor"), **dict.fromkeys(motions, "response")}
+    roles |= dict.fromkeys(motions[:1], "drive")
+    return [channel.played(roles.get(number, channel.role)) for number, channel in enumerate(out)]
 
 
 def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float | None, str, str]:

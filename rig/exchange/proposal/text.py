@@ -1,7 +1,7 @@
 """Text of a proposed mapping: TOML with comments on what is in the file and what is a guess."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,9 +63,9 @@ class Proposal:
 
 
 def text_of(
-    proposal: Proposal, found: Sequence[FileContents], files: Sequence[str], *, full_scale: bool = False
+    proposal: Proposal, found: Sequence[FileContents], files: Sequence[str], relative: Collection[str] = ()
 ) -> str:
-    """Return the mapping; ``full_scale``: numbers are relative to the full scale of a converter."""
+    """Return the mapping; ``relative`` names further files (the first is empty) with numbers relative to a full scale."""
     lines = [
         f"# Time data in {', '.join(files)}, proposed by `rig new mapping`. Where the file does not tell roles and units,",
         "# they are guesses: check every line, then",
@@ -91,7 +91,7 @@ def text_of(
     if proposal.records:
         lines += [f"records = {_quoted(proposal.records)}    # list of structures, one for each record"]
     for channel in proposal.channels:
-        lines += ["", *_channel(channel, axes, full_scale=full_scale)]
+        lines += ["", *_channel(channel, axes, full_scale=channel.leaf.file in relative)]
     if proposal.left_out:
         lines += ["", f"# {proposal.left_out} further channels are not listed here"]
     return "\n".join(lines) + "\n"

@@ -52,7 +52,8 @@ def _say(summary: dict[str, Any]) -> None:
     periodic = f"periods of {summary['period_samples']} samples" if summary["period_samples"] else "not periodic"
     excited = "" if band is None else f", excited {band[0]:g} to {band[1]:g} Hz"
     rest = ", from rest" if summary["at_rest"] and not summary["period_samples"] else ""
-    print(f"{len(records)} records at {summary['sample_rate_hz']:g} Hz, {periodic}{rest}{excited}")
+    many = "1 record" if len(records) == 1 else f"{len(records)} records"
+    print(f"{many} at {summary['sample_rate_hz']:g} Hz, {periodic}{rest}{excited}")
     print_table(
         ("channel", "role", "unit", "RMS", "largest", "mean"),
         [

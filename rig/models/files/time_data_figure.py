@@ -79,7 +79,9 @@ def _spectrum(record: TimeRecord, row: int, data: TimeRecords) -> tuple[Float, F
         frequency = np.arange(lines.size) * rate / size
     else:
         signal: Any = scipy.signal
-        frequency, power = signal.welch(values, rate, nperseg=min(_SEGMENT, values.size))
+        frequency, power = signal.welch(
+            values, rate, nperseg=min(_SEGMENT, max(values.size // 8, min(values.size, 256)))
+        )
         lines = np.sqrt(power)
     floor = 1e-9 * float(lines[1:].max(initial=0.0))
     return frequency[1:], np.where(lines[1:] > floor, lines[1:], np.nan)

@@ -151,7 +151,7 @@ def _check_files(
     for path, kind in kinds.items():
         if kind not in wanted:
             raise RecordingError(
-                f"{path}: is a file of kind {kind}; a {what} model comes from recordings and time data: {', '.join(wanted)}"
+                f"{path}: is a file of kind {kind}; a {what} model comes from recordings: {', '.join(wanted)}"
             )
     for path in validation:
         if any(path.samefile(other) for other in paths):

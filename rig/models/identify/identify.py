@@ -16,7 +16,6 @@ from identification import (
     ModalAnalysis,
     NonlinearMode,
     PeriodicSpectra,
-    TimeRecords,
     best_linear_approximation,
     combined,
     extrapolated_to_zero,
@@ -25,8 +24,6 @@ from identification import (
     nonlinear_mode,
     stabilisation,
     stepped_sine_mode,
-    time_responses,
-    time_spectra,
 )
 from identification.validation import one_specimen
 from rig.campaigns.kinds import kinds_that_yield
@@ -45,14 +42,12 @@ from rig.models.files.files import KINDS, load, load_as
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.files.linear_modes import LINEAR_MODES
-from rig.models.files.time_data import TIME_DATA
-from rig.models.identify.data_files import time_records_in
 from rig.models.identify.request import Request
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
-    from identification import FitProgress
+    from identification import FitProgress, TimeRecords
 
 __all__ = ["Request", "identify_model", "modes_in"]
 
@@ -214,7 +209,9 @@ def _matrices(
         return [(matrix, _over_instrument(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
     if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
         return [(matrix, matrix)], ()
-    if kind == TIME_DATA.name:
+    if kind == "time-data":
+        from rig.models.identify.data_files import time_records_in  # loads what other models need not wait for
+
         found = [_responses_over_time(records, estimator) for records in time_records_in(path).levels().values()]
         return found, ()
     raise RecordingError(
@@ -223,9 +220,11 @@ def _matrices(
 
 
 def _responses_over_time(
-    records: TimeRecords, estimator: Estimator
+    records: "TimeRecords", estimator: Estimator
 ) -> tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]:
     """Return the responses of one level of time data, as shown and as fitted: over the instrument, if there is one."""
+    from identification import time_responses, time_spectra
+
     shown = time_responses(records, estimator=estimator)
     if not records.period_samples or not records.instrument or estimator != "instrument":
         return shown, shown
