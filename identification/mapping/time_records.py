@@ -55,7 +55,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     raw: list[_Raw] = []
     for number in range(counts[""]):
         where = f"{mapping.records}[{number}], " if mapping.records else ""
-        raw += _raw_records({name: some[number] for name, some in entries.items()}, every, mapping, where, number)
+        raw += _raw_records({name: some[number] for name, some in entries.items()}, every, mapping, where)
     rate = raw[0].rate_hz
     if any(abs(one.rate_hz / rate - 1.0) > 1e-6 for one in raw):
         raise IdentificationError(f"sample_rate_hz: records have rates from {rate:g} Hz on; wanted is one")
@@ -99,7 +99,7 @@ def _entries(data: Any, mapping: TimeDataMapping) -> Sequence[Any]:
 
 
 def _raw_records(
-    entries: Mapping[str, Any], files: Mapping[str, Any], mapping: TimeDataMapping, where: str, number: int
+    entries: Mapping[str, Any], files: Mapping[str, Any], mapping: TimeDataMapping, where: str
 ) -> list[_Raw]:
     """Return the records in one structure: all channels side by side, on one grid of instants."""
     _, factors = in_si(mapping.channels)
@@ -128,12 +128,7 @@ def _raw_records(
     )
     size = next(iter(periods), mapping.period_samples or 0)
     levels, realisations = together.shape[1:3]
-    first = number * levels
-    return [
-        _Raw(together[:, level, one], rate, first + level if levels > 1 else 0, size)
-        for level in range(levels)
-        for one in range(realisations)
-    ]
+    return [_Raw(together[:, level, one], rate, level, size) for level in range(levels) for one in range(realisations)]
 
 
 def _sampling(
