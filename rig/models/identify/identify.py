@@ -233,7 +233,9 @@ def _responses_over_time(
 
 def _over_instrument(measured: PeriodicSpectra, specimen: str, instrument: str = "voltage") -> FrequencyResponseMatrix:
     names = [channel.name for channel in measured.channels if channel.role in ("force", "drive", "response")]
-    return best_linear_approximation(measured, inputs=(instrument,), outputs=names, specimen=specimen)
+    return best_linear_approximation(
+        measured, inputs=(instrument,), instruments=(instrument,), outputs=names, specimen=specimen
+    )
 
 
 def _exciter(paths: Sequence[Path], request: Request) -> Exciter:

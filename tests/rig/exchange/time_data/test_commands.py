@@ -10,7 +10,8 @@ import pytest
 import scipy.io
 
 from rig.cli import main
-from rig.models.files.files import load
+from rig.models.files.files import load, save
+from tests.identification.time_data.test_time_data import F0, ZETA, multisines
 
 RATE_HZ, SIZE, SETTLING, PERIODS = 512.0, 512, 6, 2
 A, CUBIC, GAIN = np.array([[1.0 - 0.09, 0.3 * 0.99], [-0.3, 0.99]]), 0.004, 0.1
@@ -121,6 +122,15 @@ def test_linear_modes_of_the_low_level_keep_the_volts(typed, folder):
     pole, modes = np.log(np.linalg.eigvals(A)[0]) * RATE_HZ, load(folder / "modes.h5").modes
     assert modes.frequency_hz == pytest.approx([abs(pole) / (2 * np.pi)], rel=1e-3)
     assert modes.damping_ratio == pytest.approx([-pole.real / abs(pole)], rel=0.03)
+
+
+def test_a_generator_of_any_name_is_the_instrument_of_linear_modes(typed, folder):
+    data = multisines(periods=4, noise=0.02, realisations=4)
+    save(data, folder / "generator.h5")
+    typed("identify generator.h5 --model linear -o generator-modes.h5 --overwrite")
+    modes = load(folder / "generator-modes.h5").modes
+    assert modes.frequency_hz == pytest.approx([F0], abs=4 * modes.frequency_std_hz[0])
+    assert modes.damping_ratio == pytest.approx([ZETA], abs=4 * modes.damping_ratio_std[0])
 
 
 def test_time_data_are_drawn_reported_exported_and_read_back(typed, folder):
