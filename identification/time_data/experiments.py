@@ -26,6 +26,7 @@ SAMPLES_PER_PERIOD = 25
 """Samples per period of the highest excited frequency."""
 _ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)
 _SAME = 1e-9
+_EXCITED = 1e-2
 
 
 def round_rate_hz(most_hz: float) -> float:
@@ -59,7 +60,7 @@ def time_experiments(
     outputs: Sequence[str] | None = None,
     rate_hz: float | None = None,
 ) -> tuple[Experiment, ...]:
-    """Return one experiment for each record, in their order.
+    """Return one experiment for each record, in their order. The band of periodic records, if unknown, is that of their inputs.
 
     Parameters
     ----------
@@ -87,12 +88,13 @@ def time_experiments(
 def _experiment(
     records: TimeRecords, record: TimeRecord, into: Sequence[int], out: Sequence[int], rate_hz: float
 ) -> Experiment:
-    size, ahead, noise = 0, 0, None
+    size, ahead, noise, band = 0, 0, None, records.excited_hz
     if records.period_samples:
         periods = resampled_periods(record.samples, records.period_samples, records.sample_rate_hz, rate_hz)
         size = periods.shape[-1]
         noise = _noise(periods[list(out)])
         ahead = round(records.ahead_periods * size)
+        band = band or _band(periods[list(into)].mean(axis=1), rate_hz)
         values = periods.mean(axis=1)[:, np.arange(-ahead, size) % size]
     else:
         values = _slower(record, records, rate_hz)
@@ -108,9 +110,17 @@ def _experiment(
         name=record.name,
         level=record.level,
         specimen=records.specimen,
-        excited_hz=records.excited_hz,
+        excited_hz=band,
         output_noise=noise,
     )
+
+
+def _band(inputs: Float, rate_hz: float) -> tuple[float, float] | None:
+    """Return the lowest and highest line with a hundredth of the strongest of any input; None without two of them."""
+    size = inputs.shape[1]
+    lines = np.abs(np.fft.rfft(inputs, axis=1))[:, 1 : (size + 1) // 2]
+    excited = 1 + np.flatnonzero(np.any((lines >= _EXCITED * lines.max(axis=1, keepdims=True)) & (lines > 0.0), axis=0))
+    return (float(excited[0] * rate_hz / size), float(excited[-1] * rate_hz / size)) if excited.size > 1 else None
 
 
 def resampled_periods(samples: Float, period_samples: int, rate_hz: float, new_rate_hz: float) -> Float:

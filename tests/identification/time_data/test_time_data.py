@@ -55,6 +55,8 @@ def test_periods_are_averaged_and_put_ahead():
     np.testing.assert_allclose(one.counted_inputs[0], mean[0], rtol=1e-12)
     np.testing.assert_allclose(one.outputs[0], np.tile(mean[1], 2), rtol=1e-12)
     assert (one.period_samples, one.counted_from, one.initial_state) == (SIZE, SIZE, "zero")
+    clean = time_experiments(multisines(), outputs=["out"])[0]
+    assert clean.excited_hz == (5.0, 149.0)  # by the lines of the input
     # The standard error of a line's amplitude under white noise of deviation s: s sqrt(4 / (N periods)).
     size = 0.1 * data.records[0].samples[1].std() / np.sqrt(1.01)
     assert np.sqrt(np.mean(one.output_noise**2)) == pytest.approx(size * np.sqrt(4.0 / (SIZE * 4)), rel=0.1)
