@@ -49,7 +49,8 @@ Changes from run to run
 Measurements of others
     map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
     MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
-    ResponseMatrixMapping
+    ResponseMatrixMapping, map_time_data, TimeDataMapping, TimeRecords, TimeRecord, time_experiments, time_responses,
+    time_spectra
 """
 
 from typing import TYPE_CHECKING
@@ -79,6 +80,8 @@ if TYPE_CHECKING:
     from identification.mapping.pnlss import PnlssMapping, map_pnlss
     from identification.mapping.response_matrix import ResponseMatrixMapping, map_response_matrix
     from identification.mapping.stepped_sine import FrequencyResponseMapping, map_frequency_responses
+    from identification.mapping.time_data import TimeDataMapping
+    from identification.mapping.time_records import map_time_data
     from identification.measurements import PeriodicVibration
     from identification.multisine.best_linear_approximation import best_linear_approximation, coherence
     from identification.multisine.design import MultisineDesign
@@ -145,6 +148,9 @@ if TYPE_CHECKING:
         structured_response,
         structured_steady_state,
     )
+    from identification.time_data.experiments import time_experiments
+    from identification.time_data.records import TimeRecord, TimeRecords
+    from identification.time_data.responses import time_responses, time_spectra
 else:
     __getattr__, __dir__ = on_use(
         __name__,
@@ -159,6 +165,8 @@ else:
             "CoupledMotion": "structured.coupled.run",
             "CoupledRun": "pnlss.coupled.run",
             "DistortionLevels": "multisine.distortion",
+            "ElementPlan": "structured.further",
+            "ElementTrial": "structured.element_trials",
             "ErrorSpectra": "prediction.simulated_runs",
             "ErrorTable": "pnlss.error_table",
             "Exciter": "prediction.exciter",
@@ -184,11 +192,10 @@ else:
             "ModelJob": "pnlss.many",
             "MultisineDesign": "multisine.design",
             "MultisineMapping": "mapping.multisine",
-            "ElementPlan": "structured.further",
-            "ElementTrial": "structured.element_trials",
             "NonlinearElement": "structured.elements",
             "NonlinearMode": "nonlinear.nonlinear_modes",
             "NonlinearModeMapping": "mapping.nonlinear_mode",
+            "OutputBand": "scatter.run_scatter",
             "OutputStretch": "prediction.simulated_runs",
             "PeriodicSpectra": "multisine.spectra",
             "PeriodicVibration": "measurements",
@@ -202,6 +209,7 @@ else:
             "Repeatability": "nonlinear.repeatability",
             "ResponseBand": "prediction.uncertainty",
             "ResponseMatrixMapping": "mapping.response_matrix",
+            "RunScatter": "scatter.run_scatter",
             "ShortPoint": "slow_flows.short_points",
             "SimulatedRun": "prediction.simulated_runs",
             "Simulation": "pnlss.simulation",
@@ -214,14 +222,14 @@ else:
             "StructuredFit": "structured.fit",
             "StructuredModel": "structured.model",
             "SweepPrediction": "prediction.sweep_prediction",
+            "TimeDataMapping": "mapping.time_data",
+            "TimeRecord": "time_data.records",
+            "TimeRecords": "time_data.records",
             "Transient": "signals.transients",
             "VoltagePath": "prediction.exciter",
             "VoltageSweep": "prediction.sweep_inputs",
             "best_linear_approximation": "multisine.best_linear_approximation",
             "best_linear_responses": "pnlss.best_linear",
-            "OutputBand": "scatter.run_scatter",
-            "RunScatter": "scatter.run_scatter",
-            "fit_with_scatter": "scatter.fit",
             "bound_of": "structured.bound",
             "coherence": "multisine.best_linear_approximation",
             "combined": "nonlinear.repeatability",
@@ -238,6 +246,7 @@ else:
             "fit_pnlss": "pnlss.fitting.fit",
             "fit_state_space": "linear.state_space_fit",
             "fit_structured": "structured.fit",
+            "fit_with_scatter": "scatter.fit",
             "force_drop_out": "signals.sweeps",
             "force_surface": "response_control.force_surface",
             "frequency_response": "prediction.frequency_response",
@@ -254,6 +263,7 @@ else:
             "map_nonlinear_mode": "mapping.nonlinear_mode",
             "map_pnlss": "mapping.pnlss",
             "map_response_matrix": "mapping.response_matrix",
+            "map_time_data": "mapping.time_records",
             "nonlinear_mode": "nonlinear.phase_resonance",
             "output_stretch": "pnlss.runs",
             "pack_frequency_responses": "frequency_responses",
@@ -283,6 +293,9 @@ else:
             "structured_response": "structured.steady.response",
             "structured_steady_state": "structured.steady.response",
             "subspace": "linear.subspace",
+            "time_experiments": "time_data.experiments",
+            "time_responses": "time_data.responses",
+            "time_spectra": "time_data.responses",
             "unpack_frequency_responses": "frequency_responses",
             "zero_crossings": "signals.half_periods",
         },
@@ -356,6 +369,9 @@ __all__ = [
     "StructuredFit",
     "StructuredModel",
     "SweepPrediction",
+    "TimeDataMapping",
+    "TimeRecord",
+    "TimeRecords",
     "Transient",
     "VoltagePath",
     "VoltageSweep",
@@ -394,6 +410,7 @@ __all__ = [
     "map_nonlinear_mode",
     "map_pnlss",
     "map_response_matrix",
+    "map_time_data",
     "nonlinear_mode",
     "output_stretch",
     "pack_frequency_responses",
@@ -423,6 +440,9 @@ __all__ = [
     "structured_response",
     "structured_steady_state",
     "subspace",
+    "time_experiments",
+    "time_responses",
+    "time_spectra",
     "unpack_frequency_responses",
     "zero_crossings",
 ]

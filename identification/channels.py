@@ -6,7 +6,17 @@ from typing import Literal, get_args
 
 from identification.errors import IdentificationError
 
-__all__ = ["MOTION_ORDER", "MOTION_UNIT", "Channel", "Motion", "Role", "find_name", "find_role"]
+__all__ = [
+    "MOTION_ORDER",
+    "MOTION_UNIT",
+    "Channel",
+    "Motion",
+    "Role",
+    "chosen_rows",
+    "find_name",
+    "find_role",
+    "in_newtons",
+]
 
 Role = Literal["force", "drive", "response", "monitor"]
 Motion = Literal["displacement", "velocity", "acceleration"]
@@ -22,7 +32,10 @@ _MOTION_OF_UNIT: dict[str, Motion] = {
     "m/s2": "acceleration",
     "m/s^2": "acceleration",
     "m/s²": "acceleration",
+    "V": "displacement",
+    "1": "displacement",
 }
+_FORCE_UNITS = ("N", "V", "1")
 
 
 @dataclass(frozen=True)
@@ -37,7 +50,8 @@ class Channel:
         ``force`` (at the drive point), ``drive`` (motion at the drive point), ``response`` (motion elsewhere) or ``monitor``
         (recorded for display only, in any unit).
     unit
-        SI unit: ``N`` for a force; ``m``, ``m/s`` or ``m/s2`` for a motion.
+        SI unit: ``N`` for a force; ``m``, ``m/s`` or ``m/s2`` for a motion. ``V`` or ``1`` where there is no better one, such
+        as in an electric circuit or in normalised data; a motion in these counts as a displacement.
     """
 
     name: str
@@ -51,14 +65,19 @@ class Channel:
             raise IdentificationError(
                 f"channel '{self.name}': role is '{self.role}', allowed are {', '.join(get_args(Role))}"
             )
-        if self.role == "force" and self.unit != "N":
-            raise IdentificationError(f"channel '{self.name}': unit is '{self.unit}', a force is given in N")
+        if self.role == "force" and self.unit not in _FORCE_UNITS:
+            raise IdentificationError(
+                f"channel '{self.name}': unit is '{self.unit}', a force is given in N (V or 1 if there is no better unit)"
+            )
         if self.role in ("drive", "response") and self.unit not in _MOTION_OF_UNIT:
-            raise IdentificationError(f"channel '{self.name}': unit is '{self.unit}', a motion is in m, m/s or m/s2")
+            raise IdentificationError(
+                f"channel '{self.name}': unit is '{self.unit}', a motion is in m, m/s or m/s2 (V or 1 if there is no better "
+                "unit)"
+            )
 
     @property
     def motion(self) -> Motion:
-        """Kind of motion that a drive or response channel measures."""
+        """Kind of motion that a drive or response channel measures; a displacement in V or 1."""
         if self.role not in ("drive", "response"):
             raise IdentificationError(f"channel '{self.name}': role {self.role} measures no motion")
         return _MOTION_OF_UNIT[self.unit]
@@ -81,3 +100,52 @@ def find_name(channels: Sequence[Channel], name: str) -> int:
         if channel.name == name:
             return index
     raise IdentificationError(f"no channel '{name}'; channels: {', '.join(c.name for c in channels)}")
+
+
+def in_newtons(channels: Sequence[Channel], what: str) -> None:
+    """Raise `IdentificationError` if a force is in another unit than N, or a motion in V or 1; ``what`` needs SI."""
+    for channel in channels:
+        if (channel.role == "force" and channel.unit != "N") or (
+            channel.role in ("drive", "response") and channel.unit in ("V", "1")
+        ):
+            raise IdentificationError(
+                f"channel '{channel.name}': unit is '{channel.unit}'; {what} needs a force in N and motions in m, m/s or m/s2"
+            )
+
+
+def chosen_rows(
+    channels: Sequence[Channel], inputs: Sequence[str], outputs: Sequence[str] | None
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the rows of the inputs and of the outputs of a model.
+
+    Channels are chosen by name, or by role if none has that name. With ``outputs`` None: all motions, and the force unless it
+    is an input. Raises `IdentificationError` for an unknown name, for an empty choice, and for a channel that is both.
+    """
+    into = _rows(channels, "inputs", inputs)
+    if outputs is not None:
+        out = _rows(channels, "outputs", outputs)
+    else:
+        motions = [row for row, channel in enumerate(channels) if channel.role in ("drive", "response")]
+        forces = [row for row, channel in enumerate(channels) if channel.role == "force" and row not in into]
+        out = tuple(row for row in (*forces, *motions) if row not in into)
+        if not out:
+            names = ", ".join(f"{channel.name} ({channel.role})" for channel in channels)
+            raise IdentificationError(f"outputs: no channel is a motion, name them; channels are {names}")
+    if both := [channels[row].name for row in out if row in into]:
+        raise IdentificationError(f"outputs: {both[0]} is an input already")
+    return into, out
+
+
+def _rows(channels: Sequence[Channel], what: str, wanted: Sequence[str]) -> tuple[int, ...]:
+    """Return the rows of channels by name, or by role if no channel has that name."""
+    found: list[int] = []
+    for name in (wanted,) if isinstance(wanted, str) else wanted:
+        rows = [row for row, channel in enumerate(channels) if channel.name == name]
+        rows = rows or [row for row, channel in enumerate(channels) if channel.role == name]
+        if not rows:
+            names = ", ".join(channel.name for channel in channels)
+            raise IdentificationError(f"{what}: there is no channel {name}; channels are {names}")
+        found += [row for row in rows if row not in found]
+    if not found:
+        raise IdentificationError(f"{what}: none given, needs one channel at least")
+    return tuple(found)

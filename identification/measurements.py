@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.channels import MOTION_ORDER, Channel, find_name, find_role
+from identification.channels import MOTION_ORDER, Channel, find_name, find_role, in_newtons
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
@@ -82,6 +82,7 @@ class PeriodicVibration:
             raise IdentificationError(f"channels: names are not unique ({', '.join(names)})")
         find_role(self.channels, "force")
         find_role(self.channels, "drive")
+        in_newtons(self.channels, "a periodic vibration")
         positive("frequency_hz", self.frequency_hz, "Hz")
         if self.periods < 1:
             raise IdentificationError(f"periods: is {self.periods}, needs at least 1")

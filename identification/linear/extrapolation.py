@@ -115,7 +115,7 @@ def _model(
     std, rows = np.sqrt(np.diag(covariance)), len(low.channels)
     levels = ", ".join(f"{value:.4g}" for value in force)
     notes = [
-        f"extrapolated to zero force from {levels} N RMS, "
+        f"extrapolated to zero force from {levels} {low.force_unit} RMS, "
         f"taking changes as proportional to the force to the power of {' to '.join(f'{p:g}' for p in powers)}"
     ]
     for k in sorted(set(range(low.frequency_hz.size)) - set(kept)):

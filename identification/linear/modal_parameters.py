@@ -127,6 +127,7 @@ def as_linear_modes(
         lowest_hz=float(data.frequency_hz[0]),
         highest_hz=float(data.frequency_hz[-1]),
         force_rms_n=band.input_rms[0] if band.input_rms else np.nan,
+        force_unit=band.inputs[0].unit,
         fit_residual=fit.residual,
         covariance=covariance,
         residues=None if normal else _residues(fit.poles, fit.terms, False)[:, rise],

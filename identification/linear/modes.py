@@ -76,6 +76,9 @@ class LinearModes(Result):
         Name of what was tested.
     notes
         Remarks on the quality of the result, one line each.
+    force_unit
+        Unit of the force: N, or V or 1 where there is no better one. ``force_rms_n``, shapes and residual terms are then in
+        units with it in place of N.
 
     Raises
     ------
@@ -103,6 +106,7 @@ class LinearModes(Result):
     small_terms: Float | None = None
     specimen: str = ""
     notes: tuple[str, ...] = ()
+    force_unit: str = "N"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
@@ -188,7 +192,7 @@ class LinearModes(Result):
         value = self.accelerance(frequency) / s[:, None] ** order
         return FrequencyResponseMatrix(
             outputs=self.channels,
-            inputs=(Channel("force", "force", "N"),),
+            inputs=(Channel("force", "force", self.force_unit),),
             frequency_hz=frequency,
             value=value[:, :, None],
             estimator="model",
@@ -209,7 +213,8 @@ class LinearModes(Result):
         arrays |= {name: np.array(getattr(self, name)) for name in _SCALARS}
         arrays |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) is not None}
         channels = [vars(channel) for channel in self.channels]
-        return arrays, {"channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
+        told = {"channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
+        return arrays, told if self.force_unit == "N" else {**told, "force_unit": self.force_unit}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "LinearModes":
@@ -219,7 +224,8 @@ class LinearModes(Result):
             values: dict[str, Any] = {name: arrays[name] for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
             values |= {name: float(arrays[name]) for name in _SCALARS if name in arrays or name != "upper_hz"}
             values |= {name: arrays.get(name) for name in _OPTIONAL}
-            return cls(channels=channels, **values, specimen=attributes["specimen"], notes=tuple(attributes["notes"]))
+            values |= {"specimen": attributes["specimen"], "notes": tuple(attributes["notes"])}
+            return cls(channels=channels, **values, force_unit=str(attributes.get("force_unit", "N")))
         except (KeyError, TypeError) as error:
             raise IdentificationError(f"linear modes: {error} is missing or unknown") from None
 

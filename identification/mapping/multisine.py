@@ -8,12 +8,11 @@ from pydantic import Field
 
 from identification.errors import IdentificationError
 from identification.mapping.base import ChannelMapping, MappingTable, Path, as_levels, in_si, numbers, value_at
+from identification.mapping.sampling import common_rate_hz, instants_at
 from identification.multisine.design import MultisineDesign
 from identification.multisine.spectra import PeriodicSpectra, periodic_spectra
 
 __all__ = ["MultisineMapping", "map_multisine"]
-
-_RATE = 1e-6  # relative
 
 
 class SignalMapping(ChannelMapping):
@@ -102,20 +101,7 @@ def _sample_rate(data: Any, mapping: MultisineMapping) -> float:
     """Return the sample rate; the rates from the mapping, the instants and the file must agree."""
     told = {"sample_rate_hz": mapping.sample_rate_hz}
     if mapping.time is not None:
-        entry = _entries(data, mapping)[0]
-        instants = np.asarray(numbers(value_at(entry, mapping.time, "time"), 1, "time"), dtype=np.float64)
-        steps = np.diff(instants)
-        step = (instants[-1] - instants[0]) / max(steps.size, 1)
-        if not steps.size or not step > 0.0 or np.any(np.abs(steps - step) > 1e-3 * step):
-            raise IdentificationError(f"time '{mapping.time}': is not evenly spaced; resample the signals")
-        told["time"] = 1.0 / step
+        told["time"] = instants_at(_entries(data, mapping)[0], mapping.time)[0]
     if isinstance(data, dict) and isinstance(data.get("sample_rate_hz"), float):
         told["file"] = data["sample_rate_hz"]
-    rates = {name: rate for name, rate in told.items() if rate is not None}
-    if not rates:
-        raise IdentificationError("sample_rate_hz: is missing; give it, or time")
-    lowest, highest = min(rates.values()), max(rates.values())
-    if highest / lowest - 1.0 > _RATE:
-        text = ", ".join(f"{name} {rate:g} Hz" for name, rate in rates.items())
-        raise IdentificationError(f"sample_rate_hz: disagrees ({text}); correct or leave out the wrong one")
-    return next(iter(rates.values()))
+    return common_rate_hz(told)

@@ -52,7 +52,7 @@ def identify_pnlss(
     Parameters
     ----------
     experiments
-        Training data; its periodic experiments give the linear start.
+        Training data; its periodic experiments give the linear start, or all if none is periodic.
     states
         Number of states: two per mode of vibration, and more for elements with memory (friction, hysteresis).
     degrees, output_degrees
@@ -72,7 +72,8 @@ def identify_pnlss(
         Data that selects the iterate and is not used for training.
     linear
         Initial linear model, whose states are kept. None: a model fitted to the best linear approximation of the periodic
-        experiments, with uncorrelated states of variance one.
+        experiments, or to a regression (`identification.linear.auto_regression`) if none is periodic, with uncorrelated states
+        of variance one.
     band_hz
         Band of the best linear approximation; None for all excited lines.
     settings

@@ -11,11 +11,12 @@ import scipy
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.linear.auto_regression import regressed_responses
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.state_space_fit import StateSpaceFit, fit_state_space, spectral_radius
 from identification.linear.subspace import StateSpace, subspace, telling_rows
 from identification.pnlss.best_linear import best_linear_responses
-from identification.pnlss.experiment import Experiment, same_channels
+from identification.pnlss.experiment import Experiment, excited_band, same_channels
 from identification.pnlss.model import PnlssModel
 
 __all__ = [
@@ -158,7 +159,10 @@ def linear_pnlss(
         replace(e, inputs=e.inputs[varying], input_channels=tuple(e.input_channels[i] for i in varying))
         for e in experiments
     ]
-    responses = best_linear_responses(moved, band_hz=band_hz)
+    if any(e.period_samples for e in moved):
+        responses = best_linear_responses(moved, band_hz=band_hz)
+    else:
+        responses = _without_periods(moved, band_hz)
     found = linear_start(responses, states, sample_rate_hz=first.sample_rate_hz)
     low, high = responses.frequency_hz[[0, -1]]
     note = (
@@ -186,6 +190,20 @@ def linear_pnlss(
         outputs=model.outputs,
         specimen=model.specimen,
         notes=(*model.notes, more) if hardly else model.notes,
+    )
+
+
+def _without_periods(experiments: Sequence[Experiment], band_hz: tuple[float, float] | None) -> FrequencyResponseMatrix:
+    """Return the frequency responses of experiments none of which is periodic."""
+    first = experiments[0]
+    return regressed_responses(
+        [(e.inputs[:, e.counted_from :], e.counted_outputs) for e in experiments],
+        sample_rate_hz=first.sample_rate_hz,
+        inputs=first.input_channels,
+        outputs=first.output_channels,
+        band_hz=band_hz or excited_band(experiments),
+        weights=[e.weight for e in experiments],
+        specimen=first.specimen,
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.channels import Channel, find_name, find_role
+from identification.channels import Channel, find_name, find_role, in_newtons
 from identification.errors import IdentificationError
 from identification.signals.chunks import unwrapped
 from identification.validation import finite_array, positive
@@ -63,6 +63,7 @@ class Transient(Result):
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))
         find_role(self.channels, "force")
+        in_newtons(self.channels, "a transient")
         for name in ("time_s", "frequency_hz"):
             object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 1))
         object.__setattr__(self, "fundamentals", finite_array("fundamentals", self.fundamentals, np.complex128, 2))

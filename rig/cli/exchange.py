@@ -11,23 +11,27 @@ __all__ = ["export_", "import_"]
 
 
 def import_(
-    file: Annotated[Path, typer.Argument(help="MAT, UFF or CSV file.")],
+    file: Annotated[Path, typer.Argument(help="MAT, UFF, CSV, HDF5, WAV, TDMS, MDF 4 or SEP005 file.")],
     output: Output,
     mapping: Annotated[Path | None, typer.Option(help="TOML file that says what is where in it.")] = None,
-    format_: Annotated[str, typer.Option("--format", help="mat, uff or csv; by the file's ending.")] = "",
+    format_: Annotated[
+        str,
+        typer.Option("--format", help="mat, uff, csv, hdf5, wav, tdms, mdf4 or sep005; by the file's ending."),
+    ] = "",
     units: Annotated[str, typer.Option(help="UFF with unclear units: labels, file (dataset 164) or si.")] = "",
     drive: Annotated[str, typer.Option(help="UFF with modes: where the force acts, such as 1+Z.")] = "",
     item: Annotated[int, typer.Option(help="Which object, where the file holds several.", min=0)] = 0,
     overwrite: Overwrite = False,
     json: Json = False,
 ) -> None:
-    """Bring in measurements and modes from elsewhere."""
+    """Bring in measurements, time data and modes from elsewhere."""
     from rig.exchange.reading import import_file
+    from rig.exchange.time_data import TimeData, records_of_series
     from rig.models.files.files import save
 
     keep_existing([file], output, overwrite)
     found = import_file(file, format_, mapping, units=units, drive=drive, item=item)
-    save(found, output)
+    save(records_of_series(found) if isinstance(found, TimeData) else found, output)
     show_file(output, json)
 
 
@@ -48,11 +52,11 @@ def export_(
 ) -> None:
     """Write what is in a file for other programs."""
     from rig.exchange.export import export_file
-    from rig.exchange.reading import format_of
+    from rig.exchange.sources import EXPORTS, format_of
     from rig.text.console import print_json
     from rig.text.printable import printable_strings
 
-    format_ = format_of(output, to, "--to")
+    format_ = format_of(output, to, "--to", EXPORTS)
     keep_existing([file], output, overwrite)
     numbers = tuple(number - 1 for number in point or ())
     written = export_file(file, output, format_, data=data, points=numbers, item=item, encoding=encoding)

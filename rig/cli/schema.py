@@ -28,9 +28,21 @@ def schema(
 
 def new(
     what: Annotated[
-        str, typer.Argument(help="bench, plan, rig (a bench with a virtual rig), sensors or driver (folder).")
+        str,
+        typer.Argument(
+            help="bench, plan, rig (a bench with a virtual rig), sensors, driver (folder), or mapping of FILES."
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write; of a driver, the folder.")],
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Of a mapping: file of time data that is looked into, and others with channels of the same test."
+        ),
+    ] = None,
+    format_: Annotated[
+        str, typer.Option("--format", help="Of a mapping: format of the file, as `rig import` takes it.")
+    ] = "",
     plan_kind: Annotated[str, typer.Option("--kind", help="Kind of a plan.")] = "backbone",
     bench: Annotated[
         str | None,
@@ -56,12 +68,17 @@ def new(
     from rig.errors import ConfigurationError
     from rig.text.printable import shown
 
+    if what == "mapping":
+        _mapping(files or [], output, format_, overwrite)
+        return
+    if files or format_:
+        raise ConfigurationError(f"{'FILES' if files else '`format`'}: is for a mapping, `rig new mapping FILE`")
     if what == "driver":
         new_driver(output, overwrite)
         print(f"{output}: take it apart and put your device in its place (docs/tutorials/a-driver.md)")
         return
     if what not in ("bench", "plan", "rig", "sensors"):
-        raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig, sensors or driver")
+        raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig, sensors, driver or mapping")
     if source is None and (shaker or trust_code):
         raise ConfigurationError(
             f"`{'shaker' if shaker else 'trust_code'}`: is for a rig that begins with a model, `source`"
@@ -75,6 +92,22 @@ def new(
         return
     one = "file of sensors" if what == "sensors" else what
     print(f"{output}: a {one} to begin with, checked by {beside}")
+
+
+def _mapping(files: list[Path], output: Path, format_: str, overwrite: bool) -> None:
+    """Write a proposed mapping; print what is left to be filled in."""
+    from rig.authoring.new_files import written
+    from rig.errors import ConfigurationError
+    from rig.exchange.proposal.proposal import proposed_mapping
+
+    if not files:
+        raise ConfigurationError("FILE: is missing; `rig new mapping FILE` looks into a file of time data")
+    text, missing = proposed_mapping(files, format_)
+    written({output: text}, overwrite)
+    left = f"; fill in {' and '.join(missing)}" if missing else ""
+    print(
+        f"{output}: a mapping proposed for {', '.join(path.name for path in files)}, roles and units to be checked{left}"
+    )
 
 
 def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_code: bool) -> dict[str, Any]:

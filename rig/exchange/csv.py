@@ -6,20 +6,26 @@ read back exactly.
 
 import csv
 import json
+import re
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 from rig.system.text_files import read_text
 from rig.text.contents import Contents
 
-__all__ = ["read_csv", "table_of_ours", "write_csv"]
+if TYPE_CHECKING:
+    from identification.mapping.csv_layout import CsvLayout
+
+__all__ = ["read_csv", "table_of_ours", "units_of_csv", "write_csv"]
 
 LARGEST_BYTES = 1_000_000_000
+_DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 _KIND, _OTHERS = "# vibrolock: ", "# others: "
 
 
@@ -96,31 +102,29 @@ def _lines(path: Path) -> list[str]:
     return read_text(path, LARGEST_BYTES, ImportFailed).splitlines()
 
 
-def read_csv(path: Path) -> dict[str, Any]:
+def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Any]:
     """Read the columns of any CSV file, by name.
 
-    Separators are comma, semicolon or tab. The first line contains the names. Lines that begin with ``#`` are skipped, and so
-    are lines of units right after the names (texts, or a 1). Raises `ImportFailed`, with the line, for anything that is not a
-    number, for rows of unequal length, and for decimal commas.
+    Without a ``layout``, separators are comma, semicolon or tab, and the first line contains the names. Lines that begin with
+    ``#`` are skipped, and so are lines of units right after the names (texts, or a 1). Raises `ImportFailed`, with the line,
+    for anything that is not a number, for rows of unequal length, and for decimal commas unless the layout has them.
     """
-    lines = [(number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#")]
-    if len(lines) < 2:
+    lines = _table_lines(path)[0 if layout is None else layout.skip_lines :]
+    told = None if layout is None else layout.names
+    if len(lines) < (2 if told is None else 1):
         raise ImportFailed(f"{path}: holds no table; wanted is a line of names, then rows of numbers")
-    comma = max(",;\t", key=lines[0][1].count)
-    names = [name.strip() for name in next(csv.reader([lines[0][1]], delimiter=comma))]
-    if len(set(names)) < len(names) or any(_number(name) is not None for name in names):
+    comma = _separator(lines, layout)
+    names = [name.strip() for name in (_cells(lines[0][1], comma) if told is None else told)]
+    if told is None and (len(set(names)) < len(names) or any(_number(name) is not None for name in names)):
         raise ImportFailed(
             f"{path}: the first line must name every column, each differently; it is '{lines[0][1][:60]}'"
         )
+    point = "." if layout is None else layout.decimal
     rows: list[list[float | None]] = []
-    for number, line in lines[1:]:
-        cells = next(csv.reader([line], delimiter=comma))
-        values = [_number(cell) for cell in cells]
-        if (
-            not rows
-            and None in values
-            and all(value is None or cell.strip() == "1" for cell, value in zip(cells, values, strict=True))
-        ):
+    for number, line in lines[1 if told is None else 0 :]:
+        cells = _cells(line, comma)
+        values = [_number(cell if point == "." else cell.replace(",", ".")) for cell in cells]
+        if not rows and _is_units(cells, values):
             continue
         if len(cells) != len(names) or None in values:
             wrong = next((cell for cell, value in zip(cells, values, strict=True) if value is None), None)
@@ -131,6 +135,43 @@ def read_csv(path: Path) -> dict[str, Any]:
     if not rows:
         raise ImportFailed(f"{path}: holds names, but no row of numbers")
     return dict(zip(names, np.array(rows, dtype=np.float64).T, strict=True))
+
+
+def units_of_csv(path: Path) -> dict[str, str]:
+    """Return the units of the columns of any CSV file, by name, if a line of units follows the names."""
+    lines = _table_lines(path, 2)
+    if len(lines) < 2:
+        return {}
+    comma = _separator(lines, None)
+    names, cells = (_cells(line, comma) for _, line in lines[:2])
+    if len(names) != len(cells) or not _is_units(cells, [_number(cell) for cell in cells]):
+        return {}
+    return {name.strip(): cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
+
+
+def _table_lines(path: Path, most: int | None = None) -> list[tuple[int, str]]:
+    """Return the lines that are neither empty nor comments, with their numbers; ``most`` of them."""
+    found = ((number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#"))
+    return list(islice(found, most))
+
+
+def _separator(lines: Sequence[tuple[int, str]], layout: "CsvLayout | None") -> str:
+    if layout is not None and layout.separator is not None:
+        return layout.separator
+    known = ";\t" if layout is not None and layout.decimal == "," else ",;\t"
+    return max(known, key=lines[0][1].count)
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    return line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
+
+
+def _is_units(cells: Sequence[str], values: Sequence[float | None]) -> bool:
+    """Return whether a row holds units: texts that do not begin like a number, or a 1."""
+    return None in values and all(
+        cell.strip() == "1" if value is not None else not _DIGIT_FIRST.match(cell)
+        for cell, value in zip(cells, values, strict=True)
+    )
 
 
 def _number(cell: str) -> float | None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identification import IdentificationError, ModalAnalysis
+from identification import IdentificationError, ModalAnalysis, TimeRecords
 from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
@@ -16,7 +16,7 @@ from rig.errors import ConfigurationError, RecordingError, RigError
 from rig.exchange.csv import write_csv
 from rig.exchange.kinds import taken_apart
 from rig.exchange.mat import write_mat
-from rig.exchange.time_data import TimeData
+from rig.exchange.time_data import TimeData, series_of_records
 from rig.exchange.uff.writing import write_uff
 from rig.measurements import bench_of_recording, point_rows
 from rig.models.files.files import load
@@ -64,6 +64,8 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
     found = load(path)
     if isinstance(found, MeasuredSurface):
         return [found.responses]
+    if isinstance(found, TimeRecords):
+        return list(series_of_records(found))
     if isinstance(found, SimulatedModel):
         return [found.model]
     if isinstance(found, ModalAnalysis):

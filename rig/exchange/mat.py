@@ -7,25 +7,17 @@ A structure contains the arrays by name, ``units`` with the same names, ``channe
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from rig.errors import RigError
-from rig.exchange.mat_process import read_values
-from rig.system.child import ChildFailed, ask_child
+from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.text.contents import Contents
 
-__all__ = ["ImportFailed", "read_mat", "structures_of_ours", "write_mat"]
+__all__ = ["read_mat", "structures_of_ours", "write_mat"]
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
 _LONGEST = 31  # largest number of characters of a field name that every reader of version 5 accepts
-_PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
-
-
-class ImportFailed(RigError):  # noqa: N818 (says what happened)
-    """A file of measurements cannot be read, or does not contain what its mapping says. The message names both."""
 
 
 def write_mat(items: Sequence[Contents], path: Path) -> None:
@@ -81,23 +73,8 @@ def _table(channels: Sequence[Mapping[str, str]]) -> Any:
 
 
 def read_mat(path: Path) -> dict[str, Any]:
-    """Read a MAT file (up to version 7) as nested dictionaries, lists and arrays; raise `ImportFailed` if this fails.
-
-    SciPy's parser crashes on some damaged files. Therefore a child process reads the file, with at most 4 GiB of memory, for at
-    most 60 s and 1 s per 5 MB.
-    """
-    if not path.is_file():
-        raise ImportFailed(f"{path}: there is no such file")
-    with TemporaryDirectory(prefix="vibrolock-") as folder:
-        timeout_s = _PATIENCE_S + path.stat().st_size / _SLOWEST_BYTES_S
-        try:
-            why = ask_child("rig.exchange.mat_process", str(path.absolute()), folder, timeout_s=timeout_s)
-        except ChildFailed as error:
-            raise ImportFailed(f"{path}: is no MAT file, or a damaged one (reading it {error})") from None
-        if why:
-            raise ImportFailed(f"{path}: {why.decode()}")
-        data: dict[str, Any] = read_values(Path(folder))
-    return data
+    """Read a MAT file (version 4 to 7.3) as nested dictionaries, lists and arrays; raise `ImportFailed` if this fails."""
+    return read_in_child("rig.exchange.mat_process", path, "MAT file")
 
 
 def structures_of_ours(data: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:

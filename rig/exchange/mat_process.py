@@ -1,82 +1,12 @@
-"""Child process that reads a MAT file. It writes the values into a folder, as a JSON document and a file of raw bytes."""
+"""Child process that reads a MAT file (`rig.exchange.child_reading`)."""
 
-import json
 import sys
 from pathlib import Path
-from typing import Any, BinaryIO
 
-import numpy as np
+from rig.exchange.child_values import reason, write_values
+from rig.system.child import confine
 
-from rig.system.child import MEMORY_BYTES, confine
-
-__all__ = ["main", "read_values", "write_values"]
-
-_TREE, _NUMBERS = "tree.json", "numbers.bin"
-_PLAIN = "biufcUS"
-
-
-def write_values(value: Any, folder: Path) -> None:
-    """Write ``value`` into ``folder``; values other than numbers, texts and containers become the name of their type."""
-    with (folder / _NUMBERS).open("wb") as numbers:
-        tree = _taken_apart(value, numbers)
-    (folder / _TREE).write_text(json.dumps(tree), encoding="ascii")
-
-
-def read_values(folder: Path) -> Any:
-    """Read back the value that `write_values` wrote."""
-    with (folder / _NUMBERS).open("rb") as numbers:
-        return _put_together(json.loads((folder / _TREE).read_text(encoding="ascii")), numbers)
-
-
-def _taken_apart(value: Any, numbers: BinaryIO) -> Any:
-    if value is None or isinstance(value, str | bool):
-        return value
-    if isinstance(value, bytes):
-        return {"bytes": value.decode("latin-1")}
-    if isinstance(value, dict):
-        return {"table": [[str(key), _taken_apart(item, numbers)] for key, item in value.items()]}
-    if isinstance(value, list | tuple):
-        return {"list": [_taken_apart(item, numbers) for item in value]}
-    if type(value) is np.ndarray and value.dtype.kind == "O":
-        return {"cells": list(value.shape), "items": [_taken_apart(item, numbers) for item in value.reshape(-1)]}
-    if type(value) is np.ndarray or isinstance(value, np.generic | int | float | complex):
-        array = np.asarray(value)
-        if array.dtype.kind in _PLAIN:
-            place = numbers.tell()
-            numbers.write(array.tobytes())
-            return {
-                "array": [array.dtype.str, list(array.shape), place],
-                "as": "array"
-                if isinstance(value, np.ndarray)
-                else "scalar"
-                if isinstance(value, np.generic)
-                else "number",
-            }
-    return f"<{type(value).__name__}>"
-
-
-def _put_together(tree: Any, numbers: BinaryIO) -> Any:
-    if not isinstance(tree, dict):
-        return tree
-    if "bytes" in tree:
-        return tree["bytes"].encode("latin-1")
-    if "table" in tree:
-        return {key: _put_together(item, numbers) for key, item in tree["table"]}
-    if "list" in tree:
-        return [_put_together(item, numbers) for item in tree["list"]]
-    if "cells" in tree:
-        cells = np.empty(len(tree["items"]), dtype=object)
-        for index, item in enumerate(tree["items"]):
-            cells[index] = _put_together(item, numbers)
-        return cells.reshape(tree["cells"])
-    dtype, shape, place = tree["array"]
-    array = np.empty(shape, dtype)
-    if array.nbytes:
-        numbers.seek(place)
-        numbers.readinto(array.reshape(-1).view(np.uint8).data)  # type: ignore[attr-defined]
-    if tree["as"] == "array":
-        return array
-    return array[()] if tree["as"] == "scalar" else array.item()
+__all__ = ["main"]
 
 
 def main(path: Path, folder: Path) -> str:
@@ -84,15 +14,15 @@ def main(path: Path, folder: Path) -> str:
     from scipy.io import loadmat
 
     try:
-        write_values(loadmat(str(path), simplify_cells=True, appendmat=False), folder)
-    except NotImplementedError:
-        return "is a MAT file of version 7.3; save it in MATLAB with save(..., '-v7')"
-    except OSError as error:
-        return f"cannot be read ({error.strerror or error})"
-    except MemoryError:
-        return f"takes more than {MEMORY_BYTES / 2**30:g} GiB of memory, or is damaged"
+        try:
+            found = loadmat(str(path), simplify_cells=True, appendmat=False)
+        except NotImplementedError:  # version 7.3
+            from rig.exchange.foreign.matlab_hdf5 import read_matlab_hdf5
+
+            found = read_matlab_hdf5(path)
+        write_values(found, folder)
     except Exception as error:  # the parser raises many unrelated exceptions on damaged bytes
-        return f"is no MAT file, or a damaged one ({' '.join(str(error).split())})"
+        return reason(error, "MAT file")
     return ""
 
 

@@ -6,38 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 from rig.bench.configuration import read_toml, validated
 from rig.errors import ConfigurationError
-from rig.exchange.mat import ImportFailed, read_mat, structures_of_ours
+from rig.exchange.child_reading import ImportFailed
+from rig.exchange.mat import read_mat, structures_of_ours
+from rig.exchange.sources import format_of, read_data
 from rig.text.printable import shown
 
 if TYPE_CHECKING:
     from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra
 
 __all__ = [
-    "FORMATS",
     "ImportFailed",
-    "format_of",
     "import_file",
     "import_sep005",
     "read_frequency_responses",
     "read_mapping",
 ]
 
-FORMATS = {"mat": (".mat",), "uff": (".uff", ".unv", ".uf", ".bunv"), "csv": (".csv", ".txt")}
-"""Formats with the suffixes that identify them."""
-
 _DEFAULT_KIND = "frequency-responses"
-
-
-def format_of(path: Path, given: str, option: str) -> str:
-    """Return the given format, or else the one for the suffix of ``path``; raise `ConfigurationError` if it is unknown."""
-    if given:
-        if given not in FORMATS:
-            raise ConfigurationError(f"{option} = {given!r}: allowed is {', '.join(FORMATS)}")
-        return given
-    for name, endings in FORMATS.items():
-        if path.suffix.lower() in endings:
-            return name
-    raise ConfigurationError(f"{path}: the ending says no format; give {option}, one of {', '.join(FORMATS)}")
+_PROPOSAL = "say by `mapping` what is where in it; `rig new mapping` proposes one for time data"
 
 
 def import_file(
@@ -48,9 +34,9 @@ def import_file(
     Parameters
     ----------
     path
-        The file.
+        The file. Further files that a mapping of time data names are beside it.
     format_
-        ``mat``, ``uff`` or ``csv``; by the suffix of ``path`` if empty.
+        ``mat``, ``uff``, ``csv``, ``hdf5``, ``wav``, ``tdms``, ``mdf4`` or ``sep005``; by the suffix of ``path`` if empty.
     mapping
         TOML file that describes the contents. Required unless this package wrote the file, or it is a universal file with
         frequency responses or modes.
@@ -70,9 +56,18 @@ def import_file(
     """
     from identification.errors import IdentificationError
 
-    reader = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}[format_of(path, format_, "`format`")]
+    form = format_of(path, format_, "`format`")
+    readers = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}
+    if units not in ("", "labels", "file", "si"):
+        raise ConfigurationError(f"`units` = {units!r}: allowed is labels, file or si")
     try:
-        return reader(path, mapping, {"units": units, "drive": drive, "item": item})
+        if mapping is not None:
+            return _read_with(mapping, path, form, units)
+        if form == "hdf5":
+            read_data(path, form)  # refuses files of ours and damaged ones
+        if form not in readers:
+            raise ImportFailed(f"{path}: {_PROPOSAL}")
+        return readers[form](path, {"units": units, "drive": drive, "item": item})
     except ImportFailed as error:
         if str(path) in str(error):
             raise
@@ -104,7 +99,7 @@ def import_sep005(series: Sequence[Mapping[str, Any]], mapping: str | Path) -> A
     from rig.exchange.sep005 import data_of_series
 
     try:
-        return _mapped(data_of_series(series), Path(mapping))
+        return _mapped(data_of_series(series), read_mapping(mapping))
     except IdentificationError as error:
         raise ImportFailed(f"the series do not fit {mapping}: {error}") from None
 
@@ -117,6 +112,7 @@ def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
         _DEFAULT_KIND: (i.FrequencyResponseMapping, i.map_frequency_responses),
         "frequency-response-matrix": (i.ResponseMatrixMapping, i.map_response_matrix),
         "multisine": (i.MultisineMapping, i.map_multisine),
+        "time-data": (i.TimeDataMapping, i.map_time_data),
         "backbone": (i.BackboneMapping, i.map_backbone),
         "pnlss": (i.PnlssMapping, i.map_pnlss),
         "nonlinear-mode": (i.NonlinearModeMapping, i.map_nonlinear_mode),
@@ -132,24 +128,52 @@ def read_mapping(path: str | Path) -> Any:
     return validated(known[kind][0], table, str(path))
 
 
-def _mapped(data: Mapping[str, Any], mapping_path: Path) -> Any:
+def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> Any:
+    """Read a file, and the further files that the mapping names, and apply the mapping."""
+    mapping = read_mapping(
+        mapping_path
+    )  # errors in the mapping are reported before the file is read, which may be large
+    layout = getattr(mapping, "csv", None)
+    data = read_data(path, form, units=units, layout=layout)
+    files: dict[str, Any] = {}
+    for name in dict.fromkeys(getattr(channel, "file", "") for channel in getattr(mapping, "channels", ())):
+        if name:
+            beside = path.parent / name
+            form = format_of(beside, "", "another ending of `file`")
+            files[name] = read_data(beside, form, units=units, layout=layout if form == "csv" else None)
+    return _mapped(data, mapping, files)
+
+
+def _mapped(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any] | None = None) -> Any:
     """Apply a mapping to data; spectra are converted to frequency responses."""
-    mapping = read_mapping(mapping_path)
-    _check_units(data, mapping)
+    from identification import map_time_data
+
+    _check_units(data, mapping, files or {})
+    if mapping.kind == "time-data":
+        return map_time_data(data, mapping, files)
     found = _mappings()[mapping.kind][1](data, mapping)
     return _response_matrix(found, mapping.instrument, mapping.specimen) if mapping.kind == "multisine" else found
 
 
-def _check_units(data: Mapping[str, Any], mapping: Any) -> None:
-    """Refuse units in a mapping that contradict those of a universal file, whose data is already converted to SI."""
+def _check_units(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any]) -> None:
+    """Refuse units in a mapping that contradict those that the file itself tells of its values."""
+    from identification.errors import IdentificationError
     from identification.mapping.units import si_of
 
     for channel in getattr(mapping, "channels", ()):
-        told = data["units"].get(channel.value) if isinstance(data.get("units"), dict) else None
-        if isinstance(told, str) and told and si_of(channel.unit, channel.name) != si_of(told, channel.name):
-            raise ImportFailed(
-                f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {told}; write that"
-            )
+        of_file = files.get(getattr(channel, "file", ""), data)
+        for key in ("units", "__file_units__"):
+            told = of_file[key].get(channel.value) if isinstance(of_file.get(key), dict) else None
+            if not isinstance(told, str) or not told or getattr(channel, "scale", 1.0) != 1.0:
+                continue  # with a scale, the numbers are another quantity: volts of a sensor, for example
+            try:
+                known = si_of(told, channel.name)
+            except IdentificationError:
+                continue
+            if si_of(channel.unit, channel.name) != known:
+                raise ImportFailed(
+                    f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {told}; write that"
+                )
 
 
 def _response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str) -> "FrequencyResponseMatrix":
@@ -167,44 +191,32 @@ def _chosen(found: list[Any], path: Path, item: int) -> Any:
     return found[max(item - 1, 0)]
 
 
-def _from_mat(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
+def _from_mat(path: Path, options: Mapping[str, Any]) -> Any:
     from rig.exchange.kinds import put_together
 
-    if mapping is not None:
-        read_mapping(mapping)  # errors in the mapping are reported before the file is read, which may be large
-        return _mapped(read_mat(path), mapping)
     ours = structures_of_ours(read_mat(path))
     if not ours:
-        raise ImportFailed(f"{path}: was not written by this package; say by `mapping` what is where in it")
+        raise ImportFailed(f"{path}: was not written by this package; {_PROPOSAL}")
     return put_together(*_chosen(ours, path, options["item"]))
 
 
-def _from_csv(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
-    from rig.exchange.csv import read_csv, table_of_ours
+def _from_csv(path: Path, options: Mapping[str, Any]) -> Any:
+    from rig.exchange.csv import table_of_ours
     from rig.exchange.kinds import put_together
 
-    if mapping is not None:
-        read_mapping(mapping)
-        return _mapped(read_csv(path), mapping)
     ours = table_of_ours(path)
     if ours is None:
-        raise ImportFailed(f"{path}: was not written by this package; say by `mapping` what is in its columns")
+        raise ImportFailed(f"{path}: was not written by this package; {_PROPOSAL}")
     return put_together(*ours)
 
 
-def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> Any:
+def _from_uff(path: Path, options: Mapping[str, Any]) -> Any:
     from rig.exchange.uff.modes import modes_in
-    from rig.exchange.uff.reading import read_uff, time_data_in
+    from rig.exchange.uff.reading import read_uff
     from rig.exchange.uff.responses import responses_in
 
     units = options["units"]
-    if units not in ("", "labels", "file", "si"):
-        raise ConfigurationError(f"`units` = {units!r}: allowed is labels, file or si")
-    if mapping is not None:
-        read_mapping(mapping)
     datasets = read_uff(path)
-    if mapping is not None:
-        return _mapped(time_data_in(datasets, units), mapping)
     kinds = {(dataset["type"], dataset.get("func_type", 0)) for dataset in datasets}
     modes = (55, 0) in kinds
     if modes and (58, 4) in kinds and not options["item"]:
@@ -217,5 +229,5 @@ def _from_uff(path: Path, mapping: Path | None, options: Mapping[str, Any]) -> A
     if modes:
         raise ImportFailed(f"{path}: holds modes alone; choose by `item` 1")
     if (58, 1) in kinds:
-        raise ImportFailed(f"{path}: holds time data; say by `mapping` with kind = 'multisine' what was played")
+        raise ImportFailed(f"{path}: holds time data; {_PROPOSAL}")
     raise ImportFailed(f"{path}: holds neither frequency responses (58, type 4), modes (55) nor time data (58, type 1)")

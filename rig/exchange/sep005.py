@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import IdentificationError
 from identification.mapping.units import si_of
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 
 __all__ = ["data_of_series"]
 

@@ -7,11 +7,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Channel, IdentificationError, Transient
+from identification import Channel, IdentificationError, TimeRecord, TimeRecords, Transient
 from rig.campaigns.evaluation.point import point_name
 from rig.text.contents import Contents
 
-__all__ = ["TimeData", "time_data_from", "time_data_parts", "transient_from", "transient_parts"]
+__all__ = [
+    "TimeData",
+    "records_of_series",
+    "series_of_records",
+    "time_data_from",
+    "time_data_parts",
+    "transient_from",
+    "transient_parts",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +66,22 @@ class TimeData:
                 raise IdentificationError(f"samples: channel '{channel.name}' is {row[where]} at [{where}]")
         if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0.0):
             raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be finite and above zero")
+
+
+def series_of_records(records: TimeRecords) -> tuple[TimeData, ...]:
+    """Return the records of others as time data, one for each, numbered from 0."""
+    return tuple(
+        TimeData(records.channels, one.samples, records.sample_rate_hz, point=number, specimen=records.specimen)
+        for number, one in enumerate(records.records)
+    )
+
+
+def records_of_series(data: TimeData) -> TimeRecords:
+    """Return time data of this program as one record; raise `IdentificationError` for lost samples, which are NaN."""
+    record = TimeRecord(samples=np.asarray(data.samples, np.float64), name=point_name(data.point))
+    return TimeRecords(
+        channels=data.channels, sample_rate_hz=data.sample_rate_hz, records=(record,), specimen=data.specimen
+    )
 
 
 def _named(channels: Sequence[Channel]) -> tuple[Any, tuple[tuple[str, ...]], list[dict[str, str]]]:

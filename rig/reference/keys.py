@@ -47,6 +47,8 @@ def tables() -> dict[str, type[BaseModel]]:
     """Return the model of every table by the name under which the reference has it."""
     from controller import LockRule, OpenLoop, PhaseLockedLoop
     from controller.harmonics.settings import HarmonicsSettings
+    from identification.mapping.csv_layout import CsvLayout
+    from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
     from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
     from rig.campaigns.dwell.plan import DriftLimits
     from rig.campaigns.kinds import KINDS
@@ -81,6 +83,10 @@ def tables() -> dict[str, type[BaseModel]]:
         "can": CanOptions,
         "faults": PassingFaults,
         **_parts_of_a_virtual_rig(),
+        "time-data": TimeDataMapping,
+        "sampled-channel": SampledChannel,
+        "stretch": Stretch,
+        "csv": CsvLayout,
     }
 
 
@@ -121,10 +127,10 @@ def _parts_of_a_virtual_rig() -> dict[str, type[BaseModel]]:
 
 
 def roots() -> tuple[type[BaseModel], ...]:
-    """Return the models of what stands in files: plans, benches, options of drivers, virtual rigs, hypotheses."""
+    """Return the models of what stands in files: plans, benches, options of drivers, virtual rigs, hypotheses, mappings."""
     from rig.campaigns.kinds import KINDS
 
-    others = ("bench", "virtual", "serial", "can", "virtual-rig", "hypotheses")
+    others = ("bench", "virtual", "serial", "can", "virtual-rig", "hypotheses", "time-data")
     return (*(campaign.plan for campaign in KINDS.values()), *(tables()[name] for name in others))
 
 

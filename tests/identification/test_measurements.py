@@ -60,6 +60,16 @@ def test_channels_of_wrong_role_or_unit_are_refused() -> None:
         Channel("a", "drive", "g")
 
 
+@pytest.mark.parametrize("unit", ["V", "1"])
+def test_a_force_without_a_better_unit_may_be_in_volts_but_not_in_a_backbone(unit: str) -> None:
+    force, drive = Channel("f", "force", unit), Channel("x", "drive", unit)
+    assert drive.motion == "displacement"
+    with pytest.raises(
+        IdentificationError, match=f"channel 'f': unit is '{unit}'; a periodic vibration needs a force in N"
+    ):
+        PeriodicVibration((force, drive), 20.0, np.ones((2, 2), dtype=complex), 10, np.zeros(2))
+
+
 def test_a_measurement_cannot_be_changed_afterwards() -> None:
     harmonics = np.ones((2, 2), dtype=complex)
     point = PeriodicVibration(CHANNELS, 20.0, harmonics, 10, np.zeros(2))

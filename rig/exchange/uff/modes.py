@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import Channel, LinearModes
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.codes import channels_in
 from rig.exchange.uff.reading import Dataset
 from rig.exchange.uff.units import file_units

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.units import file_units
 from rig.system.text_files import read_bytes
 
@@ -116,9 +116,16 @@ def _columns(records: Sequence[Any]) -> Any:
 
 
 def _rate(function: Dataset) -> float:
-    """Return the sample rate of line 5 if it agrees with the header to the header's six digits, else that of the header."""
-    if function["abscissa_spacing"] != 1 or function["abscissa_inc"] <= 0.0:
+    """Return the sample rate of line 5 if it agrees with the header to the header's six digits, else that of the header.
+
+    Of the rates with these six digits of the step, the one with the fewest digits is taken: 2048 Hz, not 2048.001 Hz.
+    """
+    step = float(function["abscissa_inc"])
+    if function["abscissa_spacing"] != 1 or step <= 0.0:
         raise ImportFailed(f"{function['where']}: is not evenly sampled; wanted is a step above zero")
-    rate = 1.0 / float(function["abscissa_inc"])
+    rate = 1.0 / step
     told = re.match(r"sample rate (\S+) Hz", function["id5"])
-    return float(told[1]) if told and abs(float(told[1]) / rate - 1.0) < 1e-5 else rate
+    if told and abs(float(told[1]) / rate - 1.0) < 1e-5:
+        return float(told[1])
+    rounded = (float(f"{rate:.{digits}g}") for digits in range(1, 7))
+    return next((one for one in rounded if f"{1.0 / one:.5e}" == f"{step:.5e}"), rate)

@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from identification import Channel, FrequencyResponse, FrequencyResponseMatrix
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.reading import Dataset, degree_of
 from rig.exchange.uff.units import FileUnits, file_units
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification.mapping.units import si_of
-from rig.exchange.mat import ImportFailed
+from rig.exchange.child_reading import ImportFailed
 
 __all__ = ["FileUnits", "file_units"]
 

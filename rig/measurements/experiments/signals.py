@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from identification import Channel, IdentificationError
+from identification import Channel
+from identification.channels import chosen_rows
 from rig.bench import Bench
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 
@@ -38,15 +39,7 @@ class Signals:
         Raises `IdentificationError` for an unknown name, for an empty choice, and for a channel that is both input and output.
         """
         channels = (*channels_of(bench), VOLTAGE)
-        into = _rows(channels, "inputs", inputs)
-        if outputs is None:
-            motions = [row for row, channel in enumerate(channels) if channel.role in ("drive", "response")]
-            forces = [row for row, channel in enumerate(channels) if channel.role == "force" and row not in into]
-            out = tuple(row for row in (*forces, *motions) if row not in into)
-        else:
-            out = _rows(channels, "outputs", outputs)
-        if both := [channels[row].name for row in out if row in into]:
-            raise IdentificationError(f"outputs: {both[0]} is an input already")
+        into, out = chosen_rows(channels, inputs, outputs)
         return cls(bench, into, out)
 
     @property
@@ -104,21 +97,6 @@ class Signals:
             return signals, 0
         moved = np.array([_advanced(row, samples) for row, samples in zip(signals, skew, strict=True)])
         return moved, SKEW_EDGE + int(np.ceil(np.abs(skew).max()))
-
-
-def _rows(channels: tuple[Channel, ...], what: str, wanted: Sequence[str]) -> tuple[int, ...]:
-    """Return the rows of channels by name, or by role if no channel has that name."""
-    found: list[int] = []
-    for name in (wanted,) if isinstance(wanted, str) else wanted:
-        rows = [row for row, channel in enumerate(channels) if channel.name == name]
-        rows = rows or [row for row, channel in enumerate(channels) if channel.role == name]
-        if not rows:
-            names = ", ".join(channel.name for channel in channels)
-            raise IdentificationError(f"{what}: there is no channel {name}; channels are {names}")
-        found += [row for row in rows if row not in found]
-    if not found:
-        raise IdentificationError(f"{what}: none given, needs one channel at least")
-    return tuple(found)
 
 
 def _advanced(signal: np.ndarray, samples: float) -> np.ndarray:

@@ -18,6 +18,7 @@ _DECLARED = {
     "frequency-responses": ("frequency_responses:FREQUENCY_RESPONSES", ("tuple",)),
     "frequency-response-matrix": ("response_matrix:RESPONSE_MATRIX", ("FrequencyResponseMatrix",)),
     "measured-backbone": ("measured_backbone:MEASURED_BACKBONE", ("Backbone",)),
+    "time-data": ("time_data:TIME_DATA", ("TimeRecords",)),
     "predictions": ("predictions:PREDICTIONS", ("Predictions",)),
     "rehearsal": ("rehearsal:REHEARSAL", ("Rehearsal",)),
 }

@@ -21,6 +21,7 @@ def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
         "estimator": None if analysis.responses is None else analysis.responses.estimator,
         "band_hz": [modes.lowest_hz, modes.highest_hz],
         "force_rms_n": modes.force_rms_n,
+        "force_unit": modes.force_unit,
         "fit_residual": modes.fit_residual,
         "modes": modes.table(),
         "shapes": modes.shapes.T.tolist(),
@@ -32,7 +33,7 @@ def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
 def _say(summary: dict[str, Any]) -> None:
     low, high = summary["band_hz"]
     source = f"{summary['estimator']}, " if summary["estimator"] else ""
-    level = f", {summary['force_rms_n']:.3g} N RMS" if summary["force_rms_n"] > 0.0 else ""
+    level = f", {summary['force_rms_n']:.3g} {summary['force_unit']} RMS" if summary["force_rms_n"] > 0.0 else ""
     residual = summary["fit_residual"]
     left = "" if residual != residual else f"; residual {number(residual, '.2f')} times that expected from noise"
     print(f"{source}{low:g} to {high:g} Hz{level}{left}")

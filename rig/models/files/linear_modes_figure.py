@@ -31,7 +31,7 @@ def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
     _stabilisation(top, modes, stabilisation, responses)
     _shapes(middle, modes)
     _mac(bottom, modes)
-    level = "" if not np.isfinite(modes.force_rms_n) else f", {modes.force_rms_n:.3g} N RMS"
+    level = "" if not np.isfinite(modes.force_rms_n) else f", {modes.force_rms_n:.3g} {modes.force_unit} RMS"
     level = ", extrapolated to zero force" if modes.force_rms_n == 0.0 else level
     title(page, f"{modes.specimen or 'specimen'}: linear modal analysis, {modes.frequency_hz.size} modes{level}")
 

@@ -13,14 +13,11 @@ from identification import Experiment, PnlssFit, RunScatter, StructuredFit, fit_
 from identification.pnlss.simulators import Simulator
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import bench_of_recording
-from rig.measurements.experiments import default_rate_hz, experiments
-from rig.measurements.experiments.build import KINDS
-from rig.measurements.points_left_out import points_left_out
+from rig.models.files.time_data import TIME_DATA
+from rig.models.identify.data_files import KINDS, experiments_in, rates_hz_in, specimen_in
 from rig.models.identify.data_fingerprints import features_of
 from rig.models.identify.data_request import DataOptions
 from rig.recording.arrays import kind_of
-from rig.recording.reader import Recording
 
 __all__ = ["FitData", "fit_data", "fitted"]
 
@@ -105,9 +102,8 @@ def fit_data(
     notes: list[str] = []
     most = 0
     for path in paths:
-        with Recording(path) as recording:
-            found = experiments(recording, rate_hz=rate_hz, **channels)
-            notes += points_left_out(recording)
+        found, missing = experiments_in(path, rate_hz, channels)
+        notes += missing
         most = max(most, *(len(same) for same in _alike(found)), 0)
         kept, out = _held_out(found, held)
         training, of_training = training + kept, of_training + [str(path)] * len(kept)
@@ -117,8 +113,7 @@ def fit_data(
             f"`hold_out` = {options.hold_out}: no level has more than {most} realisations; allowed is 0 to {max(most - 1, 1)}"
         )
     for path in options.validation:
-        with Recording(path) as recording:
-            found = experiments(recording, rate_hz=rate_hz, **channels)
+        found, _ = experiments_in(path, rate_hz, channels)
         validation, of_validation = validation + list(found), of_validation + [str(path)] * len(found)
     _check_alive([*training, *validation])
     if options.relative:
@@ -166,27 +161,18 @@ def _check_files(
             )
     if twice := next((one for one, other in combinations(validation, 2) if one.samefile(other)), None):
         raise ConfigurationError(f"`validation` = {twice}: is given twice; each file once")
-    if needs_lines and "multisine" not in [kinds[path] for path in paths]:
+    if needs_lines and not {"multisine", TIME_DATA.name} & {kinds[path] for path in paths}:
         raise ConfigurationError(
             f"{', '.join(f'{path} ({kinds[path]})' for path in paths)}: no multisine among them, which a fit begins with; "
-            "add one"
+            "add one (or imported time data)"
         )
-    one_specimen(**{str(path): _specimen(path) for path in kinds})
-
-
-def _specimen(path: Path) -> str:
-    with Recording(path) as recording:
-        return bench_of_recording(recording).specimen.name
+    one_specimen(**{str(path): specimen_in(path) for path in kinds})
 
 
 def _common_rate_hz(paths: Sequence[Path]) -> float:
     """Return the highest rate that any recording needs, limited to the lowest rate at which any was recorded."""
-    rates, most = [], float("inf")
-    for path in paths:
-        with Recording(path) as recording:
-            rates.append(default_rate_hz(recording))
-            most = min(most, float(recording.configuration["bench"]["sample_rate_hz"]))
-    return min(max(rates), most)
+    rates = [rates_hz_in(path) for path in paths]
+    return min(max(suitable for suitable, _ in rates), min(recorded for _, recorded in rates))
 
 
 def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment], list[Experiment]]:

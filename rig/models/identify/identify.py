@@ -47,7 +47,7 @@ from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
-    from identification import FitProgress
+    from identification import FitProgress, TimeRecords
 
 __all__ = ["Request", "identify_model", "modes_in"]
 
@@ -175,7 +175,13 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
             for shown, fitted in pairs
         ]
     pairs.sort(key=lambda pair: pair[0].input_rms or (0.0,))
-    one_specimen(**{f"{shown.input_rms[0]:.3g} N RMS": shown.specimen for shown, _ in pairs if shown.input_rms})
+    one_specimen(
+        **{
+            f"{shown.input_rms[0]:.3g} {shown.inputs[0].unit} RMS": shown.specimen
+            for shown, _ in pairs
+            if shown.input_rms
+        }
+    )
     lowest, fitted = pairs[0]
     diagram = stabilisation(fitted)
     found = [linear_modes(fitted, modes=request.count, diagram=diagram)]
@@ -200,15 +206,36 @@ def _matrices(
         shown = [best_linear_approximation(s, estimator=estimator, specimen=specimen) for s in measured]
         if estimator != "instrument":
             return [(matrix, matrix) for matrix in shown], missing
-        return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
+        return [(matrix, _over_instrument(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
     if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
         return [(matrix, matrix)], ()
-    raise RecordingError(f"{path}: holds a {kind}; a linear model comes from multisines or frequency response matrices")
+    if kind == "time-data":
+        from rig.models.identify.data_files import time_records_in  # loads what other models need not wait for
+
+        found = [_responses_over_time(records, estimator) for records in time_records_in(path).levels().values()]
+        return found, ()
+    raise RecordingError(
+        f"{path}: holds a {kind}; a linear model comes from multisines, time data or frequency response matrices"
+    )
 
 
-def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponseMatrix:
+def _responses_over_time(
+    records: "TimeRecords", estimator: Estimator
+) -> tuple[FrequencyResponseMatrix, FrequencyResponseMatrix]:
+    """Return the responses of one level of time data, as shown and as fitted: over the instrument, if there is one."""
+    from identification import time_responses, time_spectra
+
+    shown = time_responses(records, estimator=estimator)
+    if not records.period_samples or not records.instrument or estimator != "instrument":
+        return shown, shown
+    return shown, _over_instrument(time_spectra(records), records.specimen, records.instrument)
+
+
+def _over_instrument(measured: PeriodicSpectra, specimen: str, instrument: str = "voltage") -> FrequencyResponseMatrix:
     names = [channel.name for channel in measured.channels if channel.role in ("force", "drive", "response")]
-    return best_linear_approximation(measured, inputs=("voltage",), outputs=names, specimen=specimen)
+    return best_linear_approximation(
+        measured, inputs=(instrument,), instruments=(instrument,), outputs=names, specimen=specimen
+    )
 
 
 def _exciter(paths: Sequence[Path], request: Request) -> Exciter:

@@ -13,14 +13,13 @@ from identification import (
     identify_pnlss,
 )
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import bench_of_recording
 from rig.models.files.files import load_as
 from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.identify.data_files import exciter_in
 from rig.models.identify.data_fingerprints import uses_of
 from rig.models.identify.data_request import DataOptions
 from rig.models.identify.fit_data import FitData, fit_data, fitted
 from rig.models.identify.pnlss_request import PnlssOptions
-from rig.recording.reader import Recording
 
 __all__ = ["identified_pnlss"]
 
@@ -85,14 +84,9 @@ def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
     if "force" not in [channel.role for channel in (*first.input_channels, *first.output_channels)]:
         said.append("the force is neither input nor output: the model predicts multisines alone; add it to the outputs")
     if "voltage" in [channel.name for channel in first.input_channels]:
-        benches = " and ".join(dict.fromkeys(_bench(path) for path in paths))
+        benches = " and ".join(dict.fromkeys(exciter_in(path) for path in paths))
         said.append(f"the input is the voltage: the model holds for the exciter of {benches} alone")
     return said
-
-
-def _bench(path: Path) -> str:
-    with Recording(path) as recording:
-        return bench_of_recording(recording).name
 
 
 def _earlier(path: Path) -> IdentifiedPnlss:

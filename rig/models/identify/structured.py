@@ -20,8 +20,8 @@ from rig.recording.arrays import kind_of
 
 __all__ = ["identified_structured"]
 
-_KINDS = ("multisine", "sweep")
-"""Recordings that begin at rest."""
+_KINDS = ("multisine", "sweep", "time-data")
+"""Data that may begin at rest."""
 
 
 def identified_structured(

@@ -10,6 +10,7 @@ from typing import Any
 
 from rig.errors import DaqDisconnected, DaqRefused
 from rig.wire.can.frames import BusTiming, Frame
+from rig.wire.can.lean_import import lean_import
 from rig.wire.can.protocol import NODE_MASK
 
 __all__ = ["BUS_COUNTERS", "FrameBus", "PythonCanBus", "only_loopback"]
@@ -87,7 +88,8 @@ class PythonCanBus(FrameBus):
 
     def open(self) -> None:
         """Open the interface. `DaqRefused` without its backend, `DaqDisconnected` without the interface itself."""
-        import can
+        with lean_import():
+            import can
 
         if self._interface == "udp_multicast" and not only_loopback():
             raise DaqRefused(

@@ -7,11 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cantools
 import numpy as np
 
 from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
+from rig.wire.can.lean_import import lean_import
 
 __all__ = ["STRUCT_CODES", "CompiledMessage", "Layout", "compile_layout", "compile_text"]
 
@@ -177,6 +177,9 @@ def compile_layout(path: str | Path) -> Layout:
 
 def compile_text(text: str, source: str = "definition") -> Layout:
     """The layout in the text of a DBC file; ``source`` names it in errors."""
+    with lean_import():
+        import cantools
+
     try:
         database: Any = cantools.database.load_string(text, "dbc")
     except Exception as error:  # cantools has no common base for what a broken file may raise

@@ -217,12 +217,13 @@ def test_an_unstable_start_is_reflected_and_fitted(monkeypatch: pytest.MonkeyPat
     assert any(unstable)
 
 
-def test_without_periodic_experiments_a_linear_model_has_to_be_given() -> None:
+def test_without_periodic_experiments_a_regression_or_a_given_linear_model_begins_the_fit() -> None:
     exact = hardening()
     record = measured(exact, multisine(0))
     segment = replace(record, period_samples=0, counted_from=1000)
-    with pytest.raises(IdentificationError, match="or give a linear model to begin from"):
-        identify_pnlss([segment], states=2)
+    begun = identify_pnlss([segment], states=2)
+    assert begun.training_error < 1e-3
+    assert "no periods: responses of a regression" in " ".join(begun.model.notes)
     found = identify_pnlss([segment], states=2, linear=oscillator())
     assert found.training_error < 1e-3
     np.testing.assert_array_equal(found.linear.a, oscillator().a)

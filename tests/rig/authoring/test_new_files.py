@@ -146,7 +146,7 @@ def test_commands_refuse_another_word_and_print_a_schema(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     status, printed = run_rig(["new", "benhc", "-o", "x.toml"])
     assert status == 1
-    assert "allowed is bench, plan, rig, sensors or driver" in printed
+    assert "allowed is bench, plan, rig, sensors, driver or mapping" in printed
     with pytest.raises(ConfigurationError, match="kind = 'backbones'"):
         new_file("plan", tmp_path / "x.toml", kind="backbones")
     status, printed = run_rig(["schema", "plan"])

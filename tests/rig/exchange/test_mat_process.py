@@ -10,9 +10,10 @@ import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rig.exchange import mat
-from rig.exchange.mat import ImportFailed, read_mat
-from rig.exchange.mat_process import read_values, write_values
+from rig.exchange import child_reading
+from rig.exchange.child_reading import ImportFailed
+from rig.exchange.child_values import read_values, write_values
+from rig.exchange.mat import read_mat
 from rig.system.child import ChildFailed
 
 THINGS = {
@@ -97,7 +98,7 @@ def test_a_file_that_ends_its_reader_is_one_line(path, monkeypatch, how):
     def ended(*_args, **_kwargs):
         raise ChildFailed(how)
 
-    monkeypatch.setattr(mat, "ask_child", ended)
+    monkeypatch.setattr(child_reading, "ask_child", ended)
     with pytest.raises(ImportFailed) as refused:
         read_mat(path)
     assert str(refused.value) == f"{path}: is no MAT file, or a damaged one (reading it {how})"

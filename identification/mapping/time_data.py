@@ -1,0 +1,151 @@
+"""Mappings of time data: what a file of somebody else holds, and which records it makes."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from identification.mapping.base import ChannelMapping, MappingTable, Path
+from identification.mapping.csv_layout import CsvLayout
+
+__all__ = ["Axis", "SampledChannel", "Stretch", "TimeDataMapping"]
+
+Axis = Literal["sample", "channel", "period", "realisation", "level"]
+Count = Annotated[int, Field(ge=0)]
+Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Hertz = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class SampledChannel(ChannelMapping):
+    """A channel, where its samples are, and what their numbers mean."""
+
+    value: Path
+    """Path of the samples."""
+    file: str = ""
+    """File with the samples, beside the one that is imported; if left out, in that one."""
+    axes: Annotated[tuple[Axis, ...], Field(min_length=1)] | None = None
+    """Dimensions of the array, as the key ``axes`` of the mapping, for this channel alone."""
+    index: Annotated[int, Field(ge=1)] = 1
+    """Number of the channel along the axis ``channel``, from 1."""
+    scale: Finite = 1.0
+    """Factor from stored numbers to ``unit``, such as the inverse of a sensitivity; negative for an inverted sensor."""
+    offset: Finite | Literal["mean"] = 0.0
+    """What is subtracted from the stored numbers; ``mean`` for the mean of each record."""
+    start_samples: Count = 0
+    """Number of samples at the beginning that are left out, for a channel that began earlier than others."""
+
+    @model_validator(mode="after")
+    def _moves(self) -> "SampledChannel":
+        if self.scale == 0.0:
+            raise ValueError(f"scale = 0 of channel '{self.name}': allowed is any number but 0")
+        if self.axes is not None:
+            check_axes(self.axes)
+        return self
+
+
+class Stretch(MappingTable):
+    """A stretch of a long record that becomes a record of its own, or several of equal length that follow each other."""
+
+    start_samples: Count | None = None
+    """Number of samples before it."""
+    start_s: Seconds | None = None
+    """Time before it; in place of ``start_samples``."""
+    samples: Annotated[int, Field(ge=2)] | None = None
+    """Number of samples; to the end if left out."""
+    duration_s: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    """Duration; in place of ``samples``."""
+    repeat: Annotated[int, Field(ge=1, le=100_000)] = 1
+    """Number of stretches of this length."""
+    step_samples: Annotated[int, Field(ge=1)] | None = None
+    """Samples from the beginning of one to that of the next; if left out, they follow each other without a gap."""
+    level: Finite | None = None
+    """Level of its records; if left out, the RMS of the force."""
+
+    @model_validator(mode="after")
+    def _either(self) -> "Stretch":
+        for one, other in (("start_samples", "start_s"), ("samples", "duration_s")):
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise ValueError(f"{one} and {other}: give one of the two")
+        if self.repeat > 1 and self.samples is None and self.duration_s is None:
+            raise ValueError("repeat: needs samples or duration_s")
+        return self
+
+
+class TimeDataMapping(MappingTable):
+    """Where the samples are in the data, and which records they are."""
+
+    kind: Literal["time-data"]
+    """Kind of the mapping."""
+    specimen: str = ""
+    """Name of what was tested."""
+    source: str = ""
+    """Where the data comes from; for information only."""
+    sample_rate_hz: Hertz | None = None
+    """Samples per second; if left out, taken from ``time`` or from the file."""
+    time: Path | None = None
+    """Path of the instants in seconds."""
+    records: Path | None = None
+    """Path of a list with one structure per record; the other paths are relative to these structures."""
+    axes: Annotated[tuple[Axis, ...], Field(min_length=1)] = ("sample", "realisation")
+    """Dimensions of the arrays, in their order: ``sample``, ``channel``, ``period``, ``realisation``, ``level``. Of vectors the
+    first name counts alone."""
+    levels: Annotated[tuple[Finite, ...], Field(min_length=1)] | None = None
+    """Levels: one number for each along the axis ``level``, or else one for each record. If left out, the RMS of the force over
+    the records that are alike along that axis; all records are one level without it."""
+    stretches: tuple[Stretch, ...] = ()
+    """Parts of each record; the whole if left out."""
+    period_samples: Annotated[int, Field(ge=3)] | None = None
+    """Number of samples in a period, as stored; left out for data that is not periodic. With the axis ``period`` it is the
+    length of the axis ``sample``."""
+    transient_periods: Count = 0
+    """Number of periods to discard at the beginning of each record."""
+    ahead_periods: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+    """Periods put ahead of each record when a model is simulated from rest, in which its transient decays; if left out,
+    ``transient_periods``, at least 1."""
+    at_rest: bool = False
+    """Whether records that are not periodic begin at rest."""
+    lowest_hz: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+    """Lowest excited frequency; left out if unknown."""
+    highest_hz: Hertz | None = None
+    """Highest excited frequency; left out if unknown."""
+    new_rate_hz: Hertz | None = None
+    """Lower sample rate to which the records are filtered and decimated; left out, they keep theirs."""
+    instrument: str = ""
+    """Name of a noise-free channel, such as the voltage of the generator, for frequency responses; the force if left out."""
+    csv: CsvLayout | None = None
+    """Layout of a CSV file that does not begin with one line of names."""
+    channels: Annotated[tuple[SampledChannel, ...], Field(min_length=2)]
+    """The channels."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> "TimeDataMapping":
+        check_axes(self.axes)
+        names = [channel.name for channel in self.channels]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise ValueError(f"channels: '{twice}' is the name of two; names must differ")
+        if self.instrument and self.instrument not in names:
+            raise ValueError(f"instrument = '{self.instrument}': allowed is one of {', '.join(names)}")
+        if (self.lowest_hz is None) != (self.highest_hz is None):
+            raise ValueError("lowest_hz and highest_hz: give both or none")
+        if self.lowest_hz is not None and self.highest_hz is not None and self.lowest_hz >= self.highest_hz:
+            raise ValueError(f"lowest_hz = {self.lowest_hz:g}: allowed is below highest_hz = {self.highest_hz:g}")
+        if self.transient_periods and not self.is_periodic:
+            raise ValueError("transient_periods: is for periodic data; add period_samples, or leave it out")
+        return self
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the records are periodic."""
+        return self.period_samples is not None or any("period" in self.axes_of(channel) for channel in self.channels)
+
+    def axes_of(self, channel: SampledChannel) -> tuple[Axis, ...]:
+        """Return the axes of a channel."""
+        return self.axes if channel.axes is None else channel.axes
+
+
+def check_axes(axes: tuple[str, ...]) -> None:
+    """Raise ValueError unless ``sample`` is among the axes, and none is named twice."""
+    if "sample" not in axes:
+        raise ValueError(f"axes = {list(axes)}: sample must be among them")
+    if len(set(axes)) < len(axes):
+        raise ValueError(f"axes = {list(axes)}: each may be named once")

@@ -1,0 +1,279 @@
+"""Time data of somebody else as records, as a mapping describes them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.mapping.base import as_levels, in_si, value_at
+from identification.mapping.sampling import common_rate_hz, instants_at
+from identification.mapping.series import common_length, series
+from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
+from identification.signals.decimation import EDGE_SAMPLES, decimated
+from identification.time_data.experiments import resampled_periods
+from identification.time_data.records import TimeRecord, TimeRecords
+
+__all__ = ["map_time_data"]
+
+Float = NDArray[np.float64]
+
+_WHOLE = 0.05
+"""Largest part of a sample by which the beginnings of two channels may miss the common grid."""
+
+
+def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] | None = None) -> TimeRecords:
+    """Return the records in ``data`` in SI units.
+
+    Parameters
+    ----------
+    data
+        Nested dictionaries, lists and arrays. At the top, ``sample_rate_hz`` (float), or ``__rates_hz__`` and
+        ``__starts_s__`` (by path), tell what the file says of its own sampling.
+    mapping
+        What is where, and what it means.
+    files
+        Data of the further files that channels name.
+
+    A channel that began later than others by whole samples is lined up with them, and all are cut to the common length.
+    Periodic records are cut to whole periods and resampled without error, others filtered and decimated.
+
+    Raises
+    ------
+    IdentificationError
+        If a path does not exist, dimensions or lengths do not fit the axes, sample rates disagree, sampling is uneven, values
+        are NaN, or no whole period or sample is left.
+    """
+    every = {"": data, **(files or {})}
+    entries = {name: _entries(one, mapping) for name, one in every.items()}
+    counts = {name: len(some) for name, some in entries.items()}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{name or 'the file'} {count}" for name, count in counts.items())
+        raise IdentificationError(f"records '{mapping.records}': unequal numbers ({told})")
+    raw: list[_Raw] = []
+    for number in range(counts[""]):
+        where = f"{mapping.records}[{number}], " if mapping.records else ""
+        raw += _raw_records({name: some[number] for name, some in entries.items()}, every, mapping, where)
+    rate = raw[0].rate_hz
+    if any(abs(one.rate_hz / rate - 1.0) > 1e-6 for one in raw):
+        raise IdentificationError(f"sample_rate_hz: records have rates from {rate:g} Hz on; wanted is one")
+    cut, notes = _cut(raw, mapping, rate)
+    channels, _ = in_si(mapping.channels)
+    forces = [row for row, channel in enumerate(channels) if channel.role == "force"]
+    ahead = max(mapping.transient_periods, 1) if mapping.ahead_periods is None else mapping.ahead_periods
+    new_rate = rate if mapping.new_rate_hz is None else mapping.new_rate_hz
+    size = _period(cut, mapping, new_rate / rate) if mapping.is_periodic else 0
+    bottom, top = mapping.lowest_hz, mapping.highest_hz
+    return TimeRecords(
+        channels=channels,
+        sample_rate_hz=new_rate,
+        records=_named(cut, mapping, forces[:1], channels[forces[0]].unit if forces else ""),
+        period_samples=size,
+        ahead_periods=ahead,
+        at_rest=mapping.at_rest,
+        excited_hz=None if bottom is None or top is None else (bottom, top),
+        instrument=mapping.instrument,
+        specimen=mapping.specimen,
+        source=mapping.source,
+        notes=notes,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Raw:
+    """One record as stored, in SI."""
+
+    samples: Float
+    rate_hz: float
+    group: int
+    period_samples: int
+    level: float | None = None
+
+
+def _entries(data: Any, mapping: TimeDataMapping) -> Sequence[Any]:
+    if mapping.records is None:
+        return [data]
+    return as_levels(value_at(data, mapping.records, "records"), f"records '{mapping.records}'")
+
+
+def _raw_records(
+    entries: Mapping[str, Any], files: Mapping[str, Any], mapping: TimeDataMapping, where: str
+) -> list[_Raw]:
+    """Return the records in one structure: all channels side by side, on one grid of instants."""
+    _, factors = in_si(mapping.channels)
+    found, told, starts = [], {"sample_rate_hz": mapping.sample_rate_hz}, []
+    for channel, factor in zip(mapping.channels, factors, strict=True):
+        label = f"{where}channels.{channel.name}"
+        stored = series(
+            value_at(entries[channel.file], channel.value, label), mapping.axes_of(channel), channel.index, label
+        )
+        offset = 0.0 if channel.offset == "mean" else channel.offset
+        found.append(stored.at((stored.values - offset) * (channel.scale * factor)))
+        rates, start = _sampling(entries[channel.file], files[channel.file], mapping, channel)
+        told |= rates
+        starts.append(start)
+    rate = common_rate_hz(told)
+    skipped = _skipped(mapping.channels, starts, rate)
+    periods = {one.period_samples for one in found} - {0}
+    if len(periods) > 1 or (periods and mapping.period_samples not in (None, *periods)):
+        lengths = ", ".join(map(str, sorted({*periods, mapping.period_samples or 0} - {0})))
+        raise IdentificationError(f"{where}period_samples: disagree ({lengths}), wanted is one length of a period")
+    together = common_length(
+        [one.values for one in found],
+        skipped,
+        {c.name: one.values.shape for c, one in zip(mapping.channels, found, strict=True)},
+        cut=any(skipped) or any(channel.file for channel in mapping.channels),
+    )
+    size = next(iter(periods), mapping.period_samples or 0)
+    levels, realisations = together.shape[1:3]
+    return [_Raw(together[:, level, one], rate, level, size) for level in range(levels) for one in range(realisations)]
+
+
+def _sampling(
+    entry: Any, file: Any, mapping: TimeDataMapping, channel: SampledChannel
+) -> tuple[dict[str, float | None], float]:
+    """Return the sample rates that are told of a channel, by where they are from, and the time of its first sample."""
+    told: dict[str, float | None] = {}
+    start = 0.0
+    of_file = channel.file or "file"
+    if isinstance(file, Mapping):
+        if isinstance(rate := file.get("sample_rate_hz"), float):
+            told[of_file] = rate
+        rates, starts = file.get("__rates_hz__"), file.get("__starts_s__")
+        if isinstance(rates, Mapping) and isinstance(rate := rates.get(channel.value), float):
+            told[f"{of_file} ({channel.value})"] = rate
+        if isinstance(starts, Mapping) and isinstance(begin := starts.get(channel.value), float):
+            start = begin
+    if mapping.time is not None and _holds(entry, mapping.time, alone=not channel.file):
+        told[f"time{' of ' if channel.file else ''}{channel.file}"], start = instants_at(entry, mapping.time)
+    return told, start
+
+
+def _holds(entry: Any, path: str, *, alone: bool) -> bool:
+    """Return whether an entry has the instants; a further file may leave them out."""
+    if alone:
+        return True
+    try:
+        value_at(entry, path, "time")
+    except IdentificationError:
+        return False
+    return True
+
+
+def _skipped(channels: Sequence[SampledChannel], starts: Sequence[float], rate_hz: float) -> list[int]:
+    """Return how many samples of each channel are left out at the beginning, so that all begin at one instant."""
+    late = (max(starts) - np.array(starts)) * rate_hz
+    for channel, samples in zip(channels, late, strict=True):
+        if abs(samples - round(samples)) > _WHOLE:
+            raise IdentificationError(
+                f"channels.{channel.name}: begins {samples:.2f} samples before another; allowed are whole samples, resample it"
+            )
+    return [round(samples) + channel.start_samples for channel, samples in zip(channels, late, strict=True)]
+
+
+def _cut(raw: Sequence[_Raw], mapping: TimeDataMapping, rate_hz: float) -> tuple[list[_Raw], tuple[str, ...]]:
+    """Return the stretches of all records at the new rate, of periodic records the settled whole periods."""
+    ratio = 1.0 if mapping.new_rate_hz is None else mapping.new_rate_hz / rate_hz
+    if ratio > 1.0 + 1e-9:
+        raise IdentificationError(
+            f"new_rate_hz: is {mapping.new_rate_hz:g} Hz, the data has {rate_hz:g} Hz; allowed is up to that"
+        )
+    found, left, groups = [], 0, 1 + max(one.group for one in raw)
+    for number, one in enumerate(raw, 1):
+        samples, first = one.samples, 0.0
+        if not mapping.is_periodic and ratio < 1.0:
+            samples, first = _decimated(samples, rate_hz, rate_hz * ratio, mapping.at_rest, f"record {number}")
+        for begin, end, which in _stretches(mapping.stretches, one.samples.shape[1], rate_hz, number):
+            if mapping.is_periodic:
+                part, rest = _whole_periods(
+                    samples[:, begin:end], one.period_samples, mapping.transient_periods, number
+                )
+                left = max(left, rest)
+                part = _resampled(part, one.period_samples, rate_hz, rate_hz * ratio)
+            else:
+                low, high = (max(int(np.ceil(at * ratio - first - 1e-9)), 0) for at in (begin, end))
+                part = samples[:, low:high]
+            if not part.shape[1]:
+                raise IdentificationError(f"record {number}: no sample is left of it after the cuts")
+            for row, channel in enumerate(mapping.channels):
+                if channel.offset == "mean":
+                    part[row] -= part[row].mean()
+            level = mapping.stretches[which].level if mapping.stretches else None
+            group = one.group if level is None else groups + which
+            found.append(_Raw(part, rate_hz * ratio, group, one.period_samples, level))
+    notes = (f"{left} samples at the end of a record are no whole period and were left out",) if left else ()
+    return found, notes
+
+
+def _stretches(stretches: Sequence[Stretch], size: int, rate_hz: float, number: int) -> list[tuple[int, int, int]]:
+    """Return beginning, end and number of each stretch of a record of ``size`` samples."""
+    found = []
+    for which, one in enumerate(stretches or (Stretch(),)):
+        begin = one.start_samples or 0 if one.start_s is None else round(one.start_s * rate_hz)
+        length = one.samples if one.duration_s is None else round(one.duration_s * rate_hz)
+        step = one.step_samples or length or 0
+        for turn in range(one.repeat):
+            at = begin + turn * step
+            end = size if length is None else at + length
+            if end > size or at >= end:
+                raise IdentificationError(
+                    f"stretches[{which}]: ends at sample {max(end, at)}, record {number} has {size} samples"
+                )
+            found.append((at, end, which))
+    return found
+
+
+def _decimated(samples: Float, rate_hz: float, new_hz: float, at_rest: bool, where: str) -> tuple[Float, float]:
+    """Return the samples at the new rate without spoilt ends, and the number of new samples that were left out before them."""
+    slow = decimated(samples, rate_hz, new_hz)
+    first = 0 if at_rest else EDGE_SAMPLES
+    if slow.shape[1] <= first + EDGE_SAMPLES:
+        raise IdentificationError(f"new_rate_hz: is {new_hz:g} Hz, {where} is too short for its filter")
+    return slow[:, first : slow.shape[1] - EDGE_SAMPLES], float(first)
+
+
+def _whole_periods(samples: Float, size: int, transient: int, number: int) -> tuple[Float, int]:
+    """Return the settled whole periods of a record, and the number of samples left out behind them."""
+    periods, rest = divmod(samples.shape[1], size)
+    if periods <= transient:
+        raise IdentificationError(
+            f"record {number}: has {samples.shape[1]} samples, needs more than {transient} periods of {size}, one to be left "
+            "after the transient"
+        )
+    return samples[:, transient * size : periods * size].copy(), rest
+
+
+def _resampled(part: Float, size: int, rate_hz: float, new_hz: float) -> Float:
+    return resampled_periods(part, size, rate_hz, new_hz).reshape(len(part), -1)
+
+
+def _period(cut: Sequence[_Raw], mapping: TimeDataMapping, ratio: float) -> int:
+    """Return the samples in a period at the new rate."""
+    return round(cut[0].period_samples * ratio)
+
+
+def _named(cut: Sequence[_Raw], mapping: TimeDataMapping, force: Sequence[int], unit: str) -> tuple[TimeRecord, ...]:
+    """Return the records with their levels and names."""
+    groups = sorted({one.group for one in cut})
+    levels = mapping.levels
+    if levels is not None and len(levels) not in (len(groups), len(cut)):
+        raise IdentificationError(
+            f"levels: has {len(levels)} numbers, the data has {len(groups)} levels and {len(cut)} records; one for each"
+        )
+    records: list[TimeRecord] = []
+    for number, one in enumerate(cut):
+        alike = [other for other in cut if other.group == one.group]
+        if one.level is not None:
+            level, kind = one.level, ""
+        elif levels is not None:
+            level, kind = levels[groups.index(one.group) if len(levels) == len(groups) else number], ""
+        else:
+            squares = [np.mean(other.samples[list(force)] ** 2) for other in alike] if force else [np.nan]
+            level, kind = float(f"{np.sqrt(np.mean(squares)):.6g}"), " RMS"
+        before = sum(1 for other in records if other.level == level)
+        at = "" if np.isnan(level) else f"{level:.4g} {unit}{kind}, " if unit != "1" else f"{level:.4g}{kind}, "
+        what = "realisation" if mapping.is_periodic else "record"
+        records.append(TimeRecord(samples=one.samples, name=f"{at}{what} {before + 1}", level=level))
+    return tuple(records)

@@ -1,0 +1,164 @@
+"""Records over time that somebody else has measured: channels, samples, periods, levels."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.validation import finite_array, positive
+from vibrolock.results import Result
+
+__all__ = ["TimeRecord", "TimeRecords"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TimeRecord:
+    """One record of all channels.
+
+    Parameters
+    ----------
+    samples
+        float[n_channels, n], in the units of the channels.
+    name
+        Name for tables and messages.
+    level
+        Level by which records are grouped; NaN if there is none.
+    """
+
+    samples: Float
+    name: str = ""
+    level: float = float("nan")
+
+    def __post_init__(self) -> None:
+        where = f"record '{self.name}', samples" if self.name else "samples"
+        object.__setattr__(self, "samples", finite_array(where, self.samples, np.float64, 2))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TimeRecords(Result):
+    """Evenly sampled records of the same channels at one sample rate.
+
+    Parameters
+    ----------
+    channels
+        One per row of the samples.
+    sample_rate_hz
+        Samples per second.
+    records
+        The records, one or more.
+    period_samples
+        Number of samples in a period: every record is a whole number of settled periods. 0 for records that are not periodic.
+    ahead_periods
+        Periods that are put ahead of a periodic record when a model is simulated from rest, so that its transient decays.
+    at_rest
+        Whether a record that is not periodic begins at rest. Otherwise the state at its beginning is estimated.
+    excited_hz
+        Lowest and highest excited frequency; None if unknown.
+    instrument
+        Name of a noise-free channel, such as the voltage of a generator; empty if there is none.
+    specimen
+        Name of what was tested.
+    source
+        Where the data comes from.
+    notes
+        Remarks for the user, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        If shapes do not agree, a record is no whole number of periods, names are used twice or an instrument does not exist.
+    """
+
+    channels: tuple[Channel, ...]
+    sample_rate_hz: float
+    records: tuple[TimeRecord, ...]
+    period_samples: int = 0
+    ahead_periods: float = 1.0
+    at_rest: bool = False
+    excited_hz: tuple[float, float] | None = None
+    instrument: str = ""
+    specimen: str = ""
+    source: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for name in ("channels", "records", "notes"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        positive("sample_rate_hz", self.sample_rate_hz, "Hz")
+        names = [channel.name for channel in self.channels]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise IdentificationError(f"channels: '{twice}' is the name of two; names must differ")
+        if not self.records:
+            raise IdentificationError("records: there is none, needs one at least")
+        if self.instrument and self.instrument not in names:
+            raise IdentificationError(f"instrument: is '{self.instrument}', channels are {', '.join(names)}")
+        if not 0.0 <= self.ahead_periods < np.inf:
+            raise IdentificationError(f"ahead_periods: is {self.ahead_periods:g}, needs zero or more")
+        for number, record in enumerate(self.records, 1):
+            rows, count = record.samples.shape
+            if rows != len(names) or not count:
+                raise IdentificationError(f"record {number}: shape {(rows, count)}, needs {len(names)} rows of samples")
+            if self.period_samples < 0 or (self.period_samples and count % self.period_samples):
+                raise IdentificationError(
+                    f"record {number}: has {count} samples, no whole number of periods of {self.period_samples}"
+                )
+
+    @property
+    def level_unit(self) -> str:
+        """Unit of the levels: that of the first channel of role ``force``; empty if there is none."""
+        return next((channel.unit for channel in self.channels if channel.role == "force"), "")
+
+    def levels(self) -> "dict[float, TimeRecords]":
+        """Return the records of each level, in rising order; records without a level are one level, NaN."""
+        found: dict[float, list[TimeRecord]] = {}
+        for record in sorted(self.records, key=lambda one: one.level):
+            key = next(
+                (level for level in found if level == record.level or np.isnan([level, record.level]).all()), None
+            )
+            found.setdefault(record.level if key is None else key, []).append(record)
+        return {level: self.with_records(tuple(some)) for level, some in found.items()}
+
+    def with_records(self, records: tuple[TimeRecord, ...]) -> "TimeRecords":
+        """Return it with other records."""
+        kept = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "records"}
+        return TimeRecords(records=records, **kept)
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Return arrays by name, and the JSON-able attributes that go with them."""
+        arrays = {
+            "samples": np.concatenate([record.samples for record in self.records], axis=1),
+            "lengths": np.array([record.samples.shape[1] for record in self.records]),
+            "levels": np.array([record.level for record in self.records]),
+        }
+        plain = ("sample_rate_hz", "period_samples", "ahead_periods", "at_rest", "instrument", "specimen", "source")
+        attributes: dict[str, Any] = {name: getattr(self, name) for name in plain}
+        attributes["channels"] = [vars(channel) for channel in self.channels]
+        attributes["excited_hz"] = None if self.excited_hz is None else list(self.excited_hz)
+        attributes["names"] = [record.name for record in self.records]
+        return arrays, {**attributes, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "TimeRecords":
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing or does not fit."""
+        try:
+            rest = dict(attributes)
+            channels = tuple(Channel(**channel) for channel in rest.pop("channels"))
+            band, notes, names = rest.pop("excited_hz"), tuple(rest.pop("notes")), rest.pop("names")
+            samples, lengths = np.asarray(arrays["samples"]), np.asarray(arrays["lengths"], np.int64)
+            if samples.ndim != 2 or np.any(lengths < 0) or lengths.sum() != samples.shape[1]:
+                raise IdentificationError(f"lengths: do not add up to the samples, which have shape {samples.shape}")
+            parts = np.split(samples, np.cumsum(lengths)[:-1], axis=1)
+            records = tuple(
+                TimeRecord(samples=part, name=str(name), level=float(level))
+                for part, name, level in zip(parts, names, arrays["levels"], strict=True)
+            )
+            excited = None if band is None else (float(band[0]), float(band[1]))
+            return cls(channels=channels, records=records, excited_hz=excited, notes=notes, **rest)
+        except (KeyError, TypeError, ValueError) as error:
+            raise IdentificationError(f"time records: {error} is missing or does not fit") from None

@@ -1,0 +1,85 @@
+"""Layout of a CSV file that does not begin with one line of names, guessed from its first lines."""
+
+import csv
+import re
+from itertools import islice
+from pathlib import Path
+from typing import Literal
+
+from identification.mapping.csv_layout import CsvLayout
+from identification.mapping.units import UNITS
+from rig.exchange.child_reading import ImportFailed
+from rig.system.text_files import read_text
+
+__all__ = ["guessed_layout"]
+
+_LARGEST_BYTES = 1_000_000_000
+_LOOKED_AT = 100
+_ALIKE = 3
+Separator = Literal[",", ";", "\t", " "]
+_NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$"),
+}
+
+
+def guessed_layout(path: Path) -> CsvLayout | None:
+    """Return the layout; None if the file begins with one line of names (and one of units), or no table is found."""
+    lines = [
+        line
+        for line in read_text(path, _LARGEST_BYTES, ImportFailed).splitlines()
+        if line.strip() and not line.startswith("#")
+    ]
+    lines = list(islice(lines, _LOOKED_AT))
+    for separator, decimal in ((",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")):
+        first = _first_row(lines, separator, decimal)
+        if first is None:
+            continue
+        width = len(_cells(lines[first], separator))
+        heading = next((at for at in (first - 1, first - 2) if at >= 0 and _names(lines[at], separator, width)), None)
+        if heading is not None and heading > 0 and _units(lines[heading], separator):
+            heading -= 1 if _names(lines[heading - 1], separator, width) else 0
+        plain = separator in (",", ";", "\t") and decimal == "."
+        if plain and heading == 0:
+            return None
+        names = None if heading is not None else tuple(f"column{number}" for number in range(1, width + 1))
+        skip = first if heading is None else heading
+        return CsvLayout(
+            skip_lines=skip, names=names, separator=_known(separator), decimal="," if decimal == "," else "."
+        )
+    return None
+
+
+def _known(separator: str) -> Separator:
+    known: dict[str, Separator] = {",": ",", ";": ";", "\t": "\t", " ": " "}
+    return known[separator]
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    cells = line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
+    return [cell.strip() for cell in cells]
+
+
+def _first_row(lines: list[str], separator: str, decimal: str) -> int | None:
+    """Return the first of several lines with equally many numbers, two at least."""
+    widths = []
+    for line in lines:
+        cells = _cells(line, separator)
+        widths.append(len(cells) if len(cells) > 1 and all(_NUMBER[decimal].match(cell) for cell in cells) else 0)
+    for at in range(len(widths)):
+        some = widths[at : at + _ALIKE]
+        if some[0] and len(set(some)) == 1 and (len(some) == _ALIKE or at == 0):
+            return at
+    return None
+
+
+def _units(line: str, separator: str) -> bool:
+    """Return whether one of the texts is a unit."""
+    return any(cell.strip("[]() ") in {*UNITS, "s", "Hz"} for cell in _cells(line, separator))
+
+
+def _names(line: str, separator: str, width: int) -> bool:
+    """Return whether a line may name the columns: as many different texts, none of them a number."""
+    cells = _cells(line, separator)
+    texts = all(cell and not _NUMBER["."].match(cell) for cell in cells)
+    return len(cells) == width and len(set(cells)) == width and texts

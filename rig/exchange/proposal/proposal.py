@@ -1,0 +1,206 @@
+"""Propose a mapping of time data for a file: look into it, guess, and write TOML with comments."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mapping.csv_layout import CsvLayout
+from rig.exchange.child_reading import ImportFailed
+from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
+from rig.exchange.proposal.csv_guess import guessed_layout
+from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_of, rate_in, role_of, transient_periods
+from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
+from rig.exchange.sources import format_of, read_data
+
+__all__ = ["proposed_mapping"]
+
+_FEWEST_SAMPLES = 16
+_MOST_CHANNELS = 16
+
+
+def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") -> tuple[str, tuple[str, ...]]:
+    """Return a mapping of time data for a file and further ones beside it, as text, and what is left to be filled in.
+
+    Parameters
+    ----------
+    paths
+        The file that will be imported, and others whose channels belong to the same records.
+    format_
+        Format of the first file; by its ending if empty.
+    units
+        Of a universal file, see `rig.exchange.reading.import_file`.
+
+    Raises
+    ------
+    ImportFailed
+        If a file cannot be read, or holds no array long enough to be a signal.
+    """
+    first = paths[0]
+    layout = None
+    found: list[FileContents] = []
+    for number, path in enumerate(paths):
+        if path.parent.resolve() != first.parent.resolve():
+            raise ImportFailed(
+                f"{path}: is in another folder than {first}; a mapping names files beside the one imported"
+            )
+        form = format_of(path, format_ if not number else "", "`format`")
+        guessed = guessed_layout(path) if form == "csv" else None
+        layout = layout or guessed
+        found.append(contents_of(read_data(path, form, units=units, layout=guessed), path.name if number else ""))
+    proposal = _proposal(found, first, layout)
+    forms = [format_of(path, format_ if not number else "", "`format`") for number, path in enumerate(paths)]
+    relative = {path.name if number else "" for number, path in enumerate(paths) if forms[number] == "wav"}
+    return text_of(proposal, found, [path.name for path in paths], relative), proposal.missing
+
+
+def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | None) -> Proposal:
+    arrays = [leaf for contents in found for leaf in contents.arrays]
+    samples = _sample_count(arrays, path)
+    times = [leaf for leaf in arrays if is_time(leaf.name, leaf.values)]
+    signals = [leaf for leaf in arrays if samples in leaf.values.shape and leaf not in times]
+    if not signals:
+        raise ImportFailed(f"{path}: holds no signals: arrays of {_FEWEST_SAMPLES} samples and more besides the time")
+    channels = _channels(signals, samples)
+    rate, rate_from, time = _rate(found, times)
+    force = next((c for c in channels if c.role == "force"), channels[0])
+    period, transient, band, at_rest = _periods(force, channels, rate, samples)
+    missing = [] if rate else ["sample_rate_hz"]
+    if len(channels) < 2:
+        missing.append("a second channel")
+    return Proposal(
+        channels=tuple(channels[:_MOST_CHANNELS]),
+        left_out=len(channels) - len(channels[:_MOST_CHANNELS]),
+        records=found[0].records,
+        rate_hz=rate,
+        rate_from=rate_from,
+        time=time,
+        period_samples=period,
+        transient_periods=transient,
+        band_hz=band,
+        at_rest=at_rest,
+        layout=layout,
+        missing=tuple(missing),
+    )
+
+
+def _sample_count(arrays: Sequence[Leaf], path: Path) -> int:
+    """Return the commonest largest dimension."""
+    lengths = [max(leaf.values.shape) for leaf in arrays]
+    long = [length for length in lengths if length >= _FEWEST_SAMPLES]
+    if not long:
+        raise ImportFailed(f"{path}: holds no array of real numbers with {_FEWEST_SAMPLES} samples or more")
+    return int(max(set(long), key=lambda length: (long.count(length), length)))
+
+
+def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
+    """Return the channels in all signals, with their axes, roles and units."""
+    alone = len(signals) == 1
+    plain = [leaf for leaf in signals if leaf.values.ndim == min(one.values.ndim for one in signals)]
+    reference = next((leaf for leaf in plain if role_of(leaf.name, leaf.unit)[0] == "force"), plain[0])
+    of_reference = _axes(reference, samples, channels=alone)
+    known = dict(zip(of_reference, reference.values.shape, strict=True))
+    found: list[ProposedChannel] = []
+    for leaf in signals:
+        axes = of_reference if leaf is reference else _like(leaf, known, samples)
+        role, unit = role_of(leaf.name, leaf.unit)
+        count = leaf.values.shape[axes.index("channel")] if "channel" in axes else 1
+        for index in range(1, count + 1):
+            name = leaf.name if count == 1 else f"{leaf.name}{index}"
+            found.append(ProposedChannel(leaf, name, role, unit, axes, index))
+    return _with_roles(_with_unique_names(found))
+
+
+def _axes(leaf: Leaf, samples: int, *, channels: bool) -> tuple[str, ...]:
+    """Return the axes of an array; the columns of the only array of a file are channels."""
+    if channels and leaf.values.ndim == 2:
+        at = leaf.values.shape.index(samples)
+        return ("sample", "channel") if at == 0 else ("channel", "sample")
+    return dimensions(leaf.values, samples)
+
+
+def _like(leaf: Leaf, known: dict[str, int], samples: int) -> tuple[str, ...]:
+    """Return the axes of an array whose dimensions of other lengths than those of the reference are channels."""
+    if leaf.values.shape == tuple(known.values()):
+        return tuple(known)
+    left, names = dict(known), []
+    for length in leaf.values.shape:
+        name = next((name for name, size in left.items() if size == length), "channel")
+        left.pop(name, None)
+        names.append(name)
+    return tuple(names) if len(set(names)) == len(names) and "sample" in names else dimensions(leaf.values, samples)
+
+
+def _with_unique_names(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
+    names = [channel.name for channel in channels]
+    return [
+        channel if names.count(channel.name) == 1 else channel.called(f"{channel.name}_{number}")
+        for number, channel in enumerate(channels, 1)
+    ]
+
+
+def _with_roles(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
+    """Return the channels with one force and one drive point at most, and a role for each."""
+    out = list(channels)
+    if not any(channel.role == "force" for channel in out):
+        at = next((i for i, c in enumerate(out) if c.role == "monitor"), None)
+        if at is None:  # by the names: V1 before V2
+            open_ = [i for i, c in enumerate(out) if not c.role] or list(range(len(out)))
+            at = min(open_, key=lambda i: out[i].name)
+        out[at] = out[at].played("force")
+    forces = [number for number, channel in enumerate(out) if channel.role == "force"]
+    motions = [number for number, channel in enumerate(out) if channel.role == "motion"]
+    motions += [number for number, channel in enumerate(out) if not channel.role]
+    roles = {**dict.fromkeys(forces[1:], "monitor"), **dict.fromkeys(motions, "response")}
+    roles |= dict.fromkeys(motions[:1], "drive")
+    return [channel.played(roles.get(number, channel.role)) for number, channel in enumerate(out)]
+
+
+def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float | None, str, str]:
+    """Return the sample rate, where it is from (empty: the file tells it), and the path of the instants, if these tell it."""
+    if found[0].rate_hz is not None:
+        return found[0].rate_hz, "", ""
+    if times:
+        steps = np.diff(times[0].values.astype(np.float64))
+        return float(1.0 / steps.mean()), "", times[0].path
+    for contents in found:
+        if (told := rate_in(contents.single)) is not None:
+            return told[1], told[0], ""
+    return None, "", ""
+
+
+def _periods(
+    force: ProposedChannel, channels: Sequence[ProposedChannel], rate: float | None, samples: int
+) -> tuple[int, int, tuple[float, float] | None, bool]:
+    """Return samples of a period (0: in the axes, or none), transient periods, excited band, whether all begins at rest."""
+    records = [_first_record(channel) for channel in channels]
+    signal = _first_record(force)
+    in_axes = "period" in force.axes
+    size = samples if in_axes else period_of(signal)
+    if not size:
+        rest = all(_quiet(record) for record in records)
+        return 0, 0, None, rest
+    whole = signal.size // size
+    longest = max(
+        transient_periods(record[: whole * size].reshape(whole, size)) if whole > 1 else 0 for record in records
+    )
+    band = band_of(signal[(whole - 1) * size : whole * size], rate) if rate else None
+    return 0 if in_axes else size, longest, band, False
+
+
+def _first_record(channel: ProposedChannel) -> NDArray[np.float64]:
+    """Return the first record of a channel, its periods one after the other."""
+    values, names = channel.leaf.values.astype(np.float64), list(channel.axes)
+    for name, index in (("channel", channel.index - 1), ("realisation", 0), ("level", -1)):
+        if name in names:
+            values = np.take(values, index, axis=names.index(name))
+            names.remove(name)
+    if "period" in names:
+        values = np.moveaxis(values, names.index("period"), 0)
+    return np.asarray(values.reshape(-1))
+
+
+def _quiet(record: NDArray[np.float64]) -> bool:
+    """Return whether a record begins at rest: the first hundredth has less than a hundredth of the largest value."""
+    return bool(np.abs(record[: max(record.size // 100, 2)]).max() <= 0.01 * np.abs(record).max())
