@@ -5,7 +5,7 @@ inverse of the mean covariance of its neighbours, without the line itself. Weigh
 and ``sum_k J_k^H W_k C_k W_k J_k``, with the line's own covariance C_k, is an unbiased estimate of the effect of the errors.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,9 +18,11 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 __all__ = [
     "WeightedResponses",
     "Weighting",
+    "first_weighting",
     "known_covariance",
     "motion_factors",
     "pooled",
+    "relative_weights",
     "weighted_accelerance",
     "weighted_responses",
 ]
@@ -56,7 +58,7 @@ class WeightedResponses:
         complex[n_lines, m, m], mean covariance of the neighbouring lines, whose inverse is the weight. If no covariance is
         known: the squared modulus (errors of equal relative size).
     kind
-        Kind of covariance: ``total``, ``noise`` or ``relative``.
+        Kind of covariance: ``total``, ``noise``, ``line scatter`` (total, from neighbouring lines) or ``relative``.
     """
 
     frequency_hz: Float
@@ -91,12 +93,19 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
     modulus = np.abs(responses.value).reshape(-1, count)
     if not np.all(np.max(modulus, axis=0) > 0.0):
         raise IdentificationError("value: a response is zero at all lines")
-    if covariance is None:
-        variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
-        smooth = variance[:, :, None] * np.eye(count, dtype=np.complex128)
-    else:
-        smooth = pooled(covariance)
+    smooth = _relative(modulus) if covariance is None else pooled(covariance)
     return WeightedResponses(responses.frequency_hz, responses.value, covariance, smooth, kind)
+
+
+def relative_weights(data: WeightedResponses) -> WeightedResponses:
+    """Return the same responses, with the same covariance, weighted as if their errors were of equal relative size."""
+    return replace(data, smooth=_relative(np.abs(data.value).reshape(data.frequency_hz.size, -1)))
+
+
+def _relative(modulus: Float) -> Complex:
+    """complex[n_lines, m, m]: diagonal of the squared moduli, none far below the largest of its response."""
+    variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
+    return np.asarray(variance[:, :, None] * np.eye(modulus.shape[1], dtype=np.complex128))
 
 
 def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -> tuple[Complex | None, str]:
@@ -117,6 +126,11 @@ def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -
             if np.all(np.median(deviation, axis=0) > _ROUNDING * np.median(size, axis=0)):
                 return covariance, kind
     return None, "relative"
+
+
+def first_weighting(responses: FrequencyResponseMatrix, weighting: Weighting) -> Weighting:
+    """Return the weighting with which a fit begins: ``auto`` in place of a total covariance that only the fit will provide."""
+    return "auto" if weighting == "total" and responses.total_covariance is None else weighting
 
 
 def motion_factors(responses: FrequencyResponseMatrix) -> Complex:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from identification.linear.accelerance import WeightedResponses
 
-__all__ = ["RESIDUAL_TERMS", "ModalFit", "fit_modes", "modal_basis", "pole_derivatives"]
+__all__ = ["RESIDUAL_TERMS", "ModalFit", "fit_modes", "misfit_of", "modal_basis", "pole_derivatives"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -58,6 +58,8 @@ class ModalFit:
         RMS of the residual over its expected value from the covariance; NaN if no covariance is known.
     converged
         Whether the iteration converged.
+    systematic
+        float[m], variance of the same parameters that is due to an error of the model; None for none.
     """
 
     poles: Float
@@ -65,6 +67,7 @@ class ModalFit:
     covariance: Float
     residual: float
     converged: bool
+    systematic: Float | None = None
 
     @property
     def omega(self) -> Float:
@@ -75,6 +78,11 @@ class ModalFit:
     def zeta(self) -> Float:
         """float[n_modes]: damping ratios."""
         return np.asarray(self.poles[self.poles.size // 2 : -1])
+
+    @property
+    def misfit(self) -> float:
+        """``residual`` where it is above 1, else 1: the factor by which errors grow (the Birge ratio)."""
+        return max(1.0, self.residual) if np.isfinite(self.residual) else 1.0
 
 
 def modal_basis(s: Complex, poles: Float, normal: bool) -> Complex:
@@ -210,3 +218,9 @@ def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, ite
         if rest:
             return problem.fitted(poles, state, True)
     return problem.fitted(poles, state, iterations == 0)
+
+
+def misfit_of(data: WeightedResponses, poles: Float) -> float:
+    """Return the weighted sum of squares that is left by ``poles`` (rad/s, then damping ratios) with the best normal modes."""
+    problem = _Problem(data, normal=True)
+    return problem.state(np.append(poles, problem.prior_c)).cost

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.accelerance import WeightedResponses, Weighting, first_weighting, weighted_accelerance
 from identification.linear.errors_in_variables import driven_responses, is_driven, over_force
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.subspace import observable_space, telling_rows
@@ -130,6 +130,7 @@ def stabilisation(
     IdentificationError
         If orders are not above zero or too high for the number of lines.
     """
+    weighting = first_weighting(responses, weighting)
     joint = driven_responses(responses, weighting) if is_driven(responses) else None
     plain = over_force(responses) if is_driven(responses) and joint is None else responses
     return diagram(

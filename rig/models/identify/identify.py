@@ -25,6 +25,7 @@ from identification import (
     stabilisation,
     stepped_sine_mode,
 )
+from identification.linear.accelerance import Weighting
 from identification.validation import one_specimen
 from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
@@ -177,9 +178,15 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
     pairs.sort(key=lambda pair: pair[0].input_rms or (0.0,))
     one_specimen(**{f"{shown.input_rms[0]:.3g} N RMS": shown.specimen for shown, _ in pairs if shown.input_rms})
     lowest, fitted = pairs[0]
-    diagram = stabilisation(fitted)
-    found = [linear_modes(fitted, modes=request.count, diagram=diagram)]
-    found += [linear_modes(higher, modes=found[0]) for _, higher in pairs[1:]]
+    weighting = cast(Weighting, request.weighting)
+    orders = None if request.order is None else range(2, request.order + 1, 2)
+    try:
+        diagram = stabilisation(fitted, orders, weighting=weighting)
+        found = [linear_modes(fitted, modes=request.near_hz or request.count, diagram=diagram, weighting=weighting)]
+        found += [linear_modes(higher, modes=found[0], weighting=weighting) for _, higher in pairs[1:]]
+    except IdentificationError as error:
+        hint = " (`modes`: `near_hz`, on the command line --near)" if "starting frequencies" in str(error) else ""
+        raise IdentificationError(f"{error}{hint}") from None
     modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
     notes = [note for _, missing in read for note in missing]
     return ModalAnalysis(replace(modes, notes=(*notes, *modes.notes)), lowest, diagram)
