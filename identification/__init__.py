@@ -22,6 +22,8 @@ Multisine
 Linear modes
     linear_modes, LinearModes, ModalAnalysis, FrequencyResponseMatrix, stabilisation, StabilisationDiagram,
     extrapolated_to_zero, fit_state_space, StateSpaceFit, subspace, StateSpace, ModeShapes, mac, mac_matrix
+Hammer tests
+    hammer_test, HammerTest, Hit
 Nonlinear modes
     nonlinear_mode, NonlinearMode, single_point_mode, stepped_sine_mode, repeatability, Repeatability, combined
 Short points and continuous backbones
@@ -65,6 +67,8 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.hammer.hammer_test import hammer_test
+    from identification.hammer.result import HammerTest, Hit
     from identification.linear.extrapolation import extrapolated_to_zero
     from identification.linear.modal_analysis import ModalAnalysis, linear_modes
     from identification.linear.mode_shapes import ModeShapes, mac
@@ -174,6 +178,8 @@ else:
             "FrequencyResponseMapping": "mapping.stepped_sine",
             "FrequencyResponseMatrix": "linear.response_matrix",
             "HalfPeriods": "signals.half_periods",
+            "HammerTest": "hammer.result",
+            "Hit": "hammer.result",
             "IdentificationError": "errors",
             "IdentifiedModel": "pnlss.many",
             "InstrumentResponse": "multisine.spectra",
@@ -241,6 +247,7 @@ else:
             "force_drop_out": "signals.sweeps",
             "force_surface": "response_control.force_surface",
             "frequency_response": "prediction.frequency_response",
+            "hammer_test": "hammer.hammer_test",
             "identify_exciter": "prediction.exciter_fit",
             "identify_many": "pnlss.many",
             "identify_pnlss": "pnlss.identify",
@@ -316,6 +323,8 @@ __all__ = [
     "FrequencyResponseMapping",
     "FrequencyResponseMatrix",
     "HalfPeriods",
+    "HammerTest",
+    "Hit",
     "IdentificationError",
     "IdentifiedModel",
     "InstrumentResponse",
@@ -381,6 +390,7 @@ __all__ = [
     "force_drop_out",
     "force_surface",
     "frequency_response",
+    "hammer_test",
     "identify_exciter",
     "identify_many",
     "identify_pnlss",

@@ -13,12 +13,15 @@ ratios were 0.3 % off.
 Given the poles and c, all these terms follow by linear least squares. The step of the poles is the Schur complement of the
 full Gauss-Newton step (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973; Ruhe and Wedin, SIAM Rev. 22,
 1980). With weights P, Jacobian J and ``M = Re sum J^H P J`` the covariance of the parameters is
-``M^-1 (1/2 Re sum J^H P C P J) M^-1``. This is correct for line errors with covariance C, whatever the weights are.
+``M^-1 (1/2 Re sum J^H P C P J) M^-1``. This is correct for line errors with covariance C, whatever the weights are. If the
+responses are a mean over records with known deviations e_r, the middle is ``n / (n - 1) sum_r g_r g_r^T`` with
+``g_r = Re sum J^H P e_r`` instead, which also holds for errors that lines have in common.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from identification.linear.accelerance import WeightedResponses
@@ -175,7 +178,7 @@ class _Problem:
             whole = np.einsum("op,kt->kopt", np.eye(outputs), basis).reshape(*misfit.shape, -1)
             jacobian = np.concatenate([slopes, whole], axis=2) * unit
             heavy = self.precision @ jacobian
-            filling = 0.5 * np.tensordot(np.conj(heavy), self.data.covariance @ heavy, ((0, 1), (0, 1))).real
+            filling = _filling(heavy, self.data)
             covariance = inverse @ filling @ inverse
             expected = np.einsum("kop,kpo->", self.precision, self.data.covariance).real
             residual = float(np.sqrt(squares / (freedom * expected)))
@@ -188,6 +191,20 @@ class _Problem:
         if np.any(poles[:count] <= 0.0) or np.any(np.abs(poles[count:-1]) >= 1.0):
             return None
         return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
+
+
+def _filling(heavy: Complex, data: WeightedResponses) -> Float:
+    """float[m, m]: covariance of the gradient of the fit, from the covariance of the lines or the deviations of the records.
+
+    Deviations keep what the errors of lines have in common. Those of n records have n - 1 degrees of freedom, for which the
+    standard errors are enlarged so that 1.96 of them hold as much as Student's interval.
+    """
+    if data.deviations is None or data.covariance is None:
+        return np.asarray(0.5 * np.tensordot(np.conj(heavy), data.covariance @ heavy, ((0, 1), (0, 1))).real)
+    records = data.deviations.shape[1]
+    single = np.tensordot(data.deviations, np.conj(heavy), ((0, 2), (0, 1))).real
+    student = float(scipy.stats.t.ppf(0.975, records - 1)) / 1.96
+    return np.asarray(single.T @ single * (student**2 * records / (records - 1)))
 
 
 def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS) -> ModalFit:

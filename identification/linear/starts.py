@@ -63,11 +63,11 @@ def start_of(
     if pole is None:
         raise IdentificationError(
             f"modes: no pole is stable over the orders in {band}, and no single pole explains the responses; "
-            "give starting frequencies as `modes`, a narrower band, or a recording with more periods"
+            "give starting frequencies, a narrower band, or a recording with more periods"
         )
     return pole, [
         f"no pole is stable over the orders in {band}: the fit starts from the single pole that explains most, at "
-        f"{pole[0] / (2.0 * np.pi):.4g} Hz; starting frequencies as `modes` find others"
+        f"{pole[0] / (2.0 * np.pi):.4g} Hz; with starting frequencies others are found"
     ]
 
 

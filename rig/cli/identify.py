@@ -165,7 +165,7 @@ def identify(
         estimator=estimator,
         band_hz=band_hz,
         count=count,
-        near_hz=frequencies("--near", near),
+        near=near,
         order=order,
         weighting=weighting,
         resistance_ohm=resistance_ohm,

@@ -185,8 +185,7 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
         found = [linear_modes(fitted, modes=request.near_hz or request.count, diagram=diagram, weighting=weighting)]
         found += [linear_modes(higher, modes=found[0], weighting=weighting) for _, higher in pairs[1:]]
     except IdentificationError as error:
-        hint = " (`modes`: `near_hz`, on the command line --near)" if "starting frequencies" in str(error) else ""
-        raise IdentificationError(f"{error}{hint}") from None
+        raise IdentificationError(str(error).replace("starting frequencies", "starting frequencies by `near`")) from None
     modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
     notes = [note for _, missing in read for note in missing]
     return ModalAnalysis(replace(modes, notes=(*notes, *modes.notes)), lowest, diagram)
