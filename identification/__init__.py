@@ -49,9 +49,9 @@ Structured models
 Changes from run to run
     fit_with_scatter, RunScatter, OutputBand
 Measurements of others
-    map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
-    MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
-    ResponseMatrixMapping
+    map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping,
+    map_hammer_test, HammerTestMapping, map_multisine, MultisineMapping, map_nonlinear_mode, NonlinearModeMapping,
+    map_pnlss, PnlssMapping, map_response_matrix, ResponseMatrixMapping
 """
 
 from typing import TYPE_CHECKING
@@ -78,6 +78,7 @@ if TYPE_CHECKING:
     from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
     from identification.linear.subspace import StateSpace, subspace
     from identification.mapping.backbone import BackboneMapping, map_backbone
+    from identification.mapping.hammer_test import HammerTestMapping, map_hammer_test
     from identification.mapping.multisine import MultisineMapping, map_multisine
     from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
     from identification.mapping.pnlss import PnlssMapping, map_pnlss
@@ -179,6 +180,7 @@ else:
             "FrequencyResponseMatrix": "linear.response_matrix",
             "HalfPeriods": "signals.half_periods",
             "HammerTest": "hammer.result",
+            "HammerTestMapping": "mapping.hammer_test",
             "Hit": "hammer.result",
             "IdentificationError": "errors",
             "IdentifiedModel": "pnlss.many",
@@ -256,6 +258,7 @@ else:
             "mac": "linear.mode_shapes",
             "mac_matrix": "linear.modes",
             "map_backbone": "mapping.backbone",
+            "map_hammer_test": "mapping.hammer_test",
             "map_frequency_responses": "mapping.stepped_sine",
             "map_multisine": "mapping.multisine",
             "map_nonlinear_mode": "mapping.nonlinear_mode",
@@ -324,6 +327,7 @@ __all__ = [
     "FrequencyResponseMatrix",
     "HalfPeriods",
     "HammerTest",
+    "HammerTestMapping",
     "Hit",
     "IdentificationError",
     "IdentifiedModel",
@@ -400,6 +404,7 @@ __all__ = [
     "mac_matrix",
     "map_backbone",
     "map_frequency_responses",
+    "map_hammer_test",
     "map_multisine",
     "map_nonlinear_mode",
     "map_pnlss",

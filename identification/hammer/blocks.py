@@ -86,7 +86,8 @@ def blocks_of(
             peak_n=pulse.height_n,
             duration_s=pulse.width / rate,
         )
-        others = [p for p in place.pulses if p.first != place.pulses[0].first]
+        shift = pulse.first - place.pulses[0].first
+        others = [replace(p, first=p.first + shift, peak=p.peak + shift, end=p.end + shift) for p in place.pulses[1:]]
         raw = records[place.record][:, max(place.pulses[0].first - before, 0) :][:, :length]
         after = np.sqrt(np.mean(samples[:, pulse.first : pulse.first + max(length // 5, 1)] ** 2, axis=1))
         faults = (
@@ -153,13 +154,12 @@ def _too_short(place: _Place, before: int, length: int, rate: float) -> str:
     if left >= 0 and place.free_before >= before:
         return ""
     if left < 0:
-        return f"cut short: {place.free_after / rate:.3g} s until the next hit or the end, needs {(length - before) / rate:.3g} s"
+        needed = (length - before) / rate
+        return f"cut short: {place.free_after / rate:.3g} s until the next hit or the end, needs {needed:.3g} s"
     return f"cut short: {place.free_before / rate:.3g} s before the hit, needs {before / rate:.3g} s"
 
 
-def _still_moving(
-    rms: Float, quietest: Float, after: Float, channels: tuple[Channel, ...], force: int
-) -> str:
+def _still_moving(rms: Float, quietest: Float, after: Float, channels: tuple[Channel, ...], force: int) -> str:
     share = rms / np.maximum(after, 1e-300)
     moving = (share > _MOVING) & (rms > _QUIETEST * quietest)
     moving[force] = False

@@ -23,8 +23,8 @@ _FULL = 0.995
 """Share of its full scale from which a channel is overloaded."""
 _FLAT = 3
 """Number of equal samples at the extreme value that clipping leaves."""
-_EXACT = 1e-9
-"""In numbers that are finer than this, relative to the extreme value, two equal ones are no coincidence."""
+_EXACT, _DISTINCT = 1e-5, 0.99
+"""Two equal extremes are no coincidence in numbers with steps below this share of them, or of which nearly all are distinct."""
 _STEEP = 4.0
 """Clipped samples are reached by a step of more than this many steps of the converter."""
 
@@ -40,7 +40,9 @@ def double_hit(force: Float, pulse: Pulse, others: Sequence[Pulse], noise_n: flo
         return _said(others[0].height_n, others[0].peak - pulse.peak, pulse, sample_rate_hz)
     width = max(pulse.width, 3)
     within = np.pad(force[pulse.first : pulse.end], 1)
-    tops, found = scipy.signal.find_peaks(within, height=max(_LEAST * pulse.height_n, 2.0 * _NOISE * noise_n), prominence=0.0)
+    tops, found = scipy.signal.find_peaks(
+        within, height=max(_LEAST * pulse.height_n, 2.0 * _NOISE * noise_n), prominence=0.0
+    )
     apart = tops[found["prominences"] >= _VALLEY * found["peak_heights"]] - 1 + pulse.first - pulse.peak
     if np.any(apart != 0) and apart.size > 1:
         second = int(apart[apart != 0][0])
@@ -54,7 +56,12 @@ def double_hit(force: Float, pulse: Pulse, others: Sequence[Pulse], noise_n: flo
     floor = _NOISE * max(noise_n / np.sqrt(taps), noise_rms(mean))
     if mean[second] <= max(_SECOND * pulse.height_n, floor):
         return ""
-    return _said(float(np.max(force[after:][max(second - taps, 0) : second + taps])), after + second - pulse.peak, pulse, sample_rate_hz)
+    return _said(
+        float(np.max(force[after:][max(second - taps, 0) : second + taps])),
+        after + second - pulse.peak,
+        pulse,
+        sample_rate_hz,
+    )
 
 
 def _said(height_n: float, apart: int, pulse: Pulse, sample_rate_hz: float) -> str:
@@ -66,14 +73,17 @@ def _said(height_n: float, apart: int, pulse: Pulse, sample_rate_hz: float) -> s
 def overloaded(block: Float, channels: Sequence[Channel], full_scale: Mapping[str, float]) -> str:
     """Return which channel of float[n_channels, n] reached its full scale, or was clipped; empty if none.
 
-    Without a full scale, a single clipped sample cannot be told. Clipping shows by `_FLAT` equal samples or more at the highest or lowest value, which are reached by a
-    step that is far above the steps of the converter, or by two in numbers that are not rounded to such steps. A slow peak of coarse numbers is flat too, but is reached by single steps.
+    Without a full scale, a single clipped sample cannot be told. Clipping shows by `_FLAT` equal samples or more at the highest
+    or lowest value, which are reached by a step that is far above the steps of the converter, or by two in numbers that are not
+    rounded to such steps. A slow peak of coarse numbers is flat too, but is reached by single steps.
     """
     for channel, values in zip(channels, block, strict=True):
         largest = float(np.max(np.abs(values)))
         if channel.name in full_scale:
             if largest >= _FULL * full_scale[channel.name]:
-                return f"overload: {channel.name} reached {largest:.4g} of {full_scale[channel.name]:.4g} {channel.unit}"
+                return (
+                    f"overload: {channel.name} reached {largest:.4g} of {full_scale[channel.name]:.4g} {channel.unit}"
+                )
             continue
         for extreme in (float(values.max()), float(values.min())):
             if extreme and _clipped(values, extreme):
@@ -84,7 +94,8 @@ def overloaded(block: Float, channels: Sequence[Channel], full_scale: Mapping[st
 def _clipped(values: Float, extreme: float) -> bool:
     steps = np.abs(np.diff(values))
     smallest = float(np.min(steps[steps > 0.0], initial=np.inf))
-    if smallest < _EXACT * abs(extreme) and np.count_nonzero(values == extreme) > 1:
+    fine = smallest < _EXACT * abs(extreme) or np.unique(values).size > _DISTINCT * values.size
+    if fine and np.count_nonzero(np.abs(values) == abs(extreme)) > 1:
         return True
     at = np.concatenate([[False], values == extreme, [False]])
     first, after = np.flatnonzero(~at[:-1] & at[1:]), np.flatnonzero(at[:-1] & ~at[1:])

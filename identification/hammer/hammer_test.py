@@ -97,7 +97,9 @@ def hammer_test(
     used = [block for block in blocks if not block.hit.fault]
     if len(used) < 2:
         faults = "; ".join(f"{block.hit.label}: {block.hit.fault}" for block in blocks if block.hit.fault)
-        raise IdentificationError(f"hits: {len(used)} of {len(blocks)} count, needs two at least ({faults or 'no faults'})")
+        raise IdentificationError(
+            f"hits: {len(used)} of {len(blocks)} count, needs two at least ({faults or 'no faults'})"
+        )
     values = np.array([block.samples for block in used])
     motions = [row for row, channel in enumerate(channels) if channel.role in ("drive", "response")]
     if decay_rate_1_s is None:
@@ -106,10 +108,12 @@ def hammer_test(
     length = None if force_window_s is None else max(round(force_window_s * rate), 1)
     values[:, force] *= [force_window(values.shape[-1], block.pulse, length) for block in used]
     values *= exponential_window(values.shape[-1], decay_rate_1_s, rate)
-    frequency_hz = np.fft.rfftfreq(values.shape[-1], 1.0 / rate)
+    frequency_hz = np.asarray(np.fft.rfftfreq(values.shape[-1], 1.0 / rate), dtype=np.float64)
     spectra = np.fft.rfft(values, axis=-1) / rate
     lines = _band(frequency_hz, np.sqrt(np.mean(np.abs(spectra[:, force]) ** 2, axis=0)), rate, lowest_hz, highest_hz)
-    return _evaluated(channels, frequency_hz[lines], spectra[..., lines], blocks, estimator, decay_rate_1_s, specimen, rate)
+    return _evaluated(
+        channels, frequency_hz[lines], spectra[..., lines], blocks, estimator, decay_rate_1_s, specimen, rate
+    )
 
 
 def _check(
@@ -183,7 +187,9 @@ def _evaluated(
     power = np.sum(np.abs(force) ** 2, axis=0) * np.sum(np.abs(motions) ** 2, axis=0)
     left_out = [f"hit {block.hit.label} left out: {block.hit.fault}" for block in blocks if block.hit.fault]
     window = (
-        [f"exponential window of {decay_rate_1_s:.4g} 1/s: the peaks are lower than those of the structure, modes are not"]
+        [
+            f"exponential window of {decay_rate_1_s:.4g} 1/s: the peaks are lower than those of the structure, modes are not"
+        ]
         if decay_rate_1_s
         else []
     )
@@ -193,9 +199,7 @@ def _evaluated(
         sample_rate_hz=rate,
         record_s=blocks[0].samples.shape[-1] / rate,
         hits=tuple(block.hit for block in blocks),
-        responses=replace(
-            found, decay_rate_1_s=decay_rate_1_s, specimen=specimen, notes=(*left_out, *window, *notes)
-        ),
+        responses=replace(found, decay_rate_1_s=decay_rate_1_s, specimen=specimen, notes=(*left_out, *window, *notes)),
         coherence=np.clip(cross / np.maximum(power, 1e-300), 0.0, 1.0).T,
         force_n_s=np.sqrt(np.mean(np.abs(force) ** 2, axis=0)),
     )

@@ -52,4 +52,4 @@ def decay_rate(motions: Float, noise_rms: Float, sample_rate_hz: float) -> float
     begin, end = np.maximum(np.mean(power, axis=1) - noise_rms**2, 0.0)
     left = float(np.max(np.sqrt(end / np.maximum(begin, 1e-300))))
     duration_s = motions.shape[-1] / sample_rate_hz
-    return max(float(np.log(max(left, 1e-300) / _LEFT)) / duration_s, 0.0)
+    return float(max(np.log(max(left, 1e-300) / _LEFT) / duration_s, 0.0))

@@ -209,7 +209,7 @@ def _lines_alike(deviations: Complex | None) -> int:
         if correlation < 0.05:
             break
         total += 2.0 * correlation
-    return int(round(total))
+    return round(total)
 
 
 def _rank(covariance: Complex) -> int:

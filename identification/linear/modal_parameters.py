@@ -150,7 +150,8 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
             )
     for f, width in zip(frequency, bandwidth, strict=True):
         lines = np.count_nonzero(np.abs(data.frequency_hz - f) <= 0.5 * width)
-        if width / _spacing(data, f) < _LINES_PER_BANDWIDTH:
+        windowed = width + data.decay_rate_1_s / np.pi  # the peak as an exponential window broadens it
+        if windowed / _spacing(data, f) < _LINES_PER_BANDWIDTH:
             notes.append(
                 f"mode at {f:.5g} Hz: half-power bandwidth {width:.3g} Hz holds {lines} lines; record longer periods for "
                 "a damping ratio to rely on"
@@ -161,7 +162,9 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
     if data.kind == "relative":
         notes.append("no covariance of the responses is known: errors are taken from the misfit of the model")
     elif data.kind == "line scatter":
-        notes.append("total variance estimated from the scatter of neighbouring lines: the responses have none of realisations")
+        notes.append(
+            "total variance estimated from the scatter of neighbouring lines: the responses have none of realisations"
+        )
     elif data.kind == "noise":
         notes.append("errors from noise and misfit; two realisations or more show nonlinear distortion line by line")
     if modes.fit_residual > _LARGEST_RESIDUAL:

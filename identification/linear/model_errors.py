@@ -2,8 +2,8 @@
 
 The best linear approximation of a strongly nonlinear structure is not the response of linear modes. The pole that fits it best
 then depends on how lines are weighted. Lines far from the resonance have small errors, so that weights by noise or total
-variance fit them and leave the misfit to the resonance: on a hardening oscillator damping ratios came out 10 to 25 % below those
-that reproduce the resonance. Weights by equal relative errors do not have this preference, but larger random errors.
+variance fit them and leave the misfit to the resonance: on a hardening oscillator damping ratios came out 10 to 25 % below
+those that reproduce the resonance. Weights by equal relative errors do not have this preference, but larger random errors.
 
 Both estimates agree within their errors if the model is right: the difference d of an efficient and of a robust estimate has
 the variance ``V_robust - V_efficient`` (Hausman, Econometrica 46, 1978). So ``d^2`` above this variance is model error.
@@ -35,8 +35,8 @@ _LARGEST_MOVE = 0.3
 def line_scatter(misfit: Complex) -> Complex | None:
     """complex[n_lines, m, m]: covariance of complex[n_lines, m] about a parabola through the lines around; None for few lines.
 
-    This is the local polynomial method (Pintelon and Schoukens, 2nd ed., chapter 7). Noise and nonlinear distortion scatter from
-    line to line, the response and the error of a model do not.
+    This is the local polynomial method (Pintelon and Schoukens, 2nd ed., chapter 7). Noise and nonlinear distortion scatter
+    from line to line, the response and the error of a model do not.
     """
     lines = misfit.shape[0]
     if lines < _WINDOW:
@@ -80,7 +80,11 @@ def with_model_error(
         return fit, data, []
     relative = relative_weights(data)
     other = fit_modes(relative, fit.poles, normal=normal)
-    if not other.converged or np.any(np.abs(other.omega / fit.omega - 1.0) > _LARGEST_MOVE) or np.any(other.zeta <= 0.0):
+    if (
+        not other.converged
+        or np.any(np.abs(other.omega / fit.omega - 1.0) > _LARGEST_MOVE)
+        or np.any(other.zeta <= 0.0)
+    ):
         return fit, data, []
     difference = np.concatenate([other.poles - fit.poles, (other.terms - fit.terms).ravel()])
     systematic = np.maximum(difference**2 - np.abs(_variance(other) - _variance(fit)), 0.0)

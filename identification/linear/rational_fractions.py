@@ -178,7 +178,7 @@ class _Problem:
             whole = np.einsum("op,kt->kopt", np.eye(outputs), basis).reshape(*misfit.shape, -1)
             jacobian = np.concatenate([slopes, whole], axis=2) * unit
             heavy = self.precision @ jacobian
-            filling = _filling(heavy, self.data)
+            filling = _filling(heavy, self.data.covariance, self.data.deviations)
             covariance = inverse @ filling @ inverse
             expected = np.einsum("kop,kpo->", self.precision, self.data.covariance).real
             residual = float(np.sqrt(squares / (freedom * expected)))
@@ -193,16 +193,16 @@ class _Problem:
         return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
 
 
-def _filling(heavy: Complex, data: WeightedResponses) -> Float:
+def _filling(heavy: Complex, covariance: Complex, deviations: Complex | None) -> Float:
     """float[m, m]: covariance of the gradient of the fit, from the covariance of the lines or the deviations of the records.
 
     Deviations keep what the errors of lines have in common. Those of n records have n - 1 degrees of freedom, for which the
     standard errors are enlarged so that 1.96 of them hold as much as Student's interval.
     """
-    if data.deviations is None or data.covariance is None:
-        return np.asarray(0.5 * np.tensordot(np.conj(heavy), data.covariance @ heavy, ((0, 1), (0, 1))).real)
-    records = data.deviations.shape[1]
-    single = np.tensordot(data.deviations, np.conj(heavy), ((0, 2), (0, 1))).real
+    if deviations is None:
+        return np.asarray(0.5 * np.tensordot(np.conj(heavy), covariance @ heavy, ((0, 1), (0, 1))).real)
+    records = deviations.shape[1]
+    single = np.tensordot(deviations, np.conj(heavy), ((0, 2), (0, 1))).real
     student = float(scipy.stats.t.ppf(0.975, records - 1)) / 1.96
     return np.asarray(single.T @ single * (student**2 * records / (records - 1)))
 

@@ -72,10 +72,11 @@ def start_of(
 
 
 def _searched(data: WeightedResponses) -> Float | None:
-    """Return the frequency and damping ratio of the one pole that leaves the smallest misfit; None if it explains too little."""
+    """Return the frequency and damping ratio of the one pole that leaves the least misfit; None if it explains too little."""
     every = slice(None, None, -(-data.frequency_hz.size // _MOST_LINES))
     power = np.abs(data.value.reshape(data.frequency_hz.size, -1)) ** 2
-    around = pooled(power[:, :, None] * np.eye(power.shape[1]))  # a line that distortion made small must not count the most
+    # The mean over neighbours, so that a line which distortion made small does not count the most.
+    around = pooled(power[:, :, None] * np.eye(power.shape[1], dtype=np.complex128))
     sparse = replace(
         data, frequency_hz=data.frequency_hz[every], value=data.value[every], covariance=None, smooth=around[every]
     )
@@ -108,7 +109,7 @@ def _near(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequenc
             frequency[number] = np.median(stable.frequency_hz[close])
             damping[number] = np.median(stable.damping_ratio[close])
     poles = np.concatenate([2.0 * np.pi * frequency, np.nan_to_num(damping, nan=_DAMPING[1])])
-    for number in np.flatnonzero(np.isnan(damping)):
+    for number in map(int, np.flatnonzero(np.isnan(damping))):
         trials = np.tile(poles, (len(_DAMPING), 1))
         trials[:, near_hz.size + number] = _DAMPING
         costs = np.array([misfit_of(data, trial) for trial in trials])

@@ -52,8 +52,8 @@ def estimated_responses(
 ) -> FrequencyResponseMatrix:
     """Estimate responses and covariances from spectra complex[n_realisations, n_periods, n_channels, n_lines].
 
-    ``keep_deviations`` keeps the error of every realisation. All lines must be excited; the other parameters are those of `best_linear_approximation`, which also raises the errors
-    listed there.
+    ``keep_deviations`` keeps the error of every realisation. All lines must be excited; the other parameters are those of
+    `best_linear_approximation`, which also raises the errors listed there.
     """
     if estimator not in get_args(Estimator):
         raise IdentificationError(f"estimator: is '{estimator}', allowed are {', '.join(get_args(Estimator))}")

@@ -47,7 +47,9 @@ def identify(
     ] = None,
     order: Annotated[
         int | None,
-        typer.Option("--order", help="Highest order of a linear model's stabilisation diagram.", show_default="40", min=2),
+        typer.Option(
+            "--order", help="Highest order of a linear model's stabilisation diagram.", show_default="40", min=2
+        ),
     ] = None,
     weighting: Annotated[
         str,

@@ -11,6 +11,7 @@ from identification import (
     Exciter,
     FrequencyResponse,
     FrequencyResponseMatrix,
+    HammerTest,
     IdentificationError,
     LinearModes,
     ModalAnalysis,
@@ -185,7 +186,9 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
         found = [linear_modes(fitted, modes=request.near_hz or request.count, diagram=diagram, weighting=weighting)]
         found += [linear_modes(higher, modes=found[0], weighting=weighting) for _, higher in pairs[1:]]
     except IdentificationError as error:
-        raise IdentificationError(str(error).replace("starting frequencies", "starting frequencies by `near`")) from None
+        raise IdentificationError(
+            str(error).replace("starting frequencies", "starting frequencies by `near`")
+        ) from None
     modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
     notes = [note for _, missing in read for note in missing]
     return ModalAnalysis(replace(modes, notes=(*notes, *modes.notes)), lowest, diagram)
@@ -207,9 +210,14 @@ def _matrices(
         if estimator != "instrument":
             return [(matrix, matrix) for matrix in shown], missing
         return [(matrix, _over_voltage(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
-    if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
-        return [(matrix, matrix)], ()
-    raise RecordingError(f"{path}: holds a {kind}; a linear model comes from multisines or frequency response matrices")
+    if kind in KINDS:
+        loaded = load(path)
+        matrix = loaded.responses if isinstance(loaded, HammerTest) else loaded
+        if isinstance(matrix, FrequencyResponseMatrix):
+            return [(matrix, matrix)], ()
+    raise RecordingError(
+        f"{path}: holds a {kind}; a linear model comes from multisines, hammer tests or frequency response matrices"
+    )
 
 
 def _over_voltage(measured: PeriodicSpectra, specimen: str) -> FrequencyResponseMatrix:
