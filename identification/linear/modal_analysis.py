@@ -12,7 +12,12 @@ from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, first_weighting, weighted_accelerance
 from identification.linear.errors_in_variables import DrivenResponses, driven_responses, is_driven, over_force
 from identification.linear.modal_parameters import accepted, as_linear_modes, modal_notes
-from identification.linear.model_errors import is_mostly_distortion, with_line_scatter, with_model_error
+from identification.linear.model_errors import (
+    is_mostly_distortion,
+    with_common_distortion,
+    with_line_scatter,
+    with_model_error,
+)
 from identification.linear.modes import LinearModes
 from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
 from identification.linear.response_matrix import FrequencyResponseMatrix
@@ -160,7 +165,7 @@ def linear_modes(
         fit, data = with_line_scatter(data, fit, normal=normal)
     if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal)):
         fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
-        notes += moved
+        fit, notes = with_common_distortion(fit), notes + moved
     result = as_linear_modes(fit, band, data, normal=normal)
     return replace(result, notes=(*band.notes, *notes, *rejected, *modal_notes(result, data, fit.converged)))
 
