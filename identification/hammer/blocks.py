@@ -126,7 +126,7 @@ def _lengths(
         length = int(room[len(room) // 4])
     first = min(place.free_before for place in places)
     before = min(round(_BEFORE * length), first) if pretrigger_s is None else round(pretrigger_s * rate)
-    length = length if record_s is not None else length - before
+    length = length if record_s is not None else length + before
     if length < _SHORTEST or before >= length // 2:
         raise IdentificationError(
             f"record_s: a record of a hit has {length} samples, {before} of them before it; needs {_SHORTEST} and at most half"

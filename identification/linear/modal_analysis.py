@@ -163,7 +163,7 @@ def linear_modes(
         fit, data = _most_likely(joint, fit, normal=normal)
     if scatter or (free and data.kind != "total" and fit.misfit > _NEEDED):
         fit, data = with_line_scatter(data, fit, normal=normal)
-    if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal)):
+    if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal), fit):
         fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
         fit, notes = with_common_distortion(fit), notes + moved
     result = as_linear_modes(fit, band, data, normal=normal)

@@ -56,13 +56,14 @@ def line_scatter(misfit: Complex) -> Complex | None:
     return np.asarray(np.einsum("kim,kin->kmn", scatter, np.conj(scatter)) / (_WINDOW - powers.shape[1]))
 
 
-def is_mostly_distortion(data: WeightedResponses, noise: WeightedResponses | None) -> bool:
-    """Return whether the errors of ``data`` are known to be far above those of noise alone."""
+def is_mostly_distortion(data: WeightedResponses, noise: WeightedResponses | None, fit: ModalFit) -> bool:
+    """Return whether the errors of ``data`` around the modes are known to be far above those of noise alone."""
     if data.kind == "line scatter":
         return True
     if data.kind != "total" or noise is None or noise.covariance is None:
         return False
-    return bool(np.median(noise.std**2 / data.std**2) < _NOISE)
+    near = np.any(_near_modes(data, fit), axis=0)
+    return bool(np.any(near)) and bool(np.median((noise.std**2 / data.std**2)[near]) < _NOISE)
 
 
 def with_line_scatter(data: WeightedResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
@@ -109,9 +110,9 @@ def with_model_error(
 def with_common_distortion(fit: ModalFit) -> ModalFit:
     """Return the fit with frequency errors as distortion makes them, whose errors lines have in common.
 
-    A cubic product of three lines falls on a fourth one, and so does each other three of them on the remaining line. A stiffness
-    exchanges energy between the four, and detunes all of them alike: in the damping the four contributions cancel in part, in
-    the frequency they add up to twice what independent lines would give.
+    A cubic product of three lines falls on a fourth one, and so does each other three of them on the remaining line. A
+    stiffness exchanges energy between the four, and detunes all of them alike: in the damping the four contributions cancel in
+    part, in the frequency they add up to twice what independent lines would give.
     """
     scale = np.ones(fit.covariance.shape[0])
     scale[: fit.omega.size] = _COMMON
@@ -126,8 +127,10 @@ def _variance(fit: ModalFit) -> Float:
 def _distorted(data: WeightedResponses, fit: ModalFit) -> bool:
     """Return whether the errors of the responses around any mode are a considerable share of the responses."""
     share = data.std[:, :, 0] * fit.misfit / np.maximum(np.abs(data.value[:, :, 0]), 1e-300)
-    for omega, zeta in zip(fit.omega, fit.zeta, strict=True):
-        near = np.abs(np.abs(data.s) - omega) <= abs(zeta) * omega
-        if np.any(near) and np.median(share[near]) > _DISTORTED:
-            return True
-    return False
+    return any(np.any(near) and np.median(share[near]) > _DISTORTED for near in _near_modes(data, fit))
+
+
+def _near_modes(data: WeightedResponses, fit: ModalFit) -> NDArray[np.bool_]:
+    """bool[n_modes, n_lines]: lines within the half-power bandwidth of each mode."""
+    apart = np.abs(2.0 * np.pi * data.frequency_hz - fit.omega[:, None])
+    return np.asarray(apart <= (np.abs(fit.zeta) * fit.omega)[:, None])

@@ -1,6 +1,6 @@
 """A hardening circuit under multisines, ``x'' + 2 z w x' + w^2 x + a x^3 = u``, integrated from rest with the signal exact.
 
-The signal is known at all instants, so that the classical Runge-Kutta method has its full order; a test compares it with DOP853.
+The signal is known at all instants, so that the classical Runge-Kutta method has its full order (compared with DOP853).
 """
 
 import numpy as np
