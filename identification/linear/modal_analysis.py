@@ -23,7 +23,7 @@ from identification.linear.rational_fractions import ModalFit, fit_modes, modal_
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.stabilisation import StabilisationDiagram
 from identification.linear.stabilisation import diagram as stability
-from identification.linear.starts import poles_of, start_of
+from identification.linear.starts import poles_of, searched, start_of
 from vibrolock.results import Result
 
 __all__ = ["ModalAnalysis", "linear_modes"]
@@ -153,12 +153,20 @@ def linear_modes(
     if isinstance(modes, int) and modes < 1:
         raise IdentificationError(f"modes: is {modes}, needs at least 1")
     notes: list[str] = []
+    free_start = modes is None
     if isinstance(modes, LinearModes):
         start, modes = poles_of(modes, data), None
     else:
         stable = stability(data, orders) if diagram is None else diagram
         start, notes = start_of(stable, data, None if modes is None or isinstance(modes, int) else modes)
-    fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
+    try:
+        fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
+    except IdentificationError:
+        other = searched(data) if free_start else None
+        if other is None:
+            raise
+        fit, rejected = _without_spurious(data, band, other[0], normal=normal, modes=modes)
+        notes = other[1]
     if joint is not None:
         fit, data = _most_likely(joint, fit, normal=normal)
     if scatter or (free and data.kind != "total" and fit.misfit > _NEEDED):

@@ -21,7 +21,6 @@ responses are a mean over records with known deviations e_r, the middle is ``n /
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from identification.linear.accelerance import WeightedResponses
@@ -201,9 +200,11 @@ def _filling(heavy: Complex, covariance: Complex, deviations: Complex | None) ->
     """
     if deviations is None:
         return np.asarray(0.5 * np.tensordot(np.conj(heavy), covariance @ heavy, ((0, 1), (0, 1))).real)
+    from scipy.stats import t  # only on use: it takes long to load
+
     records = deviations.shape[1]
     single = np.tensordot(deviations, np.conj(heavy), ((0, 2), (0, 1))).real
-    student = float(scipy.stats.t.ppf(0.975, records - 1)) / 1.96
+    student = float(t.ppf(0.975, records - 1)) / 1.96
     return np.asarray(single.T @ single * (student**2 * records / (records - 1)))
 
 

@@ -19,7 +19,7 @@ from identification.linear.rational_fractions import misfit_of
 from identification.linear.stabilisation import StabilisationDiagram
 from identification.validation import finite_array
 
-__all__ = ["poles_of", "start_of"]
+__all__ = ["poles_of", "searched", "start_of"]
 
 Float = NDArray[np.float64]
 
@@ -58,21 +58,21 @@ def start_of(
     columns = stable.columns()
     if columns.size:
         return np.concatenate([2.0 * np.pi * stable.frequency_hz[columns], stable.damping_ratio[columns]]), []
-    band = f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
-    pole = _searched(data)
-    if pole is None:
+    found = searched(data)
+    if found is None:
         raise IdentificationError(
-            f"modes: no pole is stable over the orders in {band}, and no single pole explains the responses; "
+            f"modes: no pole is stable over the orders in {_band(data)}, and no single pole explains the responses; "
             "give starting frequencies, a narrower band, or a recording with more periods"
         )
-    return pole, [
-        f"no pole is stable over the orders in {band}: the fit starts from the single pole that explains most, at "
-        f"{pole[0] / (2.0 * np.pi):.4g} Hz; with starting frequencies others are found"
-    ]
+    return found
 
 
-def _searched(data: WeightedResponses) -> Float | None:
-    """Return the frequency and damping ratio of the one pole that leaves the least misfit; None if it explains too little."""
+def _band(data: WeightedResponses) -> str:
+    return f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+
+
+def searched(data: WeightedResponses) -> tuple[Float, list[str]] | None:
+    """Return the one pole that leaves the least misfit, and a note that says so; None if it explains too little."""
     every = slice(None, None, -(-data.frequency_hz.size // _MOST_LINES))
     power = np.abs(data.value.reshape(data.frequency_hz.size, -1)) ** 2
     # The mean over neighbours, so that a line which distortion made small does not count the most.
@@ -86,7 +86,12 @@ def _searched(data: WeightedResponses) -> Float | None:
     poles = [np.array([2.0 * np.pi * f, zeta]) for f in steps_hz for zeta in _DAMPING]
     costs = np.array([misfit_of(sparse, pole) for pole in poles])
     best = int(np.argmin(costs))
-    return poles[best] if costs[best] < _EXPLAINED * misfit_of(sparse, np.zeros(0)) else None
+    if costs[best] >= _EXPLAINED * misfit_of(sparse, np.zeros(0)):
+        return None
+    return poles[best], [
+        f"no modes are stable over the orders in {_band(data)}: the fit starts from the single pole that explains most, at "
+        f"{poles[best][0] / (2.0 * np.pi):.4g} Hz; with starting frequencies others are found"
+    ]
 
 
 def _near(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float]) -> Float:
