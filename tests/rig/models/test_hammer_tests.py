@@ -61,9 +61,9 @@ def test_a_mat_file_becomes_modes_with_figures(hammer, tmp_path):
 
 
 def test_starting_frequencies_order_and_weighting_can_be_typed(hammer, tmp_path):
-    made = hammer("identify hammer.h5 --model linear --near 95,41 --order 12 --weighting relative -o two.h5 --json")
+    made = hammer("identify hammer.h5 --model linear --near 95,41,211 --order 12 --weighting relative -o two.h5 --json")
     assert made.status == 0, made.err
-    assert len(json.loads(made.out)["modes"]) == 2
+    assert len(json.loads(made.out)["modes"]) == 3
     assert load(tmp_path / "two.h5").stabilisation.orders.max() == 12
 
 
