@@ -95,6 +95,8 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
 
     Raises `IdentificationError` if the requested covariance is unknown or a response is zero at all lines.
     """
+    if weighting == "relative" and responses.deviations is not None:  # weights apart, the errors are known
+        return relative_weights(weighted_responses(responses, "total"))
     covariance, kind = known_covariance(responses, weighting)
     count = responses.value[0].size
     modulus = np.abs(responses.value).reshape(-1, count)

@@ -152,21 +152,11 @@ def linear_modes(
     data = joint.first_guess() if joint else weighted_accelerance(band, "relative" if driven else weighting)
     if isinstance(modes, int) and modes < 1:
         raise IdentificationError(f"modes: is {modes}, needs at least 1")
-    notes: list[str] = []
-    free_start = modes is None
     if isinstance(modes, LinearModes):
-        start, modes = poles_of(modes, data), None
+        fit, notes = _without_spurious(data, band, poles_of(modes, data), normal=normal, modes=None)
     else:
         stable = stability(data, orders) if diagram is None else diagram
-        start, notes = start_of(stable, data, None if modes is None or isinstance(modes, int) else modes)
-    try:
-        fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
-    except IdentificationError:
-        other = searched(data) if free_start else None
-        if other is None:
-            raise
-        fit, rejected = _without_spurious(data, band, other[0], normal=normal, modes=modes)
-        notes = other[1]
+        fit, notes = _begun(stable, data, band, normal=normal, modes=modes)
     if joint is not None:
         fit, data = _most_likely(joint, fit, normal=normal)
     if scatter or (free and data.kind != "total" and fit.misfit > _NEEDED):
@@ -175,7 +165,27 @@ def linear_modes(
         fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
         fit, notes = with_common_distortion(fit), notes + moved
     result = as_linear_modes(fit, band, data, normal=normal)
-    return replace(result, notes=(*band.notes, *notes, *rejected, *modal_notes(result, data, fit.converged)))
+    return replace(result, notes=(*band.notes, *notes, *modal_notes(result, data, fit.converged)))
+
+
+def _begun(
+    stable: StabilisationDiagram,
+    data: WeightedResponses,
+    band: FrequencyResponseMatrix,
+    *,
+    normal: bool,
+    modes: int | Sequence[float] | None,
+) -> tuple[ModalFit, list[str]]:
+    """Return the fit that starts from the diagram, and notes; if none of its poles is a mode, from the pole of a search."""
+    start, notes = start_of(stable, data, None if modes is None or isinstance(modes, int) else modes)
+    try:
+        fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
+    except IdentificationError:
+        if modes is not None or (other := searched(data)) is None:
+            raise
+        start, notes = other
+        fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
+    return fit, [*notes, *rejected]
 
 
 def _noise(

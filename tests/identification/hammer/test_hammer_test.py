@@ -89,6 +89,13 @@ def test_modes_are_right_and_their_intervals_hold_them(noise_db, frequency, damp
     assert np.mean(inside) >= 0.85
 
 
+def test_relative_weights_keep_the_errors_of_the_hits():
+    responses = hammer_test(noisy(CLEAN, 40, 4), CHANNELS, RATE_HZ, **BAND).responses
+    modes, relative = (linear_modes(responses, weighting=weighting) for weighting in ("total", "relative"))
+    assert np.all(np.abs(relative.damping_ratio - DAMPING) < 3.0 * relative.damping_ratio_std)
+    assert np.all(relative.damping_ratio_std > 0.7 * modes.damping_ratio_std)
+
+
 def test_several_hits_in_one_record_are_found_and_each_has_its_own_window():
     hits = [(0.3, 60.0), (6.9, 90.0), (13.4, 75.0)]
     found = hammer_test([record(16.0, hits, noise_db=50)], CHANNELS, RATE_HZ, record_s=2.2, pretrigger_s=0.1, **BAND)
