@@ -22,6 +22,8 @@ Multisine
 Linear modes
     linear_modes, LinearModes, ModalAnalysis, FrequencyResponseMatrix, stabilisation, StabilisationDiagram,
     extrapolated_to_zero, fit_state_space, StateSpaceFit, subspace, StateSpace, ModeShapes, mac, mac_matrix
+Hammer tests
+    hammer_test, HammerTest, Hit
 Nonlinear modes
     nonlinear_mode, NonlinearMode, single_point_mode, stepped_sine_mode, repeatability, Repeatability, combined
 Short points and continuous backbones
@@ -47,10 +49,10 @@ Structured models
 Changes from run to run
     fit_with_scatter, RunScatter, OutputBand
 Measurements of others
-    map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_multisine,
-    MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss, PnlssMapping, map_response_matrix,
-    ResponseMatrixMapping, map_time_data, TimeDataMapping, TimeRecords, TimeRecord, time_experiments, time_responses,
-    time_spectra
+    map_backbone, BackboneMapping, map_frequency_responses, FrequencyResponseMapping, map_hammer_test,
+    HammerTestMapping, map_multisine, MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss,
+    PnlssMapping, map_response_matrix, ResponseMatrixMapping, map_time_data, TimeDataMapping, TimeRecords, TimeRecord,
+    time_experiments, time_responses, time_spectra
 """
 
 from typing import TYPE_CHECKING
@@ -66,6 +68,8 @@ if TYPE_CHECKING:
         pack_frequency_responses,
         unpack_frequency_responses,
     )
+    from identification.hammer.hammer_test import hammer_test
+    from identification.hammer.result import HammerTest, Hit
     from identification.linear.extrapolation import extrapolated_to_zero
     from identification.linear.modal_analysis import ModalAnalysis, linear_modes
     from identification.linear.mode_shapes import ModeShapes, mac
@@ -75,6 +79,7 @@ if TYPE_CHECKING:
     from identification.linear.state_space_fit import StateSpaceFit, fit_state_space
     from identification.linear.subspace import StateSpace, subspace
     from identification.mapping.backbone import BackboneMapping, map_backbone
+    from identification.mapping.hammer_test import HammerTestMapping, map_hammer_test
     from identification.mapping.multisine import MultisineMapping, map_multisine
     from identification.mapping.nonlinear_mode import NonlinearModeMapping, map_nonlinear_mode
     from identification.mapping.pnlss import PnlssMapping, map_pnlss
@@ -182,6 +187,9 @@ else:
             "FrequencyResponseMapping": "mapping.stepped_sine",
             "FrequencyResponseMatrix": "linear.response_matrix",
             "HalfPeriods": "signals.half_periods",
+            "HammerTest": "hammer.result",
+            "HammerTestMapping": "mapping.hammer_test",
+            "Hit": "hammer.result",
             "IdentificationError": "errors",
             "IdentifiedModel": "pnlss.many",
             "InstrumentResponse": "multisine.spectra",
@@ -250,6 +258,7 @@ else:
             "force_drop_out": "signals.sweeps",
             "force_surface": "response_control.force_surface",
             "frequency_response": "prediction.frequency_response",
+            "hammer_test": "hammer.hammer_test",
             "identify_exciter": "prediction.exciter_fit",
             "identify_many": "pnlss.many",
             "identify_pnlss": "pnlss.identify",
@@ -258,6 +267,7 @@ else:
             "mac": "linear.mode_shapes",
             "mac_matrix": "linear.modes",
             "map_backbone": "mapping.backbone",
+            "map_hammer_test": "mapping.hammer_test",
             "map_frequency_responses": "mapping.stepped_sine",
             "map_multisine": "mapping.multisine",
             "map_nonlinear_mode": "mapping.nonlinear_mode",
@@ -329,6 +339,9 @@ __all__ = [
     "FrequencyResponseMapping",
     "FrequencyResponseMatrix",
     "HalfPeriods",
+    "HammerTest",
+    "HammerTestMapping",
+    "Hit",
     "IdentificationError",
     "IdentifiedModel",
     "InstrumentResponse",
@@ -397,6 +410,7 @@ __all__ = [
     "force_drop_out",
     "force_surface",
     "frequency_response",
+    "hammer_test",
     "identify_exciter",
     "identify_many",
     "identify_pnlss",
@@ -406,6 +420,7 @@ __all__ = [
     "mac_matrix",
     "map_backbone",
     "map_frequency_responses",
+    "map_hammer_test",
     "map_multisine",
     "map_nonlinear_mode",
     "map_pnlss",

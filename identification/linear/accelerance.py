@@ -5,7 +5,7 @@ inverse of the mean covariance of its neighbours, without the line itself. Weigh
 and ``sum_k J_k^H W_k C_k W_k J_k``, with the line's own covariance C_k, is an unbiased estimate of the effect of the errors.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,9 +18,11 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 __all__ = [
     "WeightedResponses",
     "Weighting",
+    "first_weighting",
     "known_covariance",
     "motion_factors",
     "pooled",
+    "relative_weights",
     "weighted_accelerance",
     "weighted_responses",
 ]
@@ -31,6 +33,7 @@ Weighting = Literal["auto", "total", "noise", "relative"]
 
 _NEIGHBOURS = 4
 """Lines on either side that a weight averages: with five realisations, 32 degrees of freedom and a quarter more scatter."""
+_MOST_ALIKE = 50
 _FLOOR = 1e-9
 """Least eigenvalue of a covariance relative to its largest, so that a nearly exact line cannot outweigh all others."""
 
@@ -55,8 +58,12 @@ class WeightedResponses:
     smooth
         complex[n_lines, m, m], mean covariance of the neighbouring lines, whose inverse is the weight. If no covariance is
         known: the squared modulus (errors of equal relative size).
+    deviations
+        complex[n_lines, n_records, m], contributions of single records to the errors; None if unknown.
+    decay_rate_1_s
+        Rate of an exponential window.
     kind
-        Kind of covariance: ``total``, ``noise`` or ``relative``.
+        Kind of covariance: ``total``, ``noise``, ``line scatter`` (total, from neighbouring lines) or ``relative``.
     """
 
     frequency_hz: Float
@@ -64,11 +71,13 @@ class WeightedResponses:
     covariance: Complex | None
     smooth: Complex
     kind: str
+    deviations: Complex | None = None
+    decay_rate_1_s: float = 0.0
 
     @property
     def s(self) -> Complex:
-        """complex[n_lines]: ``2 pi i f``, rad/s."""
-        return np.asarray(2j * np.pi * self.frequency_hz)
+        """complex[n_lines]: ``2 pi i f``, to the right of the imaginary axis by the rate of an exponential window, rad/s."""
+        return np.asarray(self.decay_rate_1_s + 2j * np.pi * self.frequency_hz)
 
     @property
     def std(self) -> Float:
@@ -86,17 +95,29 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
 
     Raises `IdentificationError` if the requested covariance is unknown or a response is zero at all lines.
     """
+    if weighting == "relative" and responses.deviations is not None:  # weights apart, the errors are known
+        return relative_weights(weighted_responses(responses, "total"))
     covariance, kind = known_covariance(responses, weighting)
     count = responses.value[0].size
     modulus = np.abs(responses.value).reshape(-1, count)
     if not np.all(np.max(modulus, axis=0) > 0.0):
         raise IdentificationError("value: a response is zero at all lines")
-    if covariance is None:
-        variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
-        smooth = variance[:, :, None] * np.eye(count, dtype=np.complex128)
-    else:
-        smooth = pooled(covariance)
-    return WeightedResponses(responses.frequency_hz, responses.value, covariance, smooth, kind)
+    deviations = responses.deviations if kind == "total" else None
+    smooth = _relative(modulus) if covariance is None else pooled(covariance, _lines_alike(deviations))
+    return WeightedResponses(
+        responses.frequency_hz, responses.value, covariance, smooth, kind, deviations, responses.decay_rate_1_s
+    )
+
+
+def relative_weights(data: WeightedResponses) -> WeightedResponses:
+    """Return the same responses, with the same covariance, weighted as if their errors were of equal relative size."""
+    return replace(data, smooth=_relative(np.abs(data.value).reshape(data.frequency_hz.size, -1)))
+
+
+def _relative(modulus: Float) -> Complex:
+    """complex[n_lines, m, m]: diagonal of the squared moduli, none far below the largest of its response."""
+    variance = np.maximum(modulus, 1e-3 * np.max(modulus, axis=0)) ** 2
+    return np.asarray(variance[:, :, None] * np.eye(modulus.shape[1], dtype=np.complex128))
 
 
 def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -> tuple[Complex | None, str]:
@@ -119,6 +140,11 @@ def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -
     return None, "relative"
 
 
+def first_weighting(responses: FrequencyResponseMatrix, weighting: Weighting) -> Weighting:
+    """Return the weighting with which a fit begins: ``auto`` in place of a total covariance that only the fit will provide."""
+    return "auto" if weighting == "total" and responses.total_covariance is None else weighting
+
+
 def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
     """complex[n_lines, n_outputs]: factors that convert each motion to an acceleration; 1 for a force.
 
@@ -129,7 +155,7 @@ def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
             "frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above"
         )
     order = [0 if channel.role == "force" else 2 - MOTION_ORDER[channel.motion] for channel in responses.outputs]
-    return np.asarray((2j * np.pi * responses.frequency_hz[:, None]) ** np.array(order))
+    return np.asarray(responses.s[:, None] ** np.array(order))
 
 
 def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weighting = "auto") -> WeightedResponses:
@@ -149,17 +175,19 @@ def weighted_accelerance(responses: FrequencyResponseMatrix, weighting: Weightin
         None if plain.covariance is None else scaled(plain.covariance),
         scaled(plain.smooth),
         plain.kind,
+        None if plain.deviations is None else plain.deviations * factor[:, None],
+        plain.decay_rate_1_s,
     )
 
 
-def pooled(covariance: Complex) -> Complex:
+def pooled(covariance: Complex, alike: int = 1) -> Complex:
     """Return the mean covariance over the neighbours of each line, without the line itself; floored so that it can be inverted.
 
     A sample covariance of few realisations has a low rank. The mean therefore takes as many lines as give several samples per
-    direction.
+    direction. If ``alike`` neighbouring lines have their errors in common, it takes as many times more.
     """
     lines, count = covariance.shape[:2]
-    reach = min(max(_NEIGHBOURS, -(-_TIMES_OVER * count // (2 * _rank(covariance)))), lines - 1)
+    reach = min(alike * max(_NEIGHBOURS, -(-_TIMES_OVER * count // (2 * _rank(covariance)))), lines - 1)
     number = np.arange(lines)
     first, last = np.maximum(number - reach, 0), np.minimum(number + reach, lines - 1)
     running = np.concatenate([np.zeros((1, count, count)), np.cumsum(covariance, axis=0)])
@@ -169,6 +197,21 @@ def pooled(covariance: Complex) -> Complex:
     largest = np.einsum("kii->ki", smooth).real
     floor = _FLOOR * np.maximum(largest, np.max(largest, axis=0) * 1e-12 + 1e-300)
     return np.asarray(0.5 * (smooth + np.conj(np.swapaxes(smooth, 1, 2))) + floor[:, :, None] * np.eye(count))
+
+
+def _lines_alike(deviations: Complex | None) -> int:
+    """Number of neighbouring lines whose errors are nearly the same, from the correlation of the deviations over lines."""
+    if deviations is None:
+        return 1
+    scaled = deviations / np.sqrt(np.maximum(np.mean(np.abs(deviations) ** 2, axis=1, keepdims=True), 1e-300))
+    lines = deviations.shape[0]
+    total, reached = 1.0, min(_MOST_ALIKE, lines - 1)
+    for lag in range(1, reached + 1):
+        correlation = np.abs(np.mean(scaled[lag:] * np.conj(scaled[:-lag]))) ** 2
+        if correlation < 0.05:
+            break
+        total += 2.0 * correlation
+    return round(total)
 
 
 def _rank(covariance: Complex) -> int:

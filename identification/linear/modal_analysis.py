@@ -9,15 +9,21 @@ from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.errors import IdentificationError
-from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.accelerance import WeightedResponses, Weighting, first_weighting, weighted_accelerance
 from identification.linear.errors_in_variables import DrivenResponses, driven_responses, is_driven, over_force
 from identification.linear.modal_parameters import accepted, as_linear_modes, modal_notes
+from identification.linear.model_errors import (
+    is_mostly_distortion,
+    with_common_distortion,
+    with_line_scatter,
+    with_model_error,
+)
 from identification.linear.modes import LinearModes
 from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.stabilisation import StabilisationDiagram
 from identification.linear.stabilisation import diagram as stability
-from identification.validation import finite_array
+from identification.linear.starts import poles_of, searched, start_of
 from vibrolock.results import Result
 
 __all__ = ["ModalAnalysis", "linear_modes"]
@@ -26,13 +32,9 @@ Float = NDArray[np.float64]
 
 _NEEDED = 2.0
 """A pole must be a mode if the misfit without it grows by this factor, whatever number of modes was requested."""
-_NEAR = 0.05
-"""A starting frequency is replaced by the nearest pole of the diagram within this relative distance."""
 _ROUNDS = 20
 _AT_REST_STD = 0.01
 """The iteration ends once no pole moves by more than this share of its standard error."""
-_START_DAMPING = 0.005
-"""Initial damping ratio where the diagram has no pole nearby."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +121,10 @@ def linear_modes(
         Fit residues as complex numbers, for damping that couples modes. Normal modes have half as many unknowns and smaller
         standard errors where damping is light; ``phase_collinearity`` shows whether they suffice.
     weighting
-        Covariance that weights the lines: ``total`` (with nonlinear distortion), ``noise``, ``relative`` (none), or
-        the first of these that is known (``auto``).
+        Covariance that weights the lines: ``total`` (with nonlinear distortion; from the scatter of neighbouring lines if the
+        responses have none), ``noise`` or ``relative`` (errors of equal relative size). ``auto`` takes the total covariance
+        if known, else that of noise, unless the misfit is more than noise explains: then the scatter of lines. Where this
+        gives other poles than relative weights, ``auto`` takes the latter (`model_errors`).
     orders
         Orders of the stabilisation diagram.
     diagram
@@ -132,30 +136,68 @@ def linear_modes(
         Without exactly one drive channel and one force, with too few lines, or where no mode is found.
     """
     find_role(responses.outputs, "drive")
+    free, scatter = weighting == "auto", weighting == "total" and responses.total_covariance is None
+    weighting, normal = first_weighting(responses, weighting), not complex_residues
     driven = is_driven(responses)
     if not driven and (len(responses.inputs) != 1 or responses.inputs[0].role != "force"):
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in responses.inputs)
         raise IdentificationError(
             f"inputs: are {names}; modes need the responses to one force, at the drive point, or that force among the outputs"
         )
-    band = responses.select(
+    selected = responses.select(
         lowest_hz=0.0 if lowest_hz is None else lowest_hz, highest_hz=np.inf if highest_hz is None else highest_hz
     )
-    joint = driven_responses(band, weighting) if driven else None
-    band = over_force(band) if driven else band
+    joint = driven_responses(selected, weighting) if driven else None
+    band = over_force(selected) if driven else selected
     data = joint.first_guess() if joint else weighted_accelerance(band, "relative" if driven else weighting)
     if isinstance(modes, int) and modes < 1:
         raise IdentificationError(f"modes: is {modes}, needs at least 1")
     if isinstance(modes, LinearModes):
-        start, modes = _poles_of(modes, data), None
+        fit, notes = _without_spurious(data, band, poles_of(modes, data), normal=normal, modes=None)
     else:
         stable = stability(data, orders) if diagram is None else diagram
-        start = _start(stable, data, None if modes is None or isinstance(modes, int) else modes)
-    fit, rejected = _without_spurious(data, band, start, normal=not complex_residues, modes=modes)
+        fit, notes = _begun(stable, data, band, normal=normal, modes=modes)
     if joint is not None:
-        fit, data = _most_likely(joint, fit, normal=not complex_residues)
-    result = as_linear_modes(fit, band, data, normal=not complex_residues)
-    return replace(result, notes=(*band.notes, *rejected, *modal_notes(result, data, fit.converged)))
+        fit, data = _most_likely(joint, fit, normal=normal)
+    if scatter or (free and data.kind != "total" and fit.misfit > _NEEDED):
+        fit, data = with_line_scatter(data, fit, normal=normal)
+    if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal), fit):
+        fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
+        fit, notes = with_common_distortion(fit), notes + moved
+    result = as_linear_modes(fit, band, data, normal=normal)
+    return replace(result, notes=(*band.notes, *notes, *modal_notes(result, data, fit.converged)))
+
+
+def _begun(
+    stable: StabilisationDiagram,
+    data: WeightedResponses,
+    band: FrequencyResponseMatrix,
+    *,
+    normal: bool,
+    modes: int | Sequence[float] | None,
+) -> tuple[ModalFit, list[str]]:
+    """Return the fit that starts from the diagram, and notes; if none of its poles is a mode, from the pole of a search."""
+    start, notes = start_of(stable, data, None if modes is None or isinstance(modes, int) else modes)
+    try:
+        fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
+    except IdentificationError:
+        if modes is not None or (other := searched(data)) is None:
+            raise
+        start, notes = other
+        fit, rejected = _without_spurious(data, band, start, normal=normal, modes=modes)
+    return fit, [*notes, *rejected]
+
+
+def _noise(
+    responses: FrequencyResponseMatrix, joint: DrivenResponses | None, fit: ModalFit, *, normal: bool
+) -> WeightedResponses | None:
+    """Return the responses weighted by noise alone, for comparison; None if the noise is unknown."""
+    if responses.noise_covariance is None:
+        return None
+    if joint is None:
+        return None if is_driven(responses) else weighted_accelerance(responses, "noise")
+    alone = driven_responses(responses, "noise")
+    return None if alone is None else alone.around(modal_basis(joint.s, fit.poles, normal) @ fit.terms.T)
 
 
 def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
@@ -169,46 +211,6 @@ def _most_likely(joint: DrivenResponses, fit: ModalFit, *, normal: bool) -> tupl
         if np.all(np.abs(fit.poles - before.poles)[:-1] < _AT_REST_STD * std):
             return fit, data
     return replace(fit, converged=False), data
-
-
-def _poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
-    """Return the poles of known modes in the band."""
-    inside = (modes.frequency_hz >= data.frequency_hz[0]) & (modes.frequency_hz <= data.frequency_hz[-1])
-    if not np.any(inside):
-        raise IdentificationError(
-            f"modes: none of those given is in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
-        )
-    return np.concatenate([2.0 * np.pi * modes.frequency_hz[inside], np.abs(modes.damping_ratio[inside])])
-
-
-def _start(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequence[float] | None) -> Float:
-    """Return the initial poles: angular frequencies in rad/s, then damping ratios."""
-    if wanted is None:
-        columns = stable.columns()
-        if not columns.size:
-            raise IdentificationError(
-                f"modes: no pole is stable over the orders in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz; "
-                "give starting frequencies, a narrower band, or a recording with more periods"
-            )
-        return np.concatenate([2.0 * np.pi * stable.frequency_hz[columns], stable.damping_ratio[columns]])
-    near_hz = np.sort(finite_array("modes", wanted, np.float64, 1))
-    if not near_hz.size or near_hz[0] < data.frequency_hz[0] or near_hz[-1] > data.frequency_hz[-1]:
-        raise IdentificationError(
-            f"modes: frequencies are {', '.join(f'{f:g}' for f in near_hz) or 'none'} Hz, allowed are "
-            f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
-        )
-    frequency, damping, taken = near_hz.copy(), np.full(near_hz.size, _START_DAMPING), set[int]()
-    candidates = np.flatnonzero(stable.stable)
-    for number, wanted_hz in enumerate(near_hz):
-        distance = np.abs(stable.frequency_hz[candidates] - wanted_hz)
-        free = [i for i in np.argsort(distance) if candidates[i] not in taken and distance[i] < _NEAR * wanted_hz]
-        nearest = [i for i in free if np.argmin(np.abs(near_hz - stable.frequency_hz[candidates[i]])) == number]
-        if nearest:
-            close = candidates[[i for i in nearest if distance[i] < 2.0 * distance[nearest[0]] + 1e-3 * wanted_hz]]
-            taken |= set(close.tolist())
-            frequency[number] = np.median(stable.frequency_hz[close])
-            damping[number] = np.median(stable.damping_ratio[close])
-    return np.concatenate([2.0 * np.pi * frequency, damping])
 
 
 def _without_spurious(

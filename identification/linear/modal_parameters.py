@@ -15,7 +15,7 @@ Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 _SIGNIFICANT = 3.0
-_LARGEST_DAMPING = 0.1
+_LARGEST_DAMPING = 0.25
 _LARGEST_DAMPING_ERROR = 0.5
 _CLOSE_BANDWIDTHS = 2.0
 _LINES_PER_BANDWIDTH = 2.0
@@ -84,7 +84,7 @@ def as_linear_modes(
     """Return the modes in rising order of frequency; their covariance follows by first-order propagation.
 
     It grows with the square of a misfit above 1 (the Birge ratio): what the model misses moves its parameters as noise of that
-    size would. One realisation cannot tell nonlinear distortion, which is far above its noise, from the response.
+    size would. The systematic part (`model_errors`) is added.
     """
     drive = find_role(band.outputs, "drive")
     rows, count, terms = len(band.outputs), fit.omega.size, fit.terms.shape[1]
@@ -107,8 +107,10 @@ def as_linear_modes(
     rise = np.argsort(fit.omega, kind="stable")
     order = np.concatenate([block * count + rise for block in range(2 + rows)])
     values = modes(parameters)[order]
-    misfit = max(1.0, fit.residual) if np.isfinite(fit.residual) else 1.0
-    covariance = misfit**2 * (jacobian @ fit.covariance @ jacobian.T)[np.ix_(order, order)]
+    parameter_covariance = fit.misfit**2 * fit.covariance
+    if fit.systematic is not None:
+        parameter_covariance = parameter_covariance + np.diag(fit.systematic)
+    covariance = (jacobian @ parameter_covariance @ jacobian.T)[np.ix_(order, order)]
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     loose = fit if not normal else fit_modes(data, fit.poles, normal=False, iterations=0)
     return LinearModes(
@@ -149,7 +151,8 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
             )
     for f, width in zip(frequency, bandwidth, strict=True):
         lines = np.count_nonzero(np.abs(data.frequency_hz - f) <= 0.5 * width)
-        if width / _spacing(data, f) < _LINES_PER_BANDWIDTH:
+        windowed = width + data.decay_rate_1_s / np.pi  # the peak as an exponential window broadens it
+        if windowed / _spacing(data, f) < _LINES_PER_BANDWIDTH:
             notes.append(
                 f"mode at {f:.5g} Hz: half-power bandwidth {width:.3g} Hz holds {lines} lines; record longer periods for "
                 "a damping ratio to rely on"
@@ -159,6 +162,10 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
             notes.append(f"mode at {f:.5g} Hz: phase collinearity {collinear:.2f}, shape is complex or poorly measured")
     if data.kind == "relative":
         notes.append("no covariance of the responses is known: errors are taken from the misfit of the model")
+    elif data.kind == "line scatter":
+        notes.append(
+            "total variance estimated from the scatter of neighbouring lines: the responses have none of realisations"
+        )
     elif data.kind == "noise":
         notes.append("errors from noise and misfit; two realisations or more show nonlinear distortion line by line")
     if modes.fit_residual > _LARGEST_RESIDUAL:

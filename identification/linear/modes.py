@@ -158,9 +158,14 @@ class LinearModes(Result):
         order = np.argsort(np.abs(self.frequency_hz - self.frequency_hz[mode]), kind="stable")[:count]
         return ModeShapes(tuple(c.name for c in self.channels), self.shapes[:, order], 0)
 
-    def accelerance(self, frequency_hz: ArrayLike, *, without: int | None = None) -> Complex:
-        """complex[n, n_channels]: acceleration over drive force, 1/kg, with residual terms; ``without`` omits one mode."""
-        s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))[:, None]
+    def accelerance(
+        self, frequency_hz: ArrayLike, *, without: int | None = None, decay_rate_1_s: float = 0.0
+    ) -> Complex:
+        """complex[n, n_channels]: acceleration over drive force, 1/kg, with residual terms; ``without`` omits one mode.
+
+        ``decay_rate_1_s`` is the rate of an exponential window over force and motion.
+        """
+        s = decay_rate_1_s + 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))[:, None]
         omega = 2.0 * np.pi * self.frequency_hz
         modal = s**2 / (s**2 + 2.0 * self.damping_ratio * omega * s + omega**2)
         if without is not None:
@@ -184,17 +189,18 @@ class LinearModes(Result):
         s = 2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         return np.asarray(self.accelerance(frequency_hz, without=without)[:, row] / s**2)
 
-    def response_matrix(self, frequency_hz: ArrayLike) -> FrequencyResponseMatrix:
+    def response_matrix(self, frequency_hz: ArrayLike, *, decay_rate_1_s: float = 0.0) -> FrequencyResponseMatrix:
         """Return the model's frequency responses to one force, in the units of the channels."""
         frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-        s = 2j * np.pi * frequency
+        s = decay_rate_1_s + 2j * np.pi * frequency
         order = np.array([2 - MOTION_ORDER[channel.motion] for channel in self.channels])
-        value = self.accelerance(frequency) / s[:, None] ** order
+        value = self.accelerance(frequency, decay_rate_1_s=decay_rate_1_s) / s[:, None] ** order
         return FrequencyResponseMatrix(
             outputs=self.channels,
             inputs=(Channel("force", "force", self.force_unit),),
             frequency_hz=frequency,
             value=value[:, :, None],
+            decay_rate_1_s=decay_rate_1_s,
             estimator="model",
             specimen=self.specimen,
         )

@@ -13,7 +13,9 @@ ratios were 0.3 % off.
 Given the poles and c, all these terms follow by linear least squares. The step of the poles is the Schur complement of the
 full Gauss-Newton step (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973; Ruhe and Wedin, SIAM Rev. 22,
 1980). With weights P, Jacobian J and ``M = Re sum J^H P J`` the covariance of the parameters is
-``M^-1 (1/2 Re sum J^H P C P J) M^-1``. This is correct for line errors with covariance C, whatever the weights are.
+``M^-1 (1/2 Re sum J^H P C P J) M^-1``. This is correct for line errors with covariance C, whatever the weights are. If the
+responses are a mean over records with known deviations e_r, the middle is ``n / (n - 1) sum_r g_r g_r^T`` with
+``g_r = Re sum J^H P e_r`` instead, which also holds for errors that lines have in common.
 """
 
 from dataclasses import dataclass
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 
 from identification.linear.accelerance import WeightedResponses
 
-__all__ = ["RESIDUAL_TERMS", "ModalFit", "fit_modes", "modal_basis", "pole_derivatives"]
+__all__ = ["RESIDUAL_TERMS", "ModalFit", "fit_modes", "misfit_of", "modal_basis", "pole_derivatives"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -58,6 +60,8 @@ class ModalFit:
         RMS of the residual over its expected value from the covariance; NaN if no covariance is known.
     converged
         Whether the iteration converged.
+    systematic
+        float[m], variance of the same parameters that is due to an error of the model; None for none.
     """
 
     poles: Float
@@ -65,6 +69,7 @@ class ModalFit:
     covariance: Float
     residual: float
     converged: bool
+    systematic: Float | None = None
 
     @property
     def omega(self) -> Float:
@@ -75,6 +80,11 @@ class ModalFit:
     def zeta(self) -> Float:
         """float[n_modes]: damping ratios."""
         return np.asarray(self.poles[self.poles.size // 2 : -1])
+
+    @property
+    def misfit(self) -> float:
+        """``residual`` where it is above 1, else 1: the factor by which errors grow (the Birge ratio)."""
+        return max(1.0, self.residual) if np.isfinite(self.residual) else 1.0
 
 
 def modal_basis(s: Complex, poles: Float, normal: bool) -> Complex:
@@ -167,7 +177,7 @@ class _Problem:
             whole = np.einsum("op,kt->kopt", np.eye(outputs), basis).reshape(*misfit.shape, -1)
             jacobian = np.concatenate([slopes, whole], axis=2) * unit
             heavy = self.precision @ jacobian
-            filling = 0.5 * np.tensordot(np.conj(heavy), self.data.covariance @ heavy, ((0, 1), (0, 1))).real
+            filling = _filling(heavy, self.data.covariance, self.data.deviations)
             covariance = inverse @ filling @ inverse
             expected = np.einsum("kop,kpo->", self.precision, self.data.covariance).real
             residual = float(np.sqrt(squares / (freedom * expected)))
@@ -180,6 +190,22 @@ class _Problem:
         if np.any(poles[:count] <= 0.0) or np.any(np.abs(poles[count:-1]) >= 1.0):
             return None
         return np.append(poles[:-1], np.clip(poles[-1], 0.0, self.largest_c))
+
+
+def _filling(heavy: Complex, covariance: Complex, deviations: Complex | None) -> Float:
+    """float[m, m]: covariance of the gradient of the fit, from the covariance of the lines or the deviations of the records.
+
+    Deviations keep what the errors of lines have in common. Those of n records have n - 1 degrees of freedom, for which the
+    standard errors are enlarged so that 1.96 of them hold as much as Student's interval.
+    """
+    if deviations is None:
+        return np.asarray(0.5 * np.tensordot(np.conj(heavy), covariance @ heavy, ((0, 1), (0, 1))).real)
+    from scipy.stats import t  # only on use: it takes long to load
+
+    records = deviations.shape[1]
+    single = np.tensordot(deviations, np.conj(heavy), ((0, 2), (0, 1))).real
+    student = float(t.ppf(0.975, records - 1)) / 1.96
+    return np.asarray(single.T @ single * (student**2 * records / (records - 1)))
 
 
 def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, iterations: int = _ITERATIONS) -> ModalFit:
@@ -210,3 +236,9 @@ def fit_modes(data: WeightedResponses, poles: Float, *, normal: bool = True, ite
         if rest:
             return problem.fitted(poles, state, True)
     return problem.fitted(poles, state, iterations == 0)
+
+
+def misfit_of(data: WeightedResponses, poles: Float) -> float:
+    """Return the weighted sum of squares that is left by ``poles`` (rad/s, then damping ratios) with the best normal modes."""
+    problem = _Problem(data, normal=True)
+    return problem.state(np.append(poles, problem.prior_c)).cost

@@ -17,7 +17,7 @@ __all__ = ["FrequencyResponseMatrix"]
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
-_ARRAYS = ("frequency_hz", "value", "noise_covariance", "total_covariance")
+_ARRAYS = ("frequency_hz", "value", "noise_covariance", "total_covariance", "deviations")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,8 +35,14 @@ class FrequencyResponseMatrix(Result):
     noise_covariance, total_covariance
         complex[n_lines, m, m] with ``m = n_outputs * n_inputs``: covariance ``E[e e^H]`` of ``value`` row by row, from noise
         alone and from noise with nonlinear distortion. None if unknown.
+    deviations
+        complex[n_lines, n_records, n_outputs * n_inputs]: contribution of each record of a mean to the error of ``value``. They
+        add up to zero, and show errors that neighbouring lines have in common. None if unknown.
+    decay_rate_1_s
+        Rate of an exponential window ``exp(-decay_rate_1_s t)`` over input and output: ``value`` is the transfer function at
+        ``s = decay_rate_1_s + i w``. 0 without a window.
     estimator
-        Estimator of the responses: ``instrument``, ``H1``, ``H2``, ``model`` ...
+        Estimator of the responses: ``instrument``, ``H1``, ``H2``, ``Hv``, ``model`` ...
     input_rms
         float[n_inputs], RMS of every input in the band, in its unit: the level; empty if unknown.
     specimen
@@ -56,6 +62,8 @@ class FrequencyResponseMatrix(Result):
     value: Complex
     noise_covariance: Complex | None = None
     total_covariance: Complex | None = None
+    deviations: Complex | None = None
+    decay_rate_1_s: float = 0.0
     estimator: str = ""
     input_rms: tuple[float, ...] = ()
     specimen: str = ""
@@ -74,6 +82,11 @@ class FrequencyResponseMatrix(Result):
         for name in ("noise_covariance", "total_covariance"):
             if getattr(self, name) is not None:
                 self._check(name, (paths, paths))
+        if self.deviations is not None:
+            records = np.shape(self.deviations)[1] if np.ndim(self.deviations) > 1 else 0
+            self._check("deviations", (records, paths))
+        if not (np.isfinite(self.decay_rate_1_s) and self.decay_rate_1_s >= 0.0):
+            raise IdentificationError(f"decay_rate_1_s: is {self.decay_rate_1_s:g} 1/s, must be finite, 0 or above")
         if self.input_rms and len(self.input_rms) != len(self.inputs):
             raise IdentificationError(f"input_rms: {len(self.input_rms)} values for {len(self.inputs)} inputs")
 
@@ -82,6 +95,11 @@ class FrequencyResponseMatrix(Result):
         if array.shape != (self.frequency_hz.size, *trailing):
             raise IdentificationError(f"{name}: shape {array.shape}, needs {(self.frequency_hz.size, *trailing)}")
         object.__setattr__(self, name, array)
+
+    @property
+    def s(self) -> Complex:
+        """complex[n_lines]: ``decay_rate_1_s + 2 pi i f``, rad/s, where ``value`` is the transfer function."""
+        return np.asarray(self.decay_rate_1_s + 2j * np.pi * self.frequency_hz)
 
     @property
     def noise_std(self) -> Float:
@@ -137,6 +155,7 @@ class FrequencyResponseMatrix(Result):
             value=self.value[lines][:, rows],
             noise_covariance=part(self.noise_covariance),
             total_covariance=part(self.total_covariance),
+            deviations=None if self.deviations is None else self.deviations[lines][:, :, paths],
         )
 
     def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -144,7 +163,8 @@ class FrequencyResponseMatrix(Result):
         arrays = {name: getattr(self, name) for name in _ARRAYS if getattr(self, name) is not None}
         channels = {name: [vars(channel) for channel in getattr(self, name)] for name in ("outputs", "inputs")}
         texts = {"estimator": self.estimator, "specimen": self.specimen, "notes": list(self.notes)}
-        return arrays, {**channels, **texts, "input_rms": list(self.input_rms)}
+        window = {"decay_rate_1_s": self.decay_rate_1_s} if self.decay_rate_1_s else {}
+        return arrays, {**channels, **texts, "input_rms": list(self.input_rms), **window}
 
     @classmethod
     def from_arrays(
@@ -154,6 +174,8 @@ class FrequencyResponseMatrix(Result):
         try:
             channels = {name: tuple(Channel(**c) for c in attributes[name]) for name in ("outputs", "inputs")}
             texts = {name: attributes[name] for name in ("estimator", "specimen", "notes", "input_rms")}
-            return cls(**channels, **texts, **{name: arrays.get(name) for name in _ARRAYS})  # type: ignore[arg-type]
+            rate = float(attributes.get("decay_rate_1_s", 0.0))
+            stored = {name: arrays.get(name) for name in _ARRAYS}
+            return cls(**channels, **texts, **stored, decay_rate_1_s=rate)  # type: ignore[arg-type]
         except (KeyError, TypeError) as error:
             raise IdentificationError(f"frequency response matrix: {error} is missing or unknown") from None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.linear.accelerance import WeightedResponses, Weighting, weighted_accelerance
+from identification.linear.accelerance import WeightedResponses, Weighting, first_weighting, weighted_accelerance
 from identification.linear.errors_in_variables import driven_responses, is_driven, over_force
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.subspace import observable_space, telling_rows
@@ -130,6 +130,7 @@ def stabilisation(
     IdentificationError
         If orders are not above zero or too high for the number of lines.
     """
+    weighting = first_weighting(responses, weighting)
     joint = driven_responses(responses, weighting) if is_driven(responses) else None
     plain = over_force(responses) if is_driven(responses) and joint is None else responses
     return diagram(
@@ -145,8 +146,9 @@ def diagram(
     """Compute the `stabilisation` diagram of weighted accelerances."""
     lines, outputs, inputs = data.value.shape
     most = 2 * lines * inputs // (outputs + inputs) - 2
-    middle = float(np.sqrt(np.abs(data.s[0]) * np.abs(data.s[-1])))
-    z = np.asarray((1.0 + data.s / middle) / (1.0 - data.s / middle))
+    on_axis = 2j * np.pi * data.frequency_hz  # an exponential window only moves the poles, to the left
+    middle = float(np.sqrt(np.abs(on_axis[0]) * np.abs(on_axis[-1])))
+    z = np.asarray((1.0 + on_axis / middle) / (1.0 - on_axis / middle))
     if orders is None:
         highest = min(most, max(telling_rows(z, _ORDERS[-1] + 2) - 2, _LOWEST))
         orders = [order for order in _ORDERS if order <= highest]
@@ -159,7 +161,7 @@ def diagram(
     before: tuple[Float, Float, Complex] = (np.zeros(0), np.zeros(0), np.zeros((0, outputs), dtype=np.complex128))
     for order in tried:
         a, c = space.state_matrices(order)
-        frequency, damping, shapes = now = _poles(a, c, middle)
+        frequency, damping, shapes = now = _poles(a, c, middle, data.decay_rate_1_s)
         like = _alike(now, before, tolerances)
         physical = (damping > 0.0) & (damping < _LARGEST_DAMPING)
         physical &= (frequency >= band_hz[0]) & (frequency <= band_hz[1])
@@ -170,11 +172,11 @@ def diagram(
     return StabilisationDiagram(**arrays, orders=np.array(tried), singular_values=space.singular_values)
 
 
-def _poles(a: Float, c: Float, middle: float) -> tuple[Float, Float, Complex]:
+def _poles(a: Float, c: Float, middle: float, decay_rate_1_s: float) -> tuple[Float, Float, Complex]:
     """Return frequencies (Hz), damping ratios and unit shapes of the oscillating poles, mapped back from the unit circle."""
     z, vectors = np.linalg.eig(a)
     with np.errstate(divide="ignore", invalid="ignore"):
-        poles = middle * (z - 1.0) / (z + 1.0)
+        poles = middle * (z - 1.0) / (z + 1.0) + decay_rate_1_s
     kept = np.flatnonzero(np.isfinite(poles) & (poles.imag > 0.0))
     kept = kept[np.argsort(np.abs(poles[kept]))]
     shapes = (c @ vectors[:, kept]).T

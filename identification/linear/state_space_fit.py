@@ -160,6 +160,10 @@ def spectral_radius(a: Float) -> float:
 
 
 def _points(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Complex:
+    if responses.decay_rate_1_s:
+        raise IdentificationError(
+            f"decay_rate_1_s: is {responses.decay_rate_1_s:.4g} 1/s, allowed is 0; `linear_modes` takes such responses"
+        )
     if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
         raise IdentificationError(
             f"sample_rate_hz: is {sample_rate_hz:g} Hz, needs more than twice {responses.frequency_hz[-1]:g} Hz"

@@ -8,8 +8,10 @@ variables), 3 and 4 (robust method, several inputs). Every estimate is, line by 
 Y_r and U_r are means over the periods; the estimators differ in Z. ``instrument`` takes noise-free signals that drive the
 inputs, such as the voltage. Noise and nonlinear distortion in the force, which the structure itself causes, then leave no
 bias. ``H1`` takes Z = U (noise of the inputs biases it low where they are small, near resonance), ``H2`` takes Z = Y, each
-output separately (noise of the outputs biases it high, near antiresonance). With a noiseless input, ``instrument`` with the
-input as its own instrument and ``H1`` are the same.
+output separately (noise of the outputs biases it high, near antiresonance). ``Hv`` takes the sum of U and Y, each divided by
+its RMS, with Y turned into the phase of U. It is the total least squares estimate with noise of equal relative size in both
+(Rocklin, Crowley and Vold, Proc. 3rd IMAC, 1985), the geometric mean of H1 and H2. With a noiseless input, ``instrument`` with
+the input as its own instrument and ``H1`` are the same.
 
 To first order the error is ``sum_r (Y_r - H U_r) Z_r^H S_UZ^-1``. The part of ``Y - H U`` that differs from period to period
 is noise; the part that differs between realisations is noise and nonlinear distortion. Noise common to input and output
@@ -30,8 +32,8 @@ __all__ = ["Estimator", "chosen", "estimated_responses"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
-Estimator = Literal["instrument", "H1", "H2"]
-"""How a frequency response is estimated: with the generator's signal as instrument, or as H1 or H2."""
+Estimator = Literal["instrument", "H1", "H2", "Hv"]
+"""How a frequency response is estimated: with the generator's signal as instrument, or as H1, H2 or Hv."""
 
 _DEPENDENT = 1e-9  # smallest singular value of S_UZ, scaled to a unit diagonal, below which only rounding is left
 _SILENT = 1e-12  # amplitude against the strongest line
@@ -46,11 +48,12 @@ def estimated_responses(
     inputs: Sequence[str] | None,
     estimator: Estimator,
     instruments: Sequence[str],
+    keep_deviations: bool = False,
 ) -> FrequencyResponseMatrix:
     """Estimate responses and covariances from spectra complex[n_realisations, n_periods, n_channels, n_lines].
 
-    All lines must be excited; the other parameters are those of `best_linear_approximation`, which also raises the errors
-    listed there.
+    ``keep_deviations`` keeps the error of every realisation. All lines must be excited; the other parameters are those of
+    `best_linear_approximation`, which also raises the errors listed there.
     """
     if estimator not in get_args(Estimator):
         raise IdentificationError(f"estimator: is '{estimator}', allowed are {', '.join(get_args(Estimator))}")
@@ -77,6 +80,7 @@ def estimated_responses(
         value=value,
         noise_covariance=noise,
         total_covariance=total,
+        deviations=np.moveaxis(error.mean(axis=1), -1, 0) if keep_deviations else None,
         estimator=estimator,
         notes=(*_mixed([channels[row] for row in rows]), *_notes(error, len(columns))),
     )
@@ -107,12 +111,18 @@ def _instruments(
     instruments: Sequence[str],
 ) -> tuple[Complex, str]:
     """Return Z, complex[n_realisations, n_outputs or 1, n_inputs, n_lines], and its name for messages."""
-    if estimator == "H2":
+    if estimator in ("H2", "Hv"):
         if len(columns) > 1:
             raise IdentificationError(
-                f"estimator: is 'H2' with {len(columns)} inputs, allowed is one; H1 takes several"
+                f"estimator: is '{estimator}' with {len(columns)} inputs, allowed is one; H1 takes several"
             )
-        return means[:, rows, None], "outputs"
+        y, u = means[:, rows], means[:, columns]
+        if estimator == "H2":
+            return y[:, :, None], "outputs"
+        cross = np.sum(y * np.conj(u), axis=0)
+        turned = y * np.conj(cross) / np.maximum(np.abs(cross), 1e-300)
+        both = [signal / np.maximum(np.sqrt(np.sum(np.abs(signal) ** 2, axis=0)), 1e-300) for signal in (u, turned)]
+        return (both[0] + both[1])[:, :, None], "inputs and outputs"
     if estimator == "H1":
         return means[:, None, columns], "inputs"
     known = chosen("instruments", channels, instruments, ())

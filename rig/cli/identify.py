@@ -36,6 +36,25 @@ def identify(
     count: Annotated[
         int | None, typer.Option("--count", help="Number of modes of a linear model; found if left out.", min=1)
     ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(
+            "--near",
+            metavar="LIST",
+            help="Starting frequencies of a linear model, Hz, with commas: one mode near each.",
+            show_default="found",
+        ),
+    ] = None,
+    order: Annotated[
+        int | None,
+        typer.Option(
+            "--order", help="Highest order of a linear model's stabilisation diagram.", show_default="40", min=2
+        ),
+    ] = None,
+    weighting: Annotated[
+        str,
+        typer.Option(help="Of the lines of a linear model: auto, total (with distortion), noise or relative."),
+    ] = "auto",
     resistance_ohm: Annotated[
         float | None,
         typer.Option("--resistance", metavar="OHM", help="Of an exciter's coil, cable and amplifier, if measured."),
@@ -157,6 +176,9 @@ def identify(
         estimator=estimator,
         band_hz=band_hz,
         count=count,
+        near=near,
+        order=order,
+        weighting=weighting,
         resistance_ohm=resistance_ohm,
         amplifier_gain=amplifier_gain,
         stinger_stiffness_n_m=stinger_stiffness_n_m,

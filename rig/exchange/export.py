@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identification import IdentificationError, ModalAnalysis, TimeRecords
+from identification import HammerTest, IdentificationError, ModalAnalysis, TimeRecords
 from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
@@ -68,6 +68,8 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
         return list(series_of_records(found))
     if isinstance(found, SimulatedModel):
         return [found.model]
+    if isinstance(found, HammerTest):
+        return [found.responses]
     if isinstance(found, ModalAnalysis):
         return [found.modes] if found.responses is None else [found.modes, found.responses]
     return [found]

@@ -64,6 +64,9 @@ def _response_matrix(matrix: FrequencyResponseMatrix) -> Contents:
     kinds = ("noise_covariance", "total_covariance")
     units = {"value": ratio, **dict.fromkeys(kinds, covariance)}
     labels = {"value": (outputs, inputs), **dict.fromkeys(kinds, (paths, paths))}
+    if matrix.deviations is not None:
+        units["deviations"] = flat
+        labels["deviations"] = (tuple(str(record + 1) for record in range(matrix.deviations.shape[1])), paths)
     rows = dict.fromkeys(arrays, 0)
     return Contents("frequency-response-matrix", _level(matrix), arrays, attributes, rows, units, labels)
 

@@ -113,6 +113,7 @@ def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
         "frequency-response-matrix": (i.ResponseMatrixMapping, i.map_response_matrix),
         "multisine": (i.MultisineMapping, i.map_multisine),
         "time-data": (i.TimeDataMapping, i.map_time_data),
+        "hammer-test": (i.HammerTestMapping, i.map_hammer_test),
         "backbone": (i.BackboneMapping, i.map_backbone),
         "pnlss": (i.PnlssMapping, i.map_pnlss),
         "nonlinear-mode": (i.NonlinearModeMapping, i.map_nonlinear_mode),

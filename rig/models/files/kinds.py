@@ -17,6 +17,7 @@ _DECLARED = {
     "force-surface": ("force_surface:FORCE_SURFACE", ("MeasuredSurface",)),
     "frequency-responses": ("frequency_responses:FREQUENCY_RESPONSES", ("tuple",)),
     "frequency-response-matrix": ("response_matrix:RESPONSE_MATRIX", ("FrequencyResponseMatrix",)),
+    "hammer-test": ("hammer_test:HAMMER_TEST", ("HammerTest",)),
     "measured-backbone": ("measured_backbone:MEASURED_BACKBONE", ("Backbone",)),
     "time-data": ("time_data:TIME_DATA", ("TimeRecords",)),
     "predictions": ("predictions:PREDICTIONS", ("Predictions",)),

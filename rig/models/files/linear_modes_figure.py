@@ -45,7 +45,9 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
         return
     frequency = responses.frequency_hz
     fine = np.union1d(np.geomspace(max(frequency[0], 1e-3), frequency[-1], 2000), _around(modes))
-    fitted = modes.response_matrix(fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)])
+    fitted = modes.response_matrix(
+        fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)], decay_rate_1_s=responses.decay_rate_1_s
+    )
     every = slice(None, None, max(1, frequency.size // _MOST_DOTS))
     known = {channel.name for channel in modes.channels}
     errors = responses.total_std if np.isfinite(responses.total_std).any() else responses.noise_std

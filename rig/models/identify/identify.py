@@ -11,6 +11,7 @@ from identification import (
     Exciter,
     FrequencyResponse,
     FrequencyResponseMatrix,
+    HammerTest,
     IdentificationError,
     LinearModes,
     ModalAnalysis,
@@ -25,6 +26,7 @@ from identification import (
     stabilisation,
     stepped_sine_mode,
 )
+from identification.linear.accelerance import Weighting
 from identification.validation import one_specimen
 from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
@@ -183,9 +185,16 @@ def _linear(paths: Sequence[Path], request: Request) -> ModalAnalysis:
         }
     )
     lowest, fitted = pairs[0]
-    diagram = stabilisation(fitted)
-    found = [linear_modes(fitted, modes=request.count, diagram=diagram)]
-    found += [linear_modes(higher, modes=found[0]) for _, higher in pairs[1:]]
+    weighting = cast(Weighting, request.weighting)
+    orders = None if request.order is None else range(2, request.order + 1, 2)
+    try:
+        diagram = stabilisation(fitted, orders, weighting=weighting)
+        found = [linear_modes(fitted, modes=request.near_hz or request.count, diagram=diagram, weighting=weighting)]
+        found += [linear_modes(higher, modes=found[0], weighting=weighting) for _, higher in pairs[1:]]
+    except IdentificationError as error:
+        raise IdentificationError(
+            str(error).replace("starting frequencies", "starting frequencies by `near`")
+        ) from None
     modes = found[0] if len(found) == 1 else extrapolated_to_zero(*found)
     notes = [note for _, missing in read for note in missing]
     return ModalAnalysis(replace(modes, notes=(*notes, *modes.notes)), lowest, diagram)
@@ -207,15 +216,19 @@ def _matrices(
         if estimator != "instrument":
             return [(matrix, matrix) for matrix in shown], missing
         return [(matrix, _over_instrument(s, specimen)) for matrix, s in zip(shown, measured, strict=True)], missing
-    if kind in KINDS and isinstance(matrix := load(path), FrequencyResponseMatrix):
-        return [(matrix, matrix)], ()
     if kind == "time-data":
         from rig.models.identify.data_files import time_records_in  # loads what other models need not wait for
 
         found = [_responses_over_time(records, estimator) for records in time_records_in(path).levels().values()]
         return found, ()
+    if kind in KINDS:
+        loaded = load(path)
+        matrix = loaded.responses if isinstance(loaded, HammerTest) else loaded
+        if isinstance(matrix, FrequencyResponseMatrix):
+            return [(matrix, matrix)], ()
     raise RecordingError(
-        f"{path}: holds a {kind}; a linear model comes from multisines, time data or frequency response matrices"
+        f"{path}: holds a {kind}; a linear model comes from multisines, time data, hammer tests or frequency response "
+        "matrices"
     )
 
 

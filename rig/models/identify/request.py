@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
+from identification.linear.accelerance import Weighting
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.models.identify.data_request import DataOptions
@@ -15,7 +16,7 @@ __all__ = ["Request"]
 
 _OPTIONS: dict[str, tuple[str, ...]] = {
     "nonlinear-mode": ("modes",),
-    "linear": ("estimator", "band_hz", "count"),
+    "linear": ("estimator", "band_hz", "count", "near", "order", "weighting"),
     "force-surface": (),
     "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
     "pnlss": (*PnlssOptions().given(), *DataOptions().given()),
@@ -45,6 +46,12 @@ class Request:
     """Stiffness of the exciter's stinger, if known, N/m."""
     count: int | None = None
     """Number of modes of a linear model; determined automatically if None."""
+    near: str | None = None
+    """Starting frequencies of a linear model, Hz, with commas, one mode near each; determined automatically if None."""
+    order: int | None = None
+    """Highest order of the stabilisation diagram of a linear model; by default 40, or less for few lines."""
+    weighting: str = "auto"
+    """What weights the lines of a linear model: ``auto``, ``total``, ``noise`` or ``relative``."""
     pnlss: PnlssOptions = field(default_factory=PnlssOptions)
     """Options for a nonlinear state-space model."""
     structured: StructuredOptions = field(default_factory=StructuredOptions)
@@ -61,6 +68,12 @@ class Request:
             raise ConfigurationError(
                 f"`band_hz` = {self.band_hz[0]:g} {self.band_hz[1]:g}: allowed is 0 <= LOW < HIGH, Hz"
             )
+        if self.weighting not in get_args(Weighting):
+            raise ConfigurationError(f"`weighting` = {self.weighting!r}: allowed are {', '.join(get_args(Weighting))}")
+        if self.near_hz and self.count is not None:
+            raise ConfigurationError("`count`: is the number of frequencies in `near`; leave one of them out")
+        if self.order is not None and self.order < 2:
+            raise ConfigurationError(f"`order` = {self.order}: allowed is 2 and above")
         numbers = {
             "resistance_ohm": self.resistance_ohm,
             "amplifier_gain": self.amplifier_gain,
@@ -74,6 +87,9 @@ class Request:
             "band_hz": self.band_hz is not None,
             "count": self.count is not None,
             "estimator": self.estimator != "instrument",
+            "near": self.near is not None,
+            "order": self.order is not None,
+            "weighting": self.weighting != "auto",
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
             **self.structured.given(),
@@ -90,3 +106,14 @@ class Request:
         for name in _OF_THE_FIT if self.pnlss.resume is not None else ():
             if given[name]:
                 raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")
+
+    @property
+    def near_hz(self) -> tuple[float, ...]:
+        """Starting frequencies of a linear model, Hz; raise `ConfigurationError` if they are no frequencies."""
+        try:
+            found = tuple(float(part) for part in self.near.split(",")) if self.near is not None else ()
+        except ValueError:
+            found = (math.nan,)
+        if not all(0.0 < frequency < math.inf for frequency in found):
+            raise ConfigurationError(f"`near` = {self.near!r}: allowed are frequencies above 0 Hz, with commas")
+        return found

@@ -1,0 +1,128 @@
+"""Result of a hammer test: the hits, the frequency responses with their errors, the coherence."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.validation import finite_array
+from vibrolock.results import Result
+
+__all__ = ["HammerTest", "Hit"]
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hit:
+    """One hit.
+
+    Parameters
+    ----------
+    label
+        Number from 1, and where the hit is.
+    record
+        Number of the record, from 1.
+    time_s
+        Beginning of the pulse in its record.
+    peak_n
+        Largest force.
+    duration_s
+        Duration of the pulse.
+    fault
+        Why the hit does not count; empty if it does.
+    """
+
+    label: str
+    record: int
+    time_s: float
+    peak_n: float
+    duration_s: float
+    fault: str = ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HammerTest(Result):
+    """Result of a hammer test.
+
+    Parameters
+    ----------
+    channels
+        The channels of the records.
+    sample_rate_hz
+        Samples per second.
+    record_s
+        Length of the record of one hit.
+    hits
+        All hits, in the order of the records; those with a fault do not count.
+    responses
+        Frequency responses of the motions to the force, for `linear_modes`; they know the exponential window.
+    coherence
+        float[n_lines, n_outputs], in [0, 1], over the hits that count.
+    force_n_s
+        float[n_lines], RMS over the hits of the modulus of the force's transform.
+
+    Raises
+    ------
+    IdentificationError
+        If shapes do not agree or values are not finite.
+    """
+
+    channels: tuple[Channel, ...]
+    sample_rate_hz: float
+    record_s: float
+    hits: tuple[Hit, ...]
+    responses: FrequencyResponseMatrix
+    coherence: Float
+    force_n_s: Float
+
+    def __post_init__(self) -> None:
+        lines, outputs = self.responses.frequency_hz.size, len(self.responses.outputs)
+        for name, shape in (("coherence", (lines, outputs)), ("force_n_s", (lines,))):
+            array = finite_array(name, getattr(self, name), np.float64, len(shape))
+            if array.shape != shape:
+                raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
+            object.__setattr__(self, name, array)
+
+    @property
+    def used(self) -> tuple[Hit, ...]:
+        """The hits that count."""
+        return tuple(hit for hit in self.hits if not hit.fault)
+
+    def table(self) -> list[dict[str, Any]]:
+        """Return one JSON-able dictionary per hit."""
+        return [asdict(hit) for hit in self.hits]
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Return arrays by name, those of the responses in one group, and the JSON-able attributes that go with them."""
+        arrays, attributes = self.responses.to_arrays()
+        own = {"coherence": self.coherence, "force_n_s": self.force_n_s}
+        scalars = {"sample_rate_hz": self.sample_rate_hz, "record_s": self.record_s, "hits": self.table()}
+        channels = [vars(channel) for channel in self.channels]
+        return {**own, **{f"responses/{name}": values for name, values in arrays.items()}}, {
+            **scalars,
+            "channels": channels,
+            "responses": attributes,
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "HammerTest":
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
+        own = {name.removeprefix("responses/"): values for name, values in arrays.items() if "/" in name}
+        try:
+            return cls(
+                channels=tuple(Channel(**channel) for channel in attributes["channels"]),
+                sample_rate_hz=float(attributes["sample_rate_hz"]),
+                record_s=float(attributes["record_s"]),
+                hits=tuple(Hit(**hit) for hit in attributes["hits"]),
+                responses=FrequencyResponseMatrix.from_arrays(own, attributes["responses"]),
+                coherence=arrays["coherence"],
+                force_n_s=arrays["force_n_s"],
+            )
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"hammer test: {error} is missing or unknown") from None

@@ -1,0 +1,136 @@
+"""What a linear model misses in the responses of a nonlinear structure: its scatter, its effect on the poles, the weights.
+
+The best linear approximation of a strongly nonlinear structure is not the response of linear modes. The pole that fits it best
+then depends on how lines are weighted. Lines far from the resonance have small errors, so that weights by noise or total
+variance fit them and leave the misfit to the resonance: on a hardening oscillator damping ratios came out 10 to 25 % below
+those that reproduce the resonance. Weights by equal relative errors do not have this preference, but larger random errors.
+
+Both estimates agree within their errors if the model is right: the difference d of an efficient and of a robust estimate has
+the variance ``V_robust - V_efficient`` (Hausman, Econometrica 46, 1978). So ``d^2`` above this variance is model error.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.linear.accelerance import WeightedResponses, pooled, relative_weights
+from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
+
+__all__ = [
+    "is_mostly_distortion",
+    "line_scatter",
+    "with_common_distortion",
+    "with_line_scatter",
+    "with_model_error",
+]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_WINDOW = 9
+"""Lines over which the misfit is taken as smooth, that is as a parabola; 6 degrees of freedom are left for its scatter."""
+_DISTORTED = 0.05
+"""Error of a response within the half-power bandwidth, relative to the response, from which model errors are looked for."""
+_NOISE = 0.25
+"""Largest share of noise in a total variance that is called distortion."""
+_COMMON = 2.0
+"""Factor of the frequency's standard error where errors are distortion; on a hardening oscillator 2.0 to 2.2 were found."""
+_LARGEST_MOVE = 0.3
+"""Largest relative change of frequency for which the other pole is taken to be the same mode."""
+
+
+def line_scatter(misfit: Complex) -> Complex | None:
+    """complex[n_lines, m, m]: covariance of complex[n_lines, m] about a parabola through the lines around; None for few lines.
+
+    This is the local polynomial method (Pintelon and Schoukens, 2nd ed., chapter 7). Noise and nonlinear distortion scatter
+    from line to line, the response and the error of a model do not.
+    """
+    lines = misfit.shape[0]
+    if lines < _WINDOW:
+        return None
+    powers = np.linspace(-1.0, 1.0, _WINDOW)[:, None] ** np.arange(3)
+    project = np.eye(_WINDOW) - powers @ np.linalg.pinv(powers)
+    first = np.clip(np.arange(lines) - _WINDOW // 2, 0, lines - _WINDOW)
+    scatter = np.einsum("ij,kjm->kim", project, misfit[first[:, None] + np.arange(_WINDOW)])
+    return np.asarray(np.einsum("kim,kin->kmn", scatter, np.conj(scatter)) / (_WINDOW - powers.shape[1]))
+
+
+def is_mostly_distortion(data: WeightedResponses, noise: WeightedResponses | None, fit: ModalFit) -> bool:
+    """Return whether the errors of ``data`` around the modes are known to be far above those of noise alone."""
+    if data.kind == "line scatter":
+        return True
+    if data.kind != "total" or noise is None or noise.covariance is None:
+        return False
+    near = np.any(_near_modes(data, fit), axis=0)
+    return bool(np.any(near)) and bool(np.median((noise.std**2 / data.std**2)[near]) < _NOISE)
+
+
+def with_line_scatter(data: WeightedResponses, fit: ModalFit, *, normal: bool) -> tuple[ModalFit, WeightedResponses]:
+    """Return fit and responses with the total covariance taken from the scatter of neighbouring lines about the fit."""
+    for _ in range(2):
+        covariance = line_scatter(data.value[:, :, 0] - modal_basis(data.s, fit.poles, normal) @ fit.terms.T)
+        if covariance is None:
+            break
+        data = replace(data, covariance=covariance, smooth=pooled(covariance), kind="line scatter")
+        fit = fit_modes(data, fit.poles, normal=normal)
+    return fit, data
+
+
+def with_model_error(
+    data: WeightedResponses, fit: ModalFit, *, normal: bool, free: bool
+) -> tuple[ModalFit, WeightedResponses, list[str]]:
+    """Compare ``fit`` with the fit by relative weights where distortion is large; return the fit to rely on, and notes.
+
+    The squared difference beyond what the random errors allow is added as systematic variance. The fit by relative weights is
+    returned if ``free``, else the one that was asked for.
+    """
+    if data.covariance is None or not _distorted(data, fit):
+        return fit, data, []
+    relative = relative_weights(data)
+    other = fit_modes(relative, fit.poles, normal=normal)
+    if (
+        not other.converged
+        or np.any(np.abs(other.omega / fit.omega - 1.0) > _LARGEST_MOVE)
+        or np.any(other.zeta <= 0.0)
+    ):
+        return fit, data, []
+    difference = np.concatenate([other.poles - fit.poles, (other.terms - fit.terms).ravel()])
+    systematic = np.maximum(difference**2 - np.abs(_variance(other) - _variance(fit)), 0.0)
+    taken = "the latter is used" if free else "the former was asked for"
+    notes = [
+        f"mode at {f:.5g} Hz: distortion is large at this level, the response is not that of a linear mode; damping ratio "
+        f"{100 * a:.3g} % by weights from {data.kind}, {100 * b:.3g} % by relative weights; {taken}, intervals hold both"
+        for f, a, b in zip(other.omega / (2.0 * np.pi), fit.zeta, other.zeta, strict=True)
+    ]
+    chosen, responses = (other, relative) if free else (fit, data)
+    return replace(chosen, systematic=systematic), responses, notes
+
+
+def with_common_distortion(fit: ModalFit) -> ModalFit:
+    """Return the fit with frequency errors as distortion makes them, whose errors lines have in common.
+
+    A cubic product of three lines falls on a fourth one, and so does each other three of them on the remaining line. A
+    stiffness exchanges energy between the four, and detunes all of them alike: in the damping the four contributions cancel in
+    part, in the frequency they add up to twice what independent lines would give.
+    """
+    scale = np.ones(fit.covariance.shape[0])
+    scale[: fit.omega.size] = _COMMON
+    return replace(fit, covariance=fit.covariance * np.outer(scale, scale))
+
+
+def _variance(fit: ModalFit) -> Float:
+    """float[m]: random variance of the parameters, with a misfit above 1."""
+    return np.diag(fit.covariance) * fit.misfit**2
+
+
+def _distorted(data: WeightedResponses, fit: ModalFit) -> bool:
+    """Return whether the errors of the responses around any mode are a considerable share of the responses."""
+    share = data.std[:, :, 0] * fit.misfit / np.maximum(np.abs(data.value[:, :, 0]), 1e-300)
+    return any(np.any(near) and np.median(share[near]) > _DISTORTED for near in _near_modes(data, fit))
+
+
+def _near_modes(data: WeightedResponses, fit: ModalFit) -> NDArray[np.bool_]:
+    """bool[n_modes, n_lines]: lines within the half-power bandwidth of each mode."""
+    apart = np.abs(2.0 * np.pi * data.frequency_hz - fit.omega[:, None])
+    return np.asarray(apart <= (np.abs(fit.zeta) * fit.omega)[:, None])

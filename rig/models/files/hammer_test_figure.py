@@ -1,0 +1,44 @@
+"""Figure of a hammer test: responses with their errors, coherence, spectrum of the force, and the hits."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification import HammerTest
+from rig.drawing.areas import is_narrow
+from rig.drawing.lines import without_wraps
+from rig.drawing.page import grid
+from rig.drawing.style import COLOURS, MAIN, REJECTED, title, unit_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_hammer_test"]
+
+_MOST_OUTPUTS = 6
+
+
+def draw_hammer_test(page: "Figure", found: HammerTest) -> None:
+    """Draw the responses in amplitude and phase, the coherence, and the spectrum of the force with the hits' peaks."""
+    responses = found.responses
+    size, phase, coherence, force = grid(page, 4, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0, 1.0))[:, 0]
+    frequency = responses.frequency_hz
+    source = responses.inputs[0]
+    for row, (output, colour) in enumerate(zip(responses.outputs[:_MOST_OUTPUTS], COLOURS, strict=False)):
+        value = responses.value[:, row, 0]
+        label = f"{output.name} over {source.name}, {unit_text(f'{output.unit}/{source.unit}')}"
+        size.semilogy(frequency, np.abs(value), color=colour, label=label)
+        size.semilogy(frequency, responses.total_std[:, row, 0], color=colour, lw=0.6, alpha=0.6)
+        phase.plot(frequency, without_wraps(np.degrees(np.angle(value))), color=colour)
+        coherence.plot(frequency, found.coherence[:, row], color=colour)
+    size.plot([], [], color=REJECTED, lw=0.6, label="thin: standard error")
+    size.set(ylabel="frequency response")
+    size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1 if is_narrow(page) else 2, borderaxespad=0.2)
+    phase.set(ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, 0, 180))
+    coherence.set(ylabel="coherence", ylim=(0.0, 1.05))
+    level = 20.0 * np.log10(found.force_n_s / np.max(found.force_n_s))
+    force.plot(frequency, level, color=MAIN)
+    force.set(xlabel="frequency, Hz", ylabel="force, dB", ylim=(min(-25.0, float(level.min()) - 2.0), 3.0))
+    window = f", window {responses.decay_rate_1_s:.3g} 1/s" if responses.decay_rate_1_s else ""
+    count = f"{len(found.used)} of {len(found.hits)} hits"
+    title(page, f"{responses.specimen or 'specimen'}: hammer test, {responses.estimator}, {count}{window}")
