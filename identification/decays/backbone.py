@@ -98,7 +98,9 @@ def decay_backbone(
         )
     candidates, notes = separated(part[motions], rate_hz, near)
     if drive_mode_shape is not None and len(candidates) > 1:
-        raise IdentificationError(f"drive_mode_shape: is that of one mode, the decay has {len(candidates)}; name one by near_hz")
+        raise IdentificationError(
+            f"drive_mode_shape: is that of one mode, the decay has {len(candidates)}; name one by near_hz"
+        )
     record = _Record(part, channels, motions, force, rate_hz, begin_s, certain)
     modes = sorted(
         (_mode(record, candidate, number, harmonics, drive_mode_shape) for candidate in candidates),
@@ -114,7 +116,9 @@ def decay_backbone(
 
 def _check(data: Float, channels: tuple[Channel, ...], number: int, harmonics: int, shape: float | None) -> None:
     if data.shape[0] != len(channels):
-        raise IdentificationError(f"samples: shape {data.shape} for {len(channels)} channels, needs one row per channel")
+        raise IdentificationError(
+            f"samples: shape {data.shape} for {len(channels)} channels, needs one row per channel"
+        )
     if not any(channel.role in ("drive", "response") for channel in channels):
         raise IdentificationError("channels: none is a motion (role drive or response), a decay needs at least one")
     for name, value in (("number", number), ("harmonics", harmonics)):
@@ -158,13 +162,19 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
     start = 0 if record.certain else fallen(np.abs(mixed))
     stop = start + reached_floor(np.abs(mixed[start:]), float(np.sqrt(noise)))
     if stop - start < _FEWEST_INSTANTS:
+        lasting = max(0, stop - start) * periods // 2
         raise IdentificationError(
-            f"samples: the mode at {candidate.track.start_hz:.4g} Hz is above the noise for {max(0, stop - start) * periods // 2} "
-            f"periods of its decay, beside the window of {4 * periods}; needs {_FEWEST_INSTANTS * periods // 2}"
+            f"samples: the mode at {candidate.track.start_hz:.4g} Hz is above the noise for {lasting} periods of its decay, "
+            f"beside the window of {4 * periods}; needs {_FEWEST_INSTANTS * periods // 2}"
         )
     kept = slice(start, stop)
     seen = Demodulated(
-        found.at_s[kept], found.theta_rad[kept], found.values[:, kept], periods, found.spread_s[kept], found.turning[kept]
+        found.at_s[kept],
+        found.theta_rad[kept],
+        found.values[:, kept],
+        periods,
+        found.spread_s[kept],
+        found.turning[kept],
     )
     series = Series(seen, mixed[kept], noise / np.abs(mixed[kept]) ** 2)
     displacement = mixed[kept] / (1j * seen.turning) ** record.order(reference)
@@ -209,7 +219,7 @@ def _reference(record: _Record, values: Complex, variance: Float) -> int:
 
 
 def _combined(values: Complex, variance: Float, reference: int) -> tuple[Complex, float]:
-    """Return the sum of channels with the least noise that equals the reference for their mean shape, and its noise variance."""
+    """Return the sum of channels with the least noise that equals the reference, and the variance of its noise."""
     power = np.abs(values[reference]) ** 2
     shape = values @ np.conj(values[reference]) / power.sum()
     floor = np.maximum(variance, np.max(variance) * 1e-6)

@@ -53,7 +53,7 @@ def _strongest_hz(moving: Float, rate_hz: float) -> float:
     spectra[:, :3] = 0.0
     largest = spectra.max(axis=1, keepdims=True)
     line = int(np.argmax(np.max(spectra / np.where(largest > 0.0, largest, 1.0), axis=0)))
-    return max(line, 3) * rate_hz / moving.shape[1]
+    return float(max(line, 3) * rate_hz / moving.shape[1])
 
 
 def _last_large(moving: Float, rate_hz: float, period_s: float) -> float:

@@ -4,7 +4,9 @@ Wide fits leave less noise and more curvature. Of several widths each level take
 curvature is the difference to a fit of a higher degree, beyond its noise and averaged over neighbouring levels.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ Float = NDArray[np.float64]
 
 _HALF_WIDTHS = (0.12, 0.2, 0.32, 0.5, 0.75, 1.1)  # in ln(amplitude)
 _NEIGHBOURS = 2
+_COLUMNS = 11
 _WINDOW_SHARE = 0.2
 """Share of the correction for the window that counts as its error: the terms of the next order."""
 _WORST = 0.25
@@ -26,9 +29,14 @@ _WORST = 0.25
 _SHORTEST_PERIODS = 1.5  # half a fit, beside the window
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LevelFits:
-    """Levels, the largest amplitude first; the fields are those of `identification.decays.result.DecayMode`."""
+    """Fits at n levels; NaN where there is none.
+
+    ``time_s``, ``reach_s`` float[n]: instants, and lengths of the fits; ``log``, ``rate`` complex[n]: L and s;
+    ``stiffness`` (1/s^2), ``damping`` (1/s) float[n]; ``log_std``, ``stiffness_std``, ``damping_std``: random standard errors;
+    ``stiffness_bound``, ``damping_bound``: bounds of systematic errors.
+    """
 
     time_s: Float
     reach_s: Float
@@ -43,37 +51,45 @@ class LevelFits:
     damping_bound: Float
 
     def local(self, series: Series, values: Complex) -> Complex:
-        """complex[n_levels]: what a slow quantity, ``values`` at the instants of the series, is at the levels."""
+        """complex[n]: what a slow quantity, ``values`` at the instants of the series, is at the levels."""
         reach = zip(self.time_s, self.reach_s, strict=True)
         return np.array([_local(series, values, at, at - 0.5 * width, at + 0.5 * width) for at, width in reach])
 
+    @property
+    def cost(self) -> Float:
+        """float[n]: relative error of the damping, random and systematic; infinite where there is no fit."""
+        error = np.hypot(self.damping_std, self.damping_bound) / np.abs(self.damping)
+        return np.where(np.isfinite(error), error, np.inf)
+
 
 def fitted_levels(series: Series, number: int, order: int, load: Complex | None) -> LevelFits:
-    """Fit at ``number`` levels in equal ratios; ``load`` complex[n]: ``phi_d^2 F / X`` at the instants of the series, 1/s^2."""
+    """Fit at ``number`` levels in equal ratios, the largest first; levels with too much noise are left out.
+
+    ``order``: how often the signal is differentiated against the displacement; ``load`` complex[n]: ``phi_d^2 F / X`` at the
+    instants of the series, 1/s^2, if a force acts.
+    """
     envelope = _envelope(series)
-    tops = np.linspace(envelope[0], envelope[-1], number + 2)[1:-1] if number > 1 else np.array([0.5 * (envelope[0] + envelope[-1])])
     if not envelope[0] > envelope[-1]:
         raise IdentificationError("samples: the vibration does not decay; give start_s and stop_s")
+    levels = np.linspace(envelope[0], envelope[-1], number + 2)[1:-1]
     falling = np.minimum.accumulate(envelope)
-    centres = np.array([np.interp(-level, -falling, series.seen.at_s) for level in tops])
-    tables = [_at_width(series, centres, tops, falling, width, order, load) for width in _HALF_WIDTHS]
-    cost = np.array([table.cost() for table in tables])
-    if not np.isfinite(cost).any():
-        raise IdentificationError("samples: the decay is too short for a fit at any level; record at a higher level or longer")
-    least = np.min(np.where(np.isfinite(cost), cost, np.inf), axis=0)
-    keep = least < _WORST
-    if not keep.any():
+    centres = np.array([np.interp(-level, -falling, series.seen.at_s) for level in levels])
+    tables = [_at_width(series, centres, levels, falling, width, order, load) for width in _HALF_WIDTHS]
+    cost = np.array([table.cost for table in tables])
+    least = cost.min(axis=0)
+    if not np.isfinite(least).any():
         raise IdentificationError(
-            f"samples: the noise leaves the damping unknown by {100.0 * float(least.min()):.0f} % at every level; record at a "
-            "higher level"
+            "samples: the decay is too short for a fit at any level; record it longer, or from a higher level"
         )
-    best = np.argmin(np.where(np.isfinite(cost), cost, np.inf), axis=0)
-    chosen = [(tables[best[level]], level) for level in np.flatnonzero(keep)]
-    picked = {name: np.array([getattr(table, name)[level] for table, level in chosen]) for name in _PICKED}
-    return LevelFits(time_s=centres[keep], **picked)
-
-
-_PICKED = tuple(name for name in LevelFits.__dataclass_fields__ if name != "time_s")
+    keep = np.flatnonzero(least < _WORST)
+    if not keep.size:
+        raise IdentificationError(
+            f"samples: the noise leaves the damping uncertain by {100.0 * float(least.min()):.0f} % at every level; record "
+            "from a higher level"
+        )
+    best = cost.argmin(axis=0)
+    names = [entry.name for entry in fields(LevelFits)]
+    return LevelFits(**{name: np.array([getattr(tables[best[n]], name)[n] for n in keep]) for name in names})
 
 
 def _envelope(series: Series) -> Float:
@@ -88,65 +104,47 @@ def _envelope(series: Series) -> Float:
     return np.asarray(make_lsq_spline(u, series.log.real, knots, 3, w=weight)(u))
 
 
-@dataclass(frozen=True, eq=False)
-class _Table:
-    """All levels at one width; NaN where there is no fit."""
-
-    reach_s: Float
-    log: Complex
-    rate: Complex
-    stiffness: Float
-    damping: Float
-    log_std: Float
-    stiffness_std: Float
-    damping_std: Float
-    stiffness_bound: Float
-    damping_bound: Float
-
-    def cost(self) -> Float:
-        """float[n]: relative error of the damping and of the frequency, random and systematic."""
-        damping = np.hypot(self.damping_std, self.damping_bound) / np.abs(self.damping)
-        return np.asarray(damping)
-
-
 def _at_width(
     series: Series, centres: Float, levels: Float, falling: Float, width: float, order: int, load: Complex | None
-) -> _Table:
-    rows = np.full((centres.size, 11), np.nan, np.complex128)
+) -> LevelFits:
+    """Fit at all levels over ``width`` in ln(amplitude) to either side."""
+    rows = np.full((centres.size, _COLUMNS), np.nan, np.complex128)
     for number, (centre, level) in enumerate(zip(centres, levels, strict=True)):
         turning = float(np.interp(centre, series.seen.at_s, series.seen.turning))
-        least = _SHORTEST_PERIODS * 2.0 * np.pi / turning * max(1.0, series.seen.periods)
+        least = _SHORTEST_PERIODS * 2.0 * np.pi / turning * series.seen.periods
         early = min(float(np.interp(-(level + width), -falling, series.seen.at_s)), centre - least)
         late = max(float(np.interp(-(level - width), -falling, series.seen.at_s)), centre + least)
         fit = rates_at(series, centre, (early, late), order)
         if fit is not None:
-            pull = 0.0j if load is None else complex(_local(series, load, centre, early, late))
+            pull = 0.0j if load is None else _local(series, load, centre, early, late)
             rows[number] = _row(fit, pull, late - early)
-    real = rows.real
-    misfit = _pooled(real[:, 10], np.median)
-    scale = np.sqrt(np.maximum(misfit, 1.0))
-    stds = real[:, 4:7] * scale[:, None]
+    scale = np.sqrt(np.maximum(_pooled(rows[:, 9].real, np.median), 1.0))
+    random = rows[:, 4:7].real * scale[:, None]
     bounds = []
-    for column in (0, 1):
-        apart = rows[:, 7 + column]  # difference of the fits of two degrees, and its standard error times i
-        square = np.abs(apart.real) ** 2 - (scale * apart.imag) ** 2
-        bounds.append(np.sqrt(np.maximum(_pooled(square, np.mean), 0.0)) + _WINDOW_SHARE * np.abs(rows[:, 9].real if column else rows[:, 9].imag))
-    return _Table(
-        reach_s=real[:, 3] * 0.0 + real[:, 3],
+    for apart, window in ((rows[:, 7], rows[:, 10].real), (rows[:, 8], rows[:, 10].imag)):
+        beyond_noise = apart.real**2 - (scale * apart.imag) ** 2
+        bounds.append(np.sqrt(np.maximum(_pooled(beyond_noise, np.mean), 0.0)) + _WINDOW_SHARE * np.abs(window))
+    return LevelFits(
+        time_s=centres,
+        reach_s=rows[:, 3].real,
         log=rows[:, 0],
         rate=rows[:, 1],
         stiffness=rows[:, 2].real,
         damping=rows[:, 2].imag,
-        log_std=stds[:, 0],
-        stiffness_std=stds[:, 1],
-        damping_std=stds[:, 2],
+        log_std=random[:, 0],
+        stiffness_std=random[:, 1],
+        damping_std=random[:, 2],
         stiffness_bound=bounds[0],
         damping_bound=bounds[1],
     )
 
 
 def _row(fit: Rates, pull: complex, reach_s: float) -> list[complex]:
-    """Properties of one fit, errors to first order."""
+    """Return the columns of a table of fits.
+
+    L, s, ``k + i c``, the length, standard errors of ln(amplitude), k and c, the differences of k and of c to the fit of higher
+    degree with their standard errors times i, the misfit, and the effect of the window on ``k + i c``.
+    """
     stiffness, damping = _properties(fit.rate, fit.change, pull)
     further = _properties(fit.rate + fit.further[1], fit.change + fit.further[2], pull)
     corrected = _properties(fit.rate - fit.correction, fit.change, pull)
@@ -167,8 +165,8 @@ def _row(fit: Rates, pull: complex, reach_s: float) -> list[complex]:
         std(on_damping, fit.covariance),
         further[0] - stiffness + 1j * std(on_stiffness, fit.further_covariance),
         further[1] - damping + 1j * std(on_damping, fit.further_covariance),
-        (corrected[1] - damping) + 1j * (corrected[0] - stiffness),
         fit.misfit,
+        corrected[0] - stiffness + 1j * (corrected[1] - damping),
     ]
 
 
@@ -189,7 +187,7 @@ def _local(series: Series, load: Complex, centre: float, early: float, late: flo
     return complex(np.linalg.lstsq(design.astype(np.complex128), load[near] * root, rcond=None)[0][0])
 
 
-def _pooled(values: Float, by) -> Float:  # type: ignore[no-untyped-def]
+def _pooled(values: Float, by: Callable[..., Any]) -> Float:
     """float[n]: ``by`` over each level and its neighbours, those without a fit left out."""
     out = np.full(values.size, np.nan)
     for number in range(values.size):

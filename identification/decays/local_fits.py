@@ -28,7 +28,7 @@ _LEAST_SPAN = 3.0  # in units of P periods
 
 
 class Series:
-    """A vibration at n instants: ``seen``, its ``values`` complex[n] and the ``variance`` float[n] of their logarithm's noise."""
+    """A vibration at n instants: ``seen``, ``values`` complex[n], and the ``variance`` float[n] of their logarithm."""
 
     def __init__(self, seen: Demodulated, values: Complex, variance: Float) -> None:
         self.seen, self.variance = seen, variance
@@ -113,5 +113,5 @@ def _solved(u: Float, weight: Float, values: Complex, degree: int) -> tuple[Comp
     """Return coefficients complex[degree + 1] and the map float[degree + 1, n] from values to them."""
     design = np.vander(u, degree + 1, increasing=True)
     root = np.sqrt(weight)
-    mapping = np.linalg.pinv(design * root[:, None]) * root
+    mapping = np.asarray(np.linalg.pinv(design * root[:, None]) * root, np.float64)
     return mapping @ values, mapping

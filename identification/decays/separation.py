@@ -1,7 +1,7 @@
 """Which modes of a decay can be told apart, and by how narrow a filter."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,9 +48,7 @@ class _Found:
         return 0.5 * (self.track.lowest_hz + self.track.highest_hz)
 
 
-def separated(
-    data: Float, rate_hz: float, near_hz: Sequence[float] | None
-) -> tuple[list[Candidate], tuple[str, ...]]:
+def separated(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tuple[list[Candidate], tuple[str, ...]]:
     """Find the modes in a decay (float[n_channels, n]), and a filter for each that keeps the others out.
 
     Raises `IdentificationError` if there is none, or if a named mode is not there or cannot be told from another; modes that
@@ -165,7 +163,9 @@ def _filter(one: _Found, others: Sequence[_Found]) -> tuple[int | None, str]:
     shortest = int(np.clip(min(_USUAL_DECAY / (4.0 * one.decay), cycles / 64.0), 1, longest))
     found = []
     for periods in range(shortest, longest + 1):
-        largest, which = max((_neighbour(one, other, periods) for other in others if other is not one), default=(0.0, ""))
+        largest, which = max(
+            (_neighbour(one, other, periods) for other in others if other is not one), default=(0.0, "")
+        )
         if largest < _SMALL_LEAK:
             return periods, ""
         found.append((largest, periods, which))

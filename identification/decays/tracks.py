@@ -163,7 +163,7 @@ def _smoothed(theta: Float, rate: Float, size: Float, periods: int) -> Float:
 def _followed(signal: Float, rate_hz: float, near_hz: float, length: int) -> Ridge | None:
     starts = np.arange(0, signal.size - length + 1, max(1, length // 8))
     window = np.hanning(length)
-    frequency = np.fft.rfftfreq(_PADDING * length, 1.0 / rate_hz)
+    frequency = np.asarray(np.fft.rfftfreq(_PADDING * length, 1.0 / rate_hz), np.float64)
     spectra = np.empty((starts.size, frequency.size), np.float32)
     for number, start in enumerate(starts):
         part = signal[start : start + length]

@@ -8,14 +8,16 @@ from typing import get_args
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.models.identify.data_request import DataOptions
+from rig.models.identify.decay_request import DecayOptions
 from rig.models.identify.pnlss_request import PnlssOptions
 from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 
 __all__ = ["Request"]
 
 _OPTIONS: dict[str, tuple[str, ...]] = {
-    "nonlinear-mode": ("modes",),
+    "nonlinear-mode": ("modes", "near_hz"),
     "linear": ("estimator", "band_hz", "count"),
+    "decay": tuple(DecayOptions().given()),
     "force-surface": (),
     "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
     "pnlss": (*PnlssOptions().given(), *DataOptions().given()),
@@ -30,7 +32,7 @@ class Request:
     """What to identify, and how."""
 
     kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter``, ``pnlss`` or ``structured``."""
+    """``nonlinear-mode``, ``decay``, ``linear``, ``force-surface``, ``exciter``, ``pnlss`` or ``structured``."""
     modes: Path | None = None
     """Linear model whose mode shapes are used for a nonlinear mode, or with which a structured model begins."""
     estimator: str = "instrument"
@@ -49,6 +51,8 @@ class Request:
     """Options for a nonlinear state-space model."""
     structured: StructuredOptions = field(default_factory=StructuredOptions)
     """Options for a structured model."""
+    decay: DecayOptions = field(default_factory=DecayOptions)
+    """Options for a free decay."""
     data: DataOptions = field(default_factory=DataOptions)
     """Data of a nonlinear state-space model or a structured model."""
 
@@ -77,6 +81,7 @@ class Request:
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
             **self.structured.given(),
+            **self.decay.given(),
             **self.data.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
