@@ -63,7 +63,7 @@ def _last_large(moving: Float, rate_hz: float, period_s: float) -> float:
     still = moving - np.median(moving, axis=1, keepdims=True)
     variance = still.var(axis=1, keepdims=True)
     power = np.sum(still**2 / np.where(variance > 0.0, variance, 1.0), axis=0)
-    envelope = np.sqrt(np.maximum(uniform_filter1d(power, width, mode="nearest"), 0.0))
+    envelope = np.sqrt(np.maximum(uniform_filter1d(power, width, mode="reflect"), 0.0))
     return float(np.flatnonzero(envelope >= (1.0 - _WITHIN) * envelope.max())[-1] / rate_hz)
 
 
