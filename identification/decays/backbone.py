@@ -5,7 +5,7 @@ those of the backbone. `identification.decays.local_fits` has the equations.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,9 @@ from identification.decays.levels import LevelFits, fitted_levels
 from identification.decays.local_fits import Series
 from identification.decays.result import DecayBackbone, DecayMode
 from identification.decays.separation import Candidate, separated
+from identification.decays.with_force import decay_with_force
 from identification.errors import IdentificationError
+from identification.slow_flows.slow_flow import slow_flow
 from identification.validation import finite_array, positive
 
 __all__ = ["decay_backbone"]
@@ -41,6 +43,7 @@ def decay_backbone(
     number: int = 15,
     harmonics: int = 7,
     drive_mode_shape: float | None = None,
+    residual_m_n: float = 0.0,
     specimen: str = "",
 ) -> DecayBackbone:
     """Identify modal frequency and damping over the amplitude from a free decay.
@@ -65,7 +68,9 @@ def decay_backbone(
         Highest harmonic of the displacement in the result.
     drive_mode_shape
         Mass-normalised mode shape at the drive point, kg^-1/2, if one mode is evaluated. Needed for modal amplitudes, and
-        to take out a force that acts during the decay.
+        to take out a force that acts during the decay, as that of an exciter (`identification.decays.with_force`).
+    residual_m_n
+        Receptance of all other modes at the drive point, m/N, where a force is taken out; see `identification.slow_flow`.
     specimen
         Name of what was tested.
 
@@ -102,15 +107,16 @@ def decay_backbone(
             f"drive_mode_shape: is that of one mode, the decay has {len(candidates)}; name one by near_hz"
         )
     record = _Record(part, channels, motions, force, rate_hz, begin_s, certain)
-    modes = sorted(
-        (_mode(record, candidate, number, harmonics, drive_mode_shape) for candidate in candidates),
-        key=lambda mode: float(mode.modal_frequency_hz[-1]),
-    )
+    if force is not None and drive_mode_shape is not None:
+        modes = [_without_exciter(record, candidates[0], number, harmonics, drive_mode_shape, residual_m_n)]
+    else:
+        modes = [_mode(record, candidate, number, harmonics, drive_mode_shape) for candidate in candidates]
+        modes.sort(key=lambda mode: float(mode.modal_frequency_hz[-1]))
     return DecayBackbone(
         modes=tuple(modes),
         channels=channels,
         specimen=specimen,
-        notes=(*notes, *(() if drive_mode_shape else _left_force(modes))),
+        notes=(*notes, *(_left_force(modes) if drive_mode_shape is None else ())),
     )
 
 
@@ -179,8 +185,7 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
     series = Series(seen, mixed[kept], noise / np.abs(mixed[kept]) ** 2)
     displacement = mixed[kept] / (1j * seen.turning) ** record.order(reference)
     force = np.zeros(stop - start, np.complex128) if record.force is None else seen.values[record.force]
-    load = None if shape is None or record.force is None else shape**2 * force / displacement
-    fits = fitted_levels(series, number, record.order(reference), load)
+    fits = fitted_levels(series, number, record.order(reference))
     deflection = np.full((fits.time_s.size, len(record.channels)), complex(np.nan, np.nan))
     for row in record.motions:
         ratio = fits.local(series, seen.values[row] / mixed[kept])
@@ -198,6 +203,7 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
         damping_ratio=0.5 * fits.damping / omega,
         damping_ratio_std=0.5 * fits.damping_std / omega,
         damping_ratio_systematic=0.5 * fits.damping_bound / omega,
+        decay_ratio=-fits.rate.real / omega,
         deflection=deflection / deflection[:, [reference]],
         harmonics_m=_harmonics(record, reference, theta, fits, series, harmonics) * amplitude[:, None],
         force_n=fits.local(series, force / displacement) * amplitude,
@@ -206,6 +212,29 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
         stop_s=record.begin_s + float(seen.at_s[-1]),
         floor_m=float(np.sqrt(noise) / seen.turning[-1] ** record.order(reference)),
         drive_mode_shape=shape,
+    )
+
+
+def _without_exciter(
+    record: _Record, candidate: Candidate, number: int, harmonics: int, shape: float, residual_m_n: float
+) -> DecayMode:
+    """Evaluate a mode with the measured force as its input; times are those of the record."""
+    highest = int(np.pi / float(np.max(np.diff(candidate.track.theta_rad)))) - 2
+    flow = slow_flow(
+        candidate.track.theta_rad,
+        record.data,
+        record.channels,
+        sample_rate_hz=record.rate_hz,
+        drive_mode_shape=shape,
+        harmonics=max(1, min(harmonics, highest)),
+        residual_m_n=residual_m_n,
+    )
+    mode = decay_with_force(flow, start_s=0.0, number=number)
+    return replace(
+        mode,
+        time_s=record.begin_s + mode.time_s,
+        start_s=record.begin_s + mode.start_s,
+        stop_s=record.begin_s + mode.stop_s,
     )
 
 

@@ -62,11 +62,10 @@ class LevelFits:
         return np.where(np.isfinite(error), error, np.inf)
 
 
-def fitted_levels(series: Series, number: int, order: int, load: Complex | None) -> LevelFits:
+def fitted_levels(series: Series, number: int, order: int) -> LevelFits:
     """Fit at ``number`` levels in equal ratios, the largest first; levels with too much noise are left out.
 
-    ``order``: how often the signal is differentiated against the displacement; ``load`` complex[n]: ``phi_d^2 F / X`` at the
-    instants of the series, 1/s^2, if a force acts.
+    ``order``: how often the signal is differentiated against the displacement.
     """
     envelope = _envelope(series)
     if not envelope[0] > envelope[-1]:
@@ -74,7 +73,7 @@ def fitted_levels(series: Series, number: int, order: int, load: Complex | None)
     levels = np.linspace(envelope[0], envelope[-1], number + 2)[1:-1]
     falling = np.minimum.accumulate(envelope)
     centres = np.array([np.interp(-level, -falling, series.seen.at_s) for level in levels])
-    tables = [_at_width(series, centres, levels, falling, width, order, load) for width in _HALF_WIDTHS]
+    tables = [_at_width(series, centres, levels, falling, width, order) for width in _HALF_WIDTHS]
     cost = np.array([table.cost for table in tables])
     least = cost.min(axis=0)
     if not np.isfinite(least).any():
@@ -104,9 +103,7 @@ def _envelope(series: Series) -> Float:
     return np.asarray(make_lsq_spline(u, series.log.real, knots, 3, w=weight)(u))
 
 
-def _at_width(
-    series: Series, centres: Float, levels: Float, falling: Float, width: float, order: int, load: Complex | None
-) -> LevelFits:
+def _at_width(series: Series, centres: Float, levels: Float, falling: Float, width: float, order: int) -> LevelFits:
     """Fit at all levels over ``width`` in ln(amplitude) to either side."""
     rows = np.full((centres.size, _COLUMNS), np.nan, np.complex128)
     for number, (centre, level) in enumerate(zip(centres, levels, strict=True)):
@@ -116,8 +113,7 @@ def _at_width(
         late = max(float(np.interp(-(level - width), -falling, series.seen.at_s)), centre + least)
         fit = rates_at(series, centre, (early, late), order)
         if fit is not None:
-            pull = 0.0j if load is None else _local(series, load, centre, early, late)
-            rows[number] = _row(fit, pull, late - early)
+            rows[number] = _row(fit, late - early)
     scale = np.sqrt(np.maximum(_pooled(rows[:, 9].real, np.median), 1.0))
     random = rows[:, 4:7].real * scale[:, None]
     bounds = []
@@ -139,15 +135,15 @@ def _at_width(
     )
 
 
-def _row(fit: Rates, pull: complex, reach_s: float) -> list[complex]:
+def _row(fit: Rates, reach_s: float) -> list[complex]:
     """Return the columns of a table of fits.
 
     L, s, ``k + i c``, the length, standard errors of ln(amplitude), k and c, the differences of k and of c to the fit of higher
     degree with their standard errors times i, the misfit, and the effect of the window on ``k + i c``.
     """
-    stiffness, damping = _properties(fit.rate, fit.change, pull)
-    further = _properties(fit.rate + fit.further[1], fit.change + fit.further[2], pull)
-    corrected = _properties(fit.rate - fit.correction, fit.change, pull)
+    stiffness, damping = _properties(fit.rate, fit.change)
+    further = _properties(fit.rate + fit.further[1], fit.change + fit.further[2])
+    corrected = _properties(fit.rate - fit.correction, fit.change)
     omega = fit.rate.imag
     on_damping = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 1.0 / omega]])  # by real and by imaginary parts of L, s, s'
     on_stiffness = np.array([[0.0, damping + 2.0 * fit.rate.real, 1.0], [0.0, 2.0 * omega, 0.0]])
@@ -170,9 +166,9 @@ def _row(fit: Rates, pull: complex, reach_s: float) -> list[complex]:
     ]
 
 
-def _properties(rate: complex, change: complex, pull: complex) -> tuple[float, float]:
-    """Stiffness k (1/s^2) and damping c (1/s) from ``s^2 + s' + c s + k = pull``."""
-    left = pull - rate**2 - change
+def _properties(rate: complex, change: complex) -> tuple[float, float]:
+    """Stiffness k (1/s^2) and damping c (1/s) from ``s^2 + s' + c s + k = 0``."""
+    left = -(rate**2) - change
     damping = left.imag / rate.imag
     return float(left.real - damping * rate.real), float(damping)
 

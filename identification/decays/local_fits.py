@@ -5,7 +5,7 @@ With ``X = exp(L)`` and ``s = L'`` (growth rate and angular frequency, ``s = sig
     s^2 + s' + c s + k = 0,    c = -2 sigma - Omega' / Omega,    k = Omega^2 - sigma^2 - sigma' - c sigma,
 
 c (1/s) and k (1/s^2) at the instantaneous amplitude: the equation of motion after one harmonic is balanced (Krylov and
-Bogoliubov), no further approximation. With a force F at the drive point ``phi_d^2 F / X`` stands on the right-hand side.
+Bogoliubov), no further approximation.
 
 The window of the demodulation, of variance m (s^2), shifts L by ``m (l^2 + l' - l theta'' / theta') / 2``, l the rate against
 the phase theta of the demodulation; this is subtracted.

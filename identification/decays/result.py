@@ -19,7 +19,7 @@ Float = NDArray[np.float64]
 
 _TABLE = (
     *("amplitude_m", "time_s", "frequency_hz", "modal_frequency_hz", "modal_frequency_std_hz"),
-    *("modal_frequency_systematic_hz", "damping_ratio", "damping_ratio_std", "damping_ratio_systematic"),
+    *("modal_frequency_systematic_hz", "damping_ratio", "damping_ratio_std", "damping_ratio_systematic", "decay_ratio"),
 )
 
 
@@ -41,6 +41,9 @@ class DecayMode:
         float[n], random standard errors, from the noise of the record.
     modal_frequency_systematic_hz, damping_ratio_systematic
         float[n], estimated bounds of the systematic errors: curvature within the fits, window, and what the force leaves.
+    decay_ratio
+        float[n], rate of decay over the modal frequency: the damping ratio of the vibration as it was, with an exciter that
+        hung on the structure.
     deflection
         complex[n, n_channels], displacement of every motion channel over that of the reference; NaN for other channels.
     harmonics_m
@@ -67,6 +70,7 @@ class DecayMode:
     damping_ratio: Float
     damping_ratio_std: Float
     damping_ratio_systematic: Float
+    decay_ratio: Float
     deflection: Complex
     harmonics_m: Complex
     force_n: Complex
