@@ -52,7 +52,13 @@ class _Level:
 
 
 def decay_with_force(
-    flow: SlowFlow, *, start_s: float, stop_s: float | None = None, number: int = 10, drive_mode_shape_std: float = 0.0
+    flow: SlowFlow,
+    *,
+    start_s: float,
+    stop_s: float | None = None,
+    number: int = 10,
+    drive_mode_shape_std: float = 0.0,
+    residual_std_m_n: float = 0.0,
 ) -> DecayMode:
     """Return the properties of the mode without the exciter, from the slow flow of its decay.
 
@@ -68,6 +74,8 @@ def decay_with_force(
         Number of levels in equal ratios of the amplitude.
     drive_mode_shape_std
         Standard error of the slow flow's mode shape, kg^-1/2; it counts among the systematic errors.
+    residual_std_m_n
+        Standard error of the slow flow's receptance of the other modes, m/N; likewise.
 
     Raises
     ------
@@ -98,7 +106,7 @@ def decay_with_force(
     best = cost.argmin(axis=0)
     chosen = [found for n in keep if (found := tables[best[n]][n]) is not None]
     bounds = np.array([errors[best[n], n] for n in keep])
-    return _mode(decay, chosen, bounds, drive_mode_shape_std)
+    return _mode(decay, chosen, bounds, drive_mode_shape_std, residual_std_m_n)
 
 
 def _quiet(flow: SlowFlow) -> float:
@@ -162,7 +170,7 @@ def _pooled(table: Sequence[_Level | None]) -> Float:
     return out
 
 
-def _mode(decay: SlowFlow, levels: Sequence[_Level], bounds: Float, shape_std: float) -> DecayMode:
+def _mode(decay: SlowFlow, levels: Sequence[_Level], bounds: Float, shape_std: float, residual_std: float) -> DecayMode:
     amplitude, stiffness, damping = (
         np.array([getattr(one, name) for one in levels]) for name in ("amplitude_m", "stiffness", "damping")
     )
@@ -177,9 +185,12 @@ def _mode(decay: SlowFlow, levels: Sequence[_Level], bounds: Float, shape_std: f
         return np.asarray(real + 1j * np.interp(place, falling[order], np.imag(values)[order]))
 
     pull = at(decay.drive_mode_shape**2 * decay.force[:, 1] / decay.drive_m)
-    relative = 2.0 * shape_std / abs(decay.drive_mode_shape)
-    by_shape = 1.96 * relative * np.abs(np.stack([pull.real, pull.imag / at(decay.rate_1_s).imag], axis=-1))
-    bounds = bounds + by_shape
+    turning = at(decay.rate_1_s).imag
+    for error in (
+        2.0 * shape_std / abs(decay.drive_mode_shape) * pull,
+        residual_std / decay.drive_mode_shape**2 * pull**2,
+    ):
+        bounds = bounds + 1.96 * np.abs(np.stack([error.real, error.imag / turning], axis=-1))
     if amplitude.size > 1:  # what changes with the amplitude lags behind it, to first order in the rate of decay
         lag = np.abs(np.gradient(stiffness, np.log(amplitude)) * at(growth).real) / stiffness
         bounds[:, 1] += lag

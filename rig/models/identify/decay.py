@@ -12,8 +12,9 @@ from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import channels_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
+from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import bench_of_recording, point_rows
+from rig.measurements import bench_of_recording, decays, point_rows
 from rig.models.identify.decay_request import DecayOptions
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -39,6 +40,8 @@ def identified_decay(paths: Sequence[Path], options: DecayOptions) -> DecayBackb
     """
     if len(paths) != 1:
         raise ConfigurationError(f"`kind` decay: {len(paths)} files given, allowed is one")
+    if kind_of(paths[0]) in kinds_that_yield(DecayBackbone):
+        return _measured(paths[0], options)
     record = _recorded(paths[0], options.point)
     return decay_backbone(
         record.samples,
@@ -51,6 +54,21 @@ def identified_decay(paths: Sequence[Path], options: DecayOptions) -> DecayBackb
         specimen=record.specimen,
         **({} if options.levels is None else {"number": options.levels}),
     )
+
+
+def _measured(path: Path, options: DecayOptions) -> DecayBackbone:
+    """Return a decay of a decay campaign: of the given point, or of the one with the largest amplitude."""
+    given = [name for name, is_given in options.given().items() if is_given and name != "point"]
+    if given:
+        raise ConfigurationError(f"`{given[0]}`: a decay campaign knows it from its plan; leave it out")
+    with Recording(path) as recording:
+        found = decays(recording)
+    if options.point is not None and options.point - 1 not in found:
+        known = ", ".join(str(number + 1) for number in found)
+        raise RecordingError(f"{path}: {point_name(options.point - 1)}: holds no decay; points {known} do")
+    if options.point is not None:
+        return found[options.point - 1]
+    return max(found.values(), key=lambda one: float(one.mode().amplitude_m[0]))
 
 
 def _recorded(path: Path, point: int | None) -> _Record:
