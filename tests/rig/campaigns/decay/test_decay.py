@@ -7,7 +7,7 @@ from scipy.stats import binomtest
 
 import rig
 from identification import Backbone, DecayBackbone, nonlinear_mode
-from rig.bench import load_bench
+from rig.bench import Bench, load_bench
 from rig.campaigns.decay.plan import DecayPlan
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import load_plan
@@ -203,3 +203,30 @@ def test_a_decay_becomes_a_model_of_a_file(magnet, tmp_path):
     assert load(tmp_path / "decay.h5").mode().table() == found.mode().table()
     mode = identify_model([tmp_path / "decay.h5"], Request())
     assert mode.source == "free decay"
+
+
+def released(how, decay_periods, **options):
+    table = load_bench("magnet-beam").model_dump(mode="json", exclude_unset=True)
+    table["driver"]["options"] |= {"at_zero_v": how, **options}
+    plan = decay(levels_v=[1.8], decay_periods=decay_periods)
+    return rig.run(plan, bench=Bench.model_validate(table), seed=3)
+
+
+@pytest.mark.parametrize(
+    ("how", "periods", "with_exciter"), [("open-circuit", 120, 0.031), ("stinger-dropped", 300, 0.004)]
+)
+def test_a_virtual_exciter_may_be_opened_or_dropped_at_the_release(how, periods, with_exciter):
+    with released(how, periods) as run:
+        mode = decays(run.recording)[0].mode()
+    np.testing.assert_allclose(mode.decay_ratio[:3], with_exciter, rtol=0.06)
+    _, damping, relative = against_harmonic_balance(mode, "magnet-beam", 24.4)
+    assert np.abs(damping).max() < 1.0
+    assert np.abs(relative[:4]).max() < 0.01
+
+
+def test_a_way_to_release_that_does_not_exist_or_a_worn_specimen_is_refused():
+    with pytest.raises(ConfigurationError, match="at_zero_v"):
+        released("unplugged", 60)
+    wear = {"frequency_per_s": [-0.0004], "until_s": 60.0, "every_s": 0.1}
+    with pytest.raises(ConfigurationError, match=r"at_zero_v = 'open-circuit'.*wears"):
+        released("open-circuit", 60, wear=wear)
