@@ -197,8 +197,7 @@ class VirtualRig(Part):
     def released(self, how: Literal["open-circuit", "stinger-dropped"]) -> "VirtualRig":
         """Return the rig with its coil open, so that no current damps it, or with its stinger off.
 
-        Its state has the same coordinates, so that a run can go on with its arrays. An open coil has 10 000 times the
-        resistance; a stinger that is off has a stiffness of 1e-6 N/m. An amplifier of current holds 0 A at 0 V already.
+        A run can go on with its arrays. An open coil has 10 000 times the resistance, a stinger that is off 1e-6 N/m.
         """
         if how == "open-circuit":
             opened = (
