@@ -104,7 +104,7 @@ def decay_backbone(
     candidates, notes = separated(part[motions], rate_hz, near)
     if drive_mode_shape is not None and len(candidates) > 1:
         raise IdentificationError(
-            f"drive_mode_shape: is that of one mode, the decay has {len(candidates)}; name one by near_hz"
+            f"drive_mode_shape: is that of one mode, the decay has {len(candidates)}; name one by `near_hz`"
         )
     record = _Record(part, channels, motions, force, rate_hz, begin_s, certain)
     if force is not None and drive_mode_shape is not None:
@@ -285,6 +285,6 @@ def _left_force(modes: Sequence[DecayMode]) -> list[str]:
         if largest > 0.0 and np.all(np.diff(np.abs(mode.force_n)) < 0.0):
             notes.append(
                 f"a force of {largest:.3g} N acts on the mode at {mode.modal_frequency_hz[-1]:.4g} Hz while it decays: its "
-                "stiffness and damping are in the result; with drive_mode_shape they are taken out"
+                "stiffness and damping are in the result; with `drive_mode_shape` they are taken out"
             )
     return notes

@@ -69,7 +69,7 @@ def fitted_levels(series: Series, number: int, order: int) -> LevelFits:
     """
     envelope = _envelope(series)
     if not envelope[0] > envelope[-1]:
-        raise IdentificationError("samples: the vibration does not decay; give start_s and stop_s")
+        raise IdentificationError("samples: the vibration does not decay; give `start_s` and `stop_s`")
     levels = np.linspace(envelope[0], envelope[-1], number + 2)[1:-1]
     falling = np.minimum.accumulate(envelope)
     centres = np.array([np.interp(-level, -falling, series.seen.at_s) for level in levels])

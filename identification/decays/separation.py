@@ -78,7 +78,7 @@ def separated(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> t
         chosen.append(Candidate(track, periods))
     if not chosen:
         raise IdentificationError(
-            "samples: " + ("; ".join(notes) or "no mode stands out of the noise; name one by near_hz")
+            "samples: " + ("; ".join(notes) or "no mode stands out of the noise; name one by `near_hz`")
         )
     return chosen, tuple(notes)
 
