@@ -28,6 +28,8 @@ Nonlinear modes
     nonlinear_mode, NonlinearMode, single_point_mode, stepped_sine_mode, repeatability, Repeatability, combined
 Short points and continuous backbones
     slow_flow, SlowFlow, short_point, ShortPoint, continuous_backbone, ContinuousBackbone
+Free decays
+    decay_backbone, DecayBackbone, DecayMode
 Response-controlled tests
     force_surface, ForceSurface, ConstantForceCurve
 Prediction with nonlinear modes
@@ -62,6 +64,8 @@ from vibrolock.on_use import on_use
 if TYPE_CHECKING:
     from identification.backbones import Backbone
     from identification.channels import Channel
+    from identification.decays.backbone import decay_backbone
+    from identification.decays.result import DecayBackbone, DecayMode
     from identification.errors import IdentificationError
     from identification.frequency_responses import (
         FrequencyResponse,
@@ -169,6 +173,8 @@ else:
             "ContinuousBackbone": "slow_flows.continuous",
             "CoupledMotion": "structured.coupled.run",
             "CoupledRun": "pnlss.coupled.run",
+            "DecayBackbone": "decays.result",
+            "DecayMode": "decays.result",
             "DistortionLevels": "multisine.distortion",
             "ElementPlan": "structured.further",
             "ElementTrial": "structured.element_trials",
@@ -244,6 +250,7 @@ else:
             "compare": "prediction.comparison",
             "compare_sweep": "prediction.sweep_prediction",
             "continuous_backbone": "slow_flows.continuous",
+            "decay_backbone": "decays.backbone",
             "decimated": "signals.decimation",
             "demodulate": "signals.transients",
             "distortion_levels": "multisine.distortion",
@@ -321,6 +328,8 @@ __all__ = [
     "ContinuousBackbone",
     "CoupledMotion",
     "CoupledRun",
+    "DecayBackbone",
+    "DecayMode",
     "DistortionLevels",
     "ElementPlan",
     "ElementTrial",
@@ -396,6 +405,7 @@ __all__ = [
     "compare",
     "compare_sweep",
     "continuous_backbone",
+    "decay_backbone",
     "decimated",
     "demodulate",
     "distortion_levels",

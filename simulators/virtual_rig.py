@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ from simulators.structures.structure import ModalStructure, Structure
 from simulators.wear import Wear
 
 __all__ = ["VirtualRig"]
+
+_OPEN, _LOOSE_N_M = 1e4, 1e-6
 
 
 class VirtualRig(Part):
@@ -191,6 +193,19 @@ class VirtualRig(Part):
             rate_hz = self.converter.sample_rate_hz
             deviation = self._worn_deviation(self.wear.held_s(round(time_s * rate_hz), rate_hz))
         return self._changed({"deviation": deviation, "wear": Wear()})
+
+    def released(self, how: Literal["open-circuit", "stinger-dropped"]) -> "VirtualRig":
+        """Return the rig with its coil open, so that no current damps it, or with its stinger off.
+
+        A run can go on with its arrays. An open coil has 10 000 times the resistance, a stinger that is off 1e-6 N/m.
+        """
+        if how == "open-circuit":
+            opened = (
+                {"resistance_ohm": _OPEN * self.exciter.resistance_ohm} if self.exciter.amplifier == "voltage" else {}
+            )
+            return self._changed({"exciter": self.exciter.model_copy(update=opened)})
+        loose = {"stiffness_n_m": _LOOSE_N_M, "damping_n_s_m": 0.0}
+        return self._changed({"stinger": self.stinger.model_copy(update=loose)})
 
     def pieces(self, arrays: RigArrays, first: int, n: int) -> Iterator[tuple[RigArrays, slice]]:
         """Split the next ``n`` samples of a run, from sample ``first`` on, into pieces during which the plant is constant.

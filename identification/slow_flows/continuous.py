@@ -22,7 +22,7 @@ from identification.slow_flows.slow_flow import SlowFlow
 from identification.validation import finite_array
 from vibrolock.results import Result
 
-__all__ = ["ContinuousBackbone", "continuous_backbone"]
+__all__ = ["ContinuousBackbone", "continuous_backbone", "fit_around"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -198,7 +198,7 @@ def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float,
     """Return widths and fits at every level of one ramp, over the bandwidth or a width with enough instants."""
     size = np.log(flow.amplitude_m)
     widths = np.array([_wide_enough(size, level, bandwidth) for level in np.log(levels)])
-    return widths, [_fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)]
+    return widths, [fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)]
 
 
 def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
@@ -255,7 +255,7 @@ def _along(
             if width > _WIDEST:
                 break
             degree = _NOISY_DEGREE
-            fits[n] = _fit_around(flow, level, width, degree)
+            fits[n] = fit_around(flow, level, width, degree)
         part, place, weight = _around(flow, level, min(width, _WIDEST))
         found.append(amplitudes_at(part, place, weight, degree))
         periods.append(place.size * step)
@@ -273,7 +273,7 @@ def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:
     return np.asarray(by_sensors * np.sqrt(more))
 
 
-def _fit_around(flow: SlowFlow, level: float, width: float, degree: int) -> LocalFit:
+def fit_around(flow: SlowFlow, level: float, width: float, degree: int) -> LocalFit:
     """Fit stiffness and damping at ``ln X = level``, without the bias of the window in which the level moves.
 
     Within the demodulation's window, of variance s^2, the stiffness changes with the level l at its rate r. To second order

@@ -5,6 +5,7 @@ The contract "Campaigns" in ``pyproject.toml`` also names the folders.
 
 from rig.campaigns.backbone.points import BACKBONE
 from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE
+from rig.campaigns.decay.points import DECAY
 from rig.campaigns.dwell.points import DWELL
 from rig.campaigns.multisine.points import MULTISINE
 from rig.campaigns.response_controlled.points import RESPONSE_CONTROLLED
@@ -25,6 +26,7 @@ KINDS = {
         SWEEP,
         MULTISINE,
         DWELL,
+        DECAY,
     )
 }
 """All kinds by name."""

@@ -19,7 +19,8 @@ def identify(
     kind: Annotated[
         str,
         typer.Option(
-            "--model", help="Kind of model: nonlinear-mode, linear, force-surface, exciter, pnlss or structured."
+            "--model",
+            help="Kind of model: nonlinear-mode, decay, linear, force-surface, exciter, pnlss or structured.",
         ),
     ] = "nonlinear-mode",
     modes: Annotated[
@@ -41,7 +42,7 @@ def identify(
         typer.Option(
             "--near",
             metavar="LIST",
-            help="Starting frequencies of a linear model, Hz, with commas: one mode near each.",
+            help="Frequencies of a linear model or a decay, Hz, with commas: one mode near each.",
             show_default="found",
         ),
     ] = None,
@@ -154,6 +155,24 @@ def identify(
             show_default="fitted",
         ),
     ] = None,
+    start_s: Annotated[
+        float | None,
+        typer.Option("--start", metavar="S", help="Where a free decay begins; found if left out."),
+    ] = None,
+    stop_s: Annotated[
+        float | None,
+        typer.Option("--stop", metavar="S", help="Where a free decay ends; at the noise if left out."),
+    ] = None,
+    levels: Annotated[
+        int | None, typer.Option(help="Levels of each mode of a decay.", min=1, show_default="15")
+    ] = None,
+    drive_mode_shape: Annotated[
+        float | None,
+        typer.Option(metavar="PHI", help="Of a decay: mass-normalised shape at the drive point, kg^-1/2."),
+    ] = None,
+    point: Annotated[
+        int | None, typer.Option(help="Recorded point with the decay, from 1, if there are several.", min=1)
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the PNLSS model in OUTPUT, from the same files.")
     ] = False,
@@ -163,6 +182,7 @@ def identify(
     """Turn recordings into a model."""
     from rig.models.files.files import save
     from rig.models.identify.data_request import DataOptions
+    from rig.models.identify.decay_request import DecayOptions
     from rig.models.identify.identify import Request, identify_model
     from rig.models.identify.pnlss_request import PnlssOptions
     from rig.models.identify.structured_request import StructuredOptions
@@ -191,6 +211,13 @@ def identify(
             resume=output if resume else None,
         ),
         structured=StructuredOptions(laws=tuple(laws or ()), suspension_stiffness_n_m=suspension_stiffness_n_m),
+        decay=DecayOptions(
+            start_s=start_s,
+            stop_s=stop_s,
+            levels=levels,
+            drive_mode_shape=drive_mode_shape,
+            point=point,
+        ),
         data=DataOptions(
             rate_hz=rate_hz,
             input=input,

@@ -12,7 +12,7 @@ from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.virtual.driver import COUNTED, HOLD_SAMPLES
 from rig.drivers.virtual.faults import OUTPUT_HELD
-from rig.drivers.virtual.kernels import Converters, exchange_block, loopback_of
+from rig.drivers.virtual.kernels import exchange_block, loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
@@ -20,7 +20,6 @@ from simulators.layout import Flag
 __all__ = ["LoggedPlant", "Plant", "VirtualPlant", "Wiring"]
 
 WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
-NO_QUEUE = np.zeros(0)  # the emulated device has its own queue
 
 
 class Plant(Protocol):
@@ -136,7 +135,7 @@ class VirtualPlant:
         self._arrays, self._state = self._realised.build(self._seed)
         loopback = loopback_of(self._channels, HOLD_SAMPLES + self._rig.filter_delay_samples)
         counts = np.zeros(len(COUNTED), np.int64)
-        self._converters = Converters(NO_QUEUE, counts, loopback, self._daq.held_outputs())
+        self._converters = self._daq.converters(counts, loopback)
         self._first = 0
         self._buffers_for(0)
 

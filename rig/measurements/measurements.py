@@ -6,6 +6,7 @@ from typing import Any, cast
 from identification import (
     Backbone,
     ContinuousBackbone,
+    DecayBackbone,
     ForceSurface,
     FrequencyResponse,
     FrequencyResponseMatrix,
@@ -26,6 +27,7 @@ __all__ = [
     "backbone",
     "bench_of_recording",
     "continuous_backbones",
+    "decays",
     "dwell_course",
     "force_surface",
     "frequency_responses",
@@ -56,6 +58,15 @@ def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]
     Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no point.
     """
     return cast(tuple[ContinuousBackbone, ...], _measured(recording, ContinuousBackbone))
+
+
+def decays(recording: Recording) -> dict[int, DecayBackbone]:
+    """Return the decay of every accepted point of a decay recording, by the stored number of its point, which counts from 0.
+
+    The exciter's part is taken out through the measured force; times count from the release. Raises `RecordingError` for a
+    recording of another kind, `identification.IdentificationError` if there is no decay.
+    """
+    return cast(dict[int, DecayBackbone], _measured(recording, DecayBackbone))
 
 
 def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:

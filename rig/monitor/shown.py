@@ -17,7 +17,7 @@ SCOPE_PERIODS = 3
 SCOPE_POINTS = 400
 HARMONICS = 10
 BULKY = {"harmonics", "harmonics_std", "rounding_std"}  # numbers for every channel and harmonic
-RECORDS = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
+RECORDS = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
 GUARDS = {
     GuardMode.DISARMED: "not armed",
     GuardMode.ARMED: "armed",

@@ -20,18 +20,19 @@ from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
 from rig.tick.measure import pass_over, take_in
 from rig.tick.periods import close_period
-from rig.tick.safety.following import begin_to_follow, contradicts_exciter, permitted_level
+from rig.tick.safety.following import begin_to_follow, contradicts_exciter, forget_output, permitted_level
 from rig.tick.safety.kernels import (
     NON_FINITE_OUTPUT,
     PLANT_CONTRADICTED,
     permitted_amplitude,
     permitted_turn,
+    release,
     shut_down,
     watch_frequency,
 )
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.kernels import advance, is_ramp
-from rig.tick.sequencer.layout import LOOP_DRIVE, TONE, WAVEFORM
+from rig.tick.sequencer.layout import LOOP_DRIVE, RELEASE, SILENT, TONE, WAVEFORM
 from vibrolock.compiled import Record, inner_kernel, kernel
 
 SMALLEST_V = 1e-12  # lower bound of a divisor, against an output of zero
@@ -76,7 +77,7 @@ def judge_by_exciter(t: TickArrays, seen: Record) -> None:
     ``seen`` is the entry of the history with that output.
     """
     loop, guard, following, vibration = t.loop[0], t.guard[0], t.following[0], t.control[0].vibration
-    if guard.mode != ARMED or loop.drive == WAVEFORM:
+    if guard.mode != ARMED or loop.drive in (WAVEFORM, SILENT):
         return
     sent = complex(seen.amplitude_v * math.cos(seen.turn), seen.amplitude_v * math.sin(seen.turn))
     gain = t.law[0].detector.gain
@@ -94,6 +95,8 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
         control.frequency.taking_over = 1
     if segment.drive == TONE and loop.drive == LOOP_DRIVE:
         progress.omega = control.frequency.omega  # from where the tone's ramp goes to its own frequency
+    if loop.drive == SILENT and segment.drive != SILENT:
+        forget_output(t.following[0])
     loop.drive = segment.drive
     if t.law[0].harmonics.highest > 0:
         want_harmonics(control.harmonics, segment.harmonics)
@@ -119,7 +122,7 @@ def step_sequencer(t: TickArrays) -> bool:
     loop.held = 0
     if running and progress.entered == 1:
         segment = t.segments[progress.segment]
-        loop.held = 0 if is_ramp(segment.kind) else 1
+        loop.held = 0 if is_ramp(segment.kind) or segment.kind == RELEASE else 1
         loop.waveform = segment.waveform
     return bool(running)
 
@@ -132,7 +135,7 @@ def choose_frequency(t: TickArrays) -> None:
         control.frequency.omega = TWO_PI / (t.waveforms.shape[1] * loop.dt_s)
     elif loop.drive == TONE:
         control.frequency.omega = progress.omega
-    elif control.vibration.present == 1:
+    elif loop.drive == LOOP_DRIVE and control.vibration.present == 1:
         follow(t.law[0].frequency, control.frequency, control.vibration, progress.lag)
     if loop.drive != WAVEFORM:
         watch_frequency(t.guard[0], t.limits[0], control.frequency.omega, loop.sample)
@@ -146,6 +149,8 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
     output; the limits apply to it.
     """
     amplitude, guard, limits = t.control[0].amplitude, t.guard[0], t.limits[0]
+    if running and t.loop[0].drive == SILENT:
+        release(guard)
     before, turn = guard.amplitude_v, amplitude.output.turn
     permitted = permitted_amplitude(guard, limits, allowed, t.loop[0].sample)
     if running:
@@ -182,7 +187,7 @@ def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
         theta = TWO_PI * loop.play / period
     else:
         output = amplitude * math.cos(loop.theta + turn)
-        if t.law[0].harmonics.highest > 0:
+        if t.law[0].harmonics.highest > 0 and loop.drive != SILENT:
             output += harmonics_at(t.law[0].harmonics, t.control[0].harmonics, loop.theta)
         theta = advance_phase(loop.theta, omega, loop.dt_s)
     if not math.isfinite(output):

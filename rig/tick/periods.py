@@ -11,7 +11,7 @@ from rig.tick.safety.following import follow_level, see_frequency, silent_side
 from rig.tick.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.judgement import judge_period
-from rig.tick.sequencer.layout import LOOP_DRIVE, RECORD, TONE, WAVEFORM
+from rig.tick.sequencer.layout import LOOP_DRIVE, RECORD, SILENT, TONE, WAVEFORM
 from vibrolock.compiled import kernel
 
 
@@ -61,7 +61,7 @@ def close_period(t: TickArrays) -> None:
     if not end_period(period):
         return
     control.frequency.mean_error_rad = period.error_rad
-    if loop.drive == WAVEFORM:
+    if loop.drive in (WAVEFORM, SILENT):
         return
     present = control.vibration.present == 1
     if not present:

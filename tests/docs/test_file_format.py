@@ -24,6 +24,7 @@ PLANS = {
     | {"levels_m": [2e-4, 4e-4], "sweep_periods": 40.0},
     "response-controlled": load_plan("magnet-beam/response-controlled").model_dump(mode="json")
     | {"levels_m": [5e-4], "phase_lags_deg": [-90.0]},
+    "decay": load_plan("magnet-beam/decay").model_dump(mode="json") | {"levels_v": [1.0]},
     "dwell": load_plan("friction-beam/dwell").model_dump(mode="json") | {"cycles": 150, "mean_s": 0.5},
     "stepped-sine": SMALL | {"kind": "stepped-sine", "frequencies_hz": [23.0]},
     "sweep": SMALL | {"kind": "sweep", "start_hz": 22.0, "stop_hz": 26.0, "rate_hz_per_s": 4.0},

@@ -18,14 +18,22 @@ HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far its window reaches to 
 
 
 def recorded_flow(
-    bench: Bench, rows: np.ndarray, harmonics: int, plant: PlantFacts | None, *, other_modes: bool = True
+    bench: Bench,
+    rows: np.ndarray,
+    harmonics: int,
+    plant: PlantFacts | None,
+    *,
+    other_modes: bool = True,
+    residual_m_n: float | None = None,
 ) -> SlowFlow:
     """Compute the slow flow of recorded rows.
 
     The skew of the channels is removed. If the plant is known, the mode shape at the drive point is the measured one, and with
-    ``other_modes`` the contribution of its other modes is removed too. Raises `identification.IdentificationError` if the rows
+    ``other_modes`` the contribution of its other modes is removed too; ``residual_m_n`` replaces their receptance at the mode's
+    frequency by that at another. Raises `identification.IdentificationError` if the rows
     contain no vibration.
     """
+    known = plant.residual_m_n if plant is not None and other_modes else 0.0
     return slow_flow(
         rows["theta_rad"].astype(float),
         bridged(rows).T,
@@ -34,7 +42,7 @@ def recorded_flow(
         drive_mode_shape=drive_shape(bench, plant).value or 0.0,
         harmonics=harmonics,
         skew_samples=[channel.skew_samples for channel in bench.channels],
-        residual_m_n=plant.residual_m_n if plant is not None and other_modes else 0.0,
+        residual_m_n=known if residual_m_n is None else residual_m_n,
     )
 
 

@@ -23,6 +23,7 @@ _KEYS = {
     SegmentKind.SWEEP: ("rate_hz_per_s", "rate_octaves_per_min"),
     SegmentKind.LEVEL_SWEEP: ("sweep_periods", "record_periods"),
     SegmentKind.START: ("start_periods",),
+    SegmentKind.RELEASE: ("decay_periods",),
 }
 """Plan keys that determine the length of a segment, by kind of segment. A plan has one or more of them."""
 
@@ -34,7 +35,12 @@ def check_length(plan: Plan, bench: Bench) -> None:
         duration_s = _duration_s(plan, bench, segment)
         took[segment.kind] += duration_s
         rows = duration_s * bench.sample_rate_hz
-        if rows > MOST_ROWS and segment.kind in (SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP):
+        if rows > MOST_ROWS and segment.kind in (
+            SegmentKind.RECORD,
+            SegmentKind.SWEEP,
+            SegmentKind.LEVEL_SWEEP,
+            SegmentKind.RELEASE,
+        ):
             raise ConfigurationError(
                 f"{_keys(plan, segment.kind)}: up to {rows:.3g} samples of one record at {bench.sample_rate_hz:g} samples/s, "
                 f"allowed are up to {MOST_ROWS:g}"

@@ -79,8 +79,13 @@ class PlantFacts(Configured):
     @property
     def residual_m_n(self) -> float:
         """Receptance of the other modes at the drive point at the frequency of the tested mode, m/N."""
+        return self.residual_at(self.frequency_rad_s / (2.0 * math.pi))
+
+    def residual_at(self, frequency_hz: float) -> float:
+        """Return the receptance of the other modes at the drive point at a frequency near the mode's, m/N."""
         constant, square = self.residual_per_kg
-        return -(constant - square * (self.frequency_rad_s / self.centre_rad_s) ** 2) / self.frequency_rad_s**2
+        omega = 2.0 * math.pi * frequency_hz
+        return -(constant - square * (omega / self.centre_rad_s) ** 2) / omega**2
 
     @property
     def model(self) -> PlantModel:

@@ -41,7 +41,7 @@ from rig.tick.sequencer.layout import Outcome, SegmentKind
 
 __all__ = ["Execution", "Journal", "nothing_left"]
 
-EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP}
+EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
 UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED, Outcome.NOT_SETTLED}
 OVER = {

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -11,7 +11,7 @@ from rig.bench import Bench
 from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, PassingFaults
-from rig.drivers.virtual.kernels import Converters, exchange_block, fused, loopback_of
+from rig.drivers.virtual.kernels import Converters, Loopback, exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over
@@ -38,6 +38,9 @@ class Queue(Configured):
     """Further samples between the handing over of an output and the converter."""
     faults: PassingFaults = PassingFaults()
     """Passing faults: outputs that come too late, samples that are lost."""
+    at_zero_v: Literal["attached", "open-circuit", "stinger-dropped"] = "attached"
+    """What the exciter does while the output is exactly 0 V, as in a plan of kind ``decay``: it stays ``attached``; its coil is
+    open (``open-circuit``); its stinger is off (``stinger-dropped``)."""
 
 
 class VirtualDAQ(DAQ):
@@ -75,12 +78,31 @@ class VirtualDAQ(DAQ):
         self._specimen = bench.specimen
         self._counts = np.zeros(len(COUNTED), np.int64)
         self._bench_block = bench.block
-        self._exchanged = Converters(np.zeros(0), self._counts, loopback_of(self.channels, 0.0), self._faults())
+        self._how = self._queue_options.at_zero_v
+        if self._how != "attached" and self._wears:
+            raise ConfigurationError(
+                f"driver.options.at_zero_v = {self._how!r}: allowed is 'attached' for a specimen that wears"
+            )
+        self._released = self._released_arrays()
+        self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults())
         self._first = 0
         self._exchange_bound: Callable[..., None] | None = None
 
     def _faults(self) -> FaultArrays:
         return self._queue_options.faults.build(self._seed, self.sample_rate_hz, self._bench_block)
+
+    def _released_arrays(self) -> RigArrays:
+        """Arrays of the rig while the output is 0 V; those of the rig itself if its exciter stays attached."""
+        rig = self.rig.realised(self._seed)
+        return (rig if self._how == "attached" else rig.released(self._how)).build(self._seed)[0]
+
+    def converters(self, counts: np.ndarray, loopback: Loopback) -> Converters:
+        """Converters without a queue for a device around the rig that counts and loses samples in a way of its own."""
+        return Converters(np.zeros(0), counts, loopback, self.held_outputs(), self._how != "attached", self._released)
+
+    def _converters(self, queue_samples: int, loopback: Loopback, faults: FaultArrays) -> Converters:
+        releases = self._how != "attached"
+        return Converters(np.zeros(queue_samples), self._counts, loopback, faults, releases, self._released)
 
     def held_outputs(self) -> FaultArrays:
         """The held outputs among the passing faults, for a device around the rig that loses samples in a way of its own."""
@@ -197,8 +219,8 @@ class VirtualDAQ(DAQ):
         self._arrays, self._state = self._realised.build(self._seed)
         loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
         faults = self._faults()
-        self._exchanged = Converters(np.zeros(self.queue_samples), self._counts, loopback, faults)
-        self._fused = Converters(np.zeros(self.block + self.queue_samples), self._counts, loopback, faults)
+        self._exchanged = self._converters(self.queue_samples, loopback, faults)
+        self._fused = self._converters(self.block + self.queue_samples, loopback, faults)
         self._counts[:] = 0
         self._first = 0
 

@@ -49,6 +49,18 @@ class Converters(NamedTuple):
     """Channels that read the output."""
     faults: FaultArrays
     """Passing faults of the device."""
+    releases: bool
+    """Whether the rig is another while the output is exactly 0 V."""
+    released: RigArrays
+    """That other rig."""
+
+
+@kernel
+def sampled(rig: RigArrays, state: RigState, converters: Converters, voltage: float, row: np.ndarray) -> int:
+    """Advance the rig by one sample: the released one while the output is 0 V, if it is to be released."""
+    if converters.releases and voltage == 0.0:
+        return int(sample(converters.released, state, voltage, row))
+    return int(sample(rig, state, voltage, row))
 
 
 @kernel
@@ -89,7 +101,7 @@ def exchange_block(
         row = inputs[index]
         voltage, raised = convert(converters.faults, first + index, voltage)
         read_output(loopback, first + index, voltage, row)
-        flags[index] = told(sample(rig, state, voltage, row[:sensed]) | raised, converters.counts)
+        flags[index] = told(sampled(rig, state, converters, voltage, row[:sensed]) | raised, converters.counts)
         if flags[index] & LOST:
             row[:] = math.nan
 
@@ -145,7 +157,7 @@ def fused(
         voltage, raised = convert(converters.faults, t.loop[0].sample, queue[slot])
         if looped:
             read_output(loopback, t.loop[0].sample, voltage, volts)
-        flags = told(sample(rig, state, voltage, sensed) | raised, converters.counts)
+        flags = told(sampled(rig, state, converters, voltage, sensed) | raised, converters.counts)
         note_faults(t, flags)
         queue[slot] = tick(t, volts, (flags & LOST) != 0, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)

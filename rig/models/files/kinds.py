@@ -10,6 +10,7 @@ __all__ = ["KINDS", "as_kept", "kind_of_file_for"]
 
 _DECLARED = {
     "nonlinear-mode": ("nonlinear_mode:NONLINEAR_MODE", ("NonlinearMode",)),
+    "decay-backbone": ("decay:DECAY", ("DecayBackbone",)),
     "linear-modes": ("linear_modes:LINEAR_MODES", ("ModalAnalysis", "LinearModes")),
     "exciter": ("exciter:EXCITER", ("Exciter",)),
     "pnlss": ("pnlss:PNLSS", ("IdentifiedPnlss", "PnlssFit", "PnlssModel")),

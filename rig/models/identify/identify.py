@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from identification import (
     Backbone,
     ContinuousBackbone,
+    DecayBackbone,
     Exciter,
     FrequencyResponse,
     FrequencyResponseMatrix,
@@ -40,10 +41,12 @@ from rig.measurements import (
     spectra,
 )
 from rig.measurements.points_left_out import points_left_out
+from rig.models.files.decay import DECAY
 from rig.models.files.files import KINDS, load, load_as
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
 from rig.models.files.linear_modes import LINEAR_MODES
+from rig.models.identify.decay import identified_decay
 from rig.models.identify.request import Request
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -69,6 +72,8 @@ def identify_model(
         from rig.models.identify.pnlss import identified_pnlss  # a second, which the other models need not wait for
 
         return identified_pnlss(paths, request.pnlss, request.data, progress)
+    if request.kind == "decay":
+        return identified_decay(paths, request.decay, request.near_hz)
     if request.kind == "structured" and request.modes is not None:
         from rig.models.identify.structured import identified_structured  # as above
 
@@ -85,6 +90,10 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
     """Identify a nonlinear mode from one or several backbones, or from stepped sines (imported or response-controlled)."""
     kinds = {kind_of(path): path for path in paths}
     modes = None if request.modes is None else modes_in(request.modes)
+    if set(kinds) == {DECAY.name}:
+        return _mode_of_decay(paths, request)
+    if request.near_hz:
+        raise ConfigurationError("`near`: names a mode of a decay, and the files are none; leave it out")
     if set(kinds) <= {FREQUENCY_RESPONSES.name, *STEPPED}:
         if modes is not None:
             raise ConfigurationError("`modes`: stepped sines of one sensor have no use for mode shapes; leave it out")
@@ -100,6 +109,15 @@ def _nonlinear_mode(paths: Sequence[Path], request: Request) -> NonlinearMode:
             )
             identified.append(replace(found, notes=(*notes, *found.notes)))
     return identified[0] if len(identified) == 1 else combined(identified)
+
+
+def _mode_of_decay(paths: Sequence[Path], request: Request) -> NonlinearMode:
+    """Return one mode of a decay, or of several decays, as a nonlinear mode."""
+    if len(request.near_hz) > 1:
+        raise ConfigurationError(f"`near`: {len(request.near_hz)} given, a nonlinear mode is one")
+    near = next(iter(request.near_hz), None)
+    found = [cast(DecayBackbone, load_as(DECAY, path)).nonlinear_mode(near) for path in paths]
+    return found[0] if len(found) == 1 else combined(found)
 
 
 def _stepped_mode(paths: Sequence[Path]) -> NonlinearMode:

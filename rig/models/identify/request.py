@@ -9,14 +9,16 @@ from identification.linear.accelerance import Weighting
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.models.identify.data_request import DataOptions
+from rig.models.identify.decay_request import DecayOptions
 from rig.models.identify.pnlss_request import PnlssOptions
 from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 
 __all__ = ["Request"]
 
 _OPTIONS: dict[str, tuple[str, ...]] = {
-    "nonlinear-mode": ("modes",),
+    "nonlinear-mode": ("modes", "near"),
     "linear": ("estimator", "band_hz", "count", "near", "order", "weighting"),
+    "decay": ("near", *DecayOptions().given()),
     "force-surface": (),
     "exciter": ("band_hz", "resistance_ohm", "amplifier_gain", "stinger_stiffness_n_m"),
     "pnlss": (*PnlssOptions().given(), *DataOptions().given()),
@@ -31,7 +33,7 @@ class Request:
     """What to identify, and how."""
 
     kind: str = "nonlinear-mode"
-    """``nonlinear-mode``, ``linear``, ``force-surface``, ``exciter``, ``pnlss`` or ``structured``."""
+    """``nonlinear-mode``, ``decay``, ``linear``, ``force-surface``, ``exciter``, ``pnlss`` or ``structured``."""
     modes: Path | None = None
     """Linear model whose mode shapes are used for a nonlinear mode, or with which a structured model begins."""
     estimator: str = "instrument"
@@ -47,7 +49,8 @@ class Request:
     count: int | None = None
     """Number of modes of a linear model; determined automatically if None."""
     near: str | None = None
-    """Starting frequencies of a linear model, Hz, with commas, one mode near each; determined automatically if None."""
+    """Frequencies near which the modes of a linear model or of a decay are, Hz, with commas; found if None. Of a nonlinear mode
+    from decays: which of their modes."""
     order: int | None = None
     """Highest order of the stabilisation diagram of a linear model; by default 40, or less for few lines."""
     weighting: str = "auto"
@@ -56,6 +59,8 @@ class Request:
     """Options for a nonlinear state-space model."""
     structured: StructuredOptions = field(default_factory=StructuredOptions)
     """Options for a structured model."""
+    decay: DecayOptions = field(default_factory=DecayOptions)
+    """Options for a free decay."""
     data: DataOptions = field(default_factory=DataOptions)
     """Data of a nonlinear state-space model or a structured model."""
 
@@ -93,6 +98,7 @@ class Request:
             **{name: value is not None for name, value in numbers.items()},
             **self.pnlss.given(),
             **self.structured.given(),
+            **self.decay.given(),
             **self.data.given(),
         }
         for name in (name for name, is_given in given.items() if is_given):
@@ -109,7 +115,7 @@ class Request:
 
     @property
     def near_hz(self) -> tuple[float, ...]:
-        """Starting frequencies of a linear model, Hz; raise `ConfigurationError` if they are no frequencies."""
+        """Frequencies near which the modes are, Hz; raise `ConfigurationError` if they are no frequencies."""
         try:
             found = tuple(float(part) for part in self.near.split(",")) if self.near is not None else ()
         except ValueError:

@@ -241,6 +241,14 @@ def follow_level(
 
 
 @kernel
+def forget_output(following: Record) -> None:
+    """Forget outputs, forces and motions of before: while the output was silent they were not compared."""
+    following.sent = following.late_sent = following.late_force = following.late_drive = following.needed = 0.0
+    following.unlike_s = 0.0
+    following.silent_periods = 0
+
+
+@kernel
 def permitted_level(following: Record, demanded_v: float) -> float:
     """Return the output amplitude (V), limited to `LARGEST_RISE` times the reference, that a law holding a level may use."""
     return float(min(demanded_v, LARGEST_RISE * following.reference_v))

@@ -134,6 +134,17 @@ def watch_frequency(guard: Record, limits: Record, omega: float, sample: int) ->
 
 
 @kernel
+def release(guard: Record) -> None:
+    """Take the output to 0 V at once, without the slew limit, so that the vibration decays freely.
+
+    The guard stays armed: its limits go on, and what trips finds the output at 0 V already. Only the sequencer calls this, in a
+    segment of kind ``RELEASE``; whatever ends a run is `shut_down`.
+    """
+    if guard.mode == ARMED:
+        guard.amplitude_v = 0.0
+
+
+@kernel
 def permitted_turn(limits: Record, turn: float, demanded: float, before_v: float, after_v: float) -> float:
     """Return the next angle (rad) of the complex command after ``turn``; its amplitude goes from ``before_v`` to ``after_v``.
 

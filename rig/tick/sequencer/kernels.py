@@ -29,6 +29,7 @@ from rig.tick.sequencer.layout import (
     LOOP_DRIVE,
     RAMP,
     RECORD,
+    RELEASE,
     SETTLE,
     START,
     SWEEP,
@@ -190,6 +191,10 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
         progress.returning = 1 if 0.0 < progress.kept_level < progress.level else 0
     if segment.kind == SETTLE:
         forget_periods(settling)
+    if segment.kind == RELEASE:
+        reacquire(lock)  # the lock is given up, not lost
+        progress.start_level = 0.0  # readings that do not change are no fault while nothing drives
+        progress.kept_level = 0.0
 
 
 @kernel

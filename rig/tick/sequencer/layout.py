@@ -29,6 +29,8 @@ class SegmentKind(IntEnum):
     """A ramp of the level whose rows are evaluated."""
     START = 6
     """Hold for ``periods``, and longer while a lock is in doubt. If the start fails, the run ends before the level rises."""
+    RELEASE = 7
+    """0 V at once for ``periods`` of the frozen frequency, while the vibration decays; these rows are evaluated."""
 
 
 class Drive(IntEnum):
@@ -40,6 +42,8 @@ class Drive(IntEnum):
     """The plan: one frequency, ramped, stepped or swept."""
     WAVEFORM = 2
     """The plan: a periodic waveform of unit peak is played. The level is its peak; its period is the oscillator period."""
+    SILENT = 3
+    """Nothing: the output is 0 V and the oscillator runs on at its last frequency."""
 
 
 class Outcome(IntEnum):
@@ -74,8 +78,8 @@ class OnFailure(IntEnum):
     STOP = 1
 
 
-RAMP, SETTLE, RECORD, HOLD, SWEEP, LEVEL_SWEEP, START = (int(kind) for kind in SegmentKind)
-LOOP_DRIVE, TONE, WAVEFORM = (int(drive) for drive in Drive)
+RAMP, SETTLE, RECORD, HOLD, SWEEP, LEVEL_SWEEP, START, RELEASE = (int(kind) for kind in SegmentKind)
+LOOP_DRIVE, TONE, WAVEFORM, SILENT = (int(drive) for drive in Drive)
 
 SEGMENT = np.dtype(
     [

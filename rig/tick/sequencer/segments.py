@@ -117,7 +117,9 @@ def segment_table(
         row["again"] = _again(segments, index) if segment.kind is SegmentKind.RECORD else -1
         row["on_failure"], row["on_lost_lock"] = segment.on_failure, segment.on_lost_lock
         row["harmonics"] = harmonics if segment.harmonics is None else harmonic_ratios(segment.harmonics)
-        if segment.excitation is not None:
+        if segment.kind is SegmentKind.RELEASE:
+            row["drive"], row["amplitude_law"], row["level"] = Drive.SILENT, AmplitudeLaw.VOLTAGE, 0.0
+        elif segment.excitation is not None:
             _fill_in(row, segment.excitation, sample_rate_hz)
     outcomes = np.zeros(len(segments), OUTCOME)
     outcomes["mean_error_rad"] = np.nan

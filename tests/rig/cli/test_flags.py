@@ -6,6 +6,7 @@ from rig.arming.run_options import RunOptions
 from rig.cli.app import app
 from rig.cli.flags import flags, with_flags
 from rig.models.identify.data_request import DataOptions
+from rig.models.identify.decay_request import DecayOptions
 from rig.models.identify.pnlss_request import PnlssOptions
 from rig.models.identify.request import Request
 from rig.models.identify.structured_request import StructuredOptions
@@ -13,13 +14,23 @@ from rig.models.predict.request import PredictionRequest
 from rig.reproduce.options import Options
 from rig.tuning import TuningRequest
 
-FILLED_OTHERWISE = {"pnlss", "structured", "data", "specimen", "folder", "progress", "about"}
+FILLED_OTHERWISE = {"pnlss", "structured", "decay", "data", "specimen", "folder", "progress", "about"}
 """Fields that no single option fills."""
 
 
 @pytest.mark.parametrize(
     "request_",
-    [Request, DataOptions, PnlssOptions, StructuredOptions, PredictionRequest, TuningRequest, Options, RunOptions],
+    [
+        Request,
+        DataOptions,
+        DecayOptions,
+        PnlssOptions,
+        StructuredOptions,
+        PredictionRequest,
+        TuningRequest,
+        Options,
+        RunOptions,
+    ],
 )
 def test_every_field_of_a_request_has_its_option(request_):
     assert {field.name for field in fields(request_)} - FILLED_OTHERWISE <= set(flags(app))

@@ -1,0 +1,240 @@
+"""What a free decay tells of its modes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import Channel
+from identification.errors import IdentificationError
+from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
+from vibrolock.results import Result
+
+__all__ = ["DecayBackbone", "DecayMode"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_TABLE = (
+    *("amplitude_m", "time_s", "frequency_hz", "modal_frequency_hz", "modal_frequency_std_hz"),
+    *("modal_frequency_systematic_hz", "damping_ratio", "damping_ratio_std", "damping_ratio_systematic", "decay_ratio"),
+)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DecayMode:
+    """One mode over its amplitude, n levels from the largest to the smallest.
+
+    Parameters
+    ----------
+    amplitude_m, amplitude_std_m
+        float[n], peak of the fundamental of the displacement at the reference channel, and its standard error.
+    time_s
+        float[n], instants of the record at which the vibration passed these amplitudes.
+    frequency_hz
+        float[n], frequency of the vibration at these instants.
+    modal_frequency_hz, damping_ratio
+        float[n], undamped modal frequency ``sqrt(k) / (2 pi)`` and ratio ``c / (2 sqrt(k))`` of the one-mode equation.
+    modal_frequency_std_hz, damping_ratio_std
+        float[n], random standard errors, from the noise of the record.
+    modal_frequency_systematic_hz, damping_ratio_systematic
+        float[n], estimated bounds of the systematic errors: curvature within the fits, window, and what the force leaves.
+    decay_ratio
+        float[n], rate of decay over the modal frequency: the damping ratio of the vibration as it was, with an exciter that
+        hung on the structure.
+    deflection
+        complex[n, n_channels], displacement of every motion channel over that of the reference; NaN for other channels.
+    harmonics_m
+        complex[n, H + 1], harmonics of the displacement of the reference, the first real.
+    force_n
+        complex[n], measured fundamental of the force against the displacement; 0 where there is none.
+    reference
+        Name of the channel of ``amplitude_m``.
+    start_s, stop_s
+        Stretch of the record that was evaluated, from the beginning of the free decay to the noise floor.
+    floor_m
+        RMS of the noise in the demodulated displacement of the reference, peak value.
+    drive_mode_shape
+        Mass-normalised mode shape at the drive point, kg^-1/2; None if it was not given.
+    """
+
+    amplitude_m: Float
+    amplitude_std_m: Float
+    time_s: Float
+    frequency_hz: Float
+    modal_frequency_hz: Float
+    modal_frequency_std_hz: Float
+    modal_frequency_systematic_hz: Float
+    damping_ratio: Float
+    damping_ratio_std: Float
+    damping_ratio_systematic: Float
+    decay_ratio: Float
+    deflection: Complex
+    harmonics_m: Complex
+    force_n: Complex
+    reference: str
+    start_s: float
+    stop_s: float
+    floor_m: float
+    drive_mode_shape: float | None = None
+
+    @property
+    def modal_frequency_bound_95_hz(self) -> Float:
+        """float[n]: half width of the 95 % interval of the modal frequency, at the estimated amplitude."""
+        slope = _slope(self.amplitude_m, self.modal_frequency_hz)
+        return np.asarray(
+            1.96 * np.hypot(self.modal_frequency_std_hz, slope * self.amplitude_std_m)
+            + self.modal_frequency_systematic_hz
+        )
+
+    @property
+    def damping_ratio_bound_95(self) -> Float:
+        """float[n]: half width of the 95 % interval of the damping ratio, at the estimated amplitude."""
+        slope = _slope(self.amplitude_m, self.damping_ratio)
+        return np.asarray(
+            1.96 * np.hypot(self.damping_ratio_std, slope * self.amplitude_std_m) + self.damping_ratio_systematic
+        )
+
+    def table(self) -> list[dict[str, float]]:
+        """Return one JSON-able dictionary per level."""
+        columns = {name: getattr(self, name) for name in _TABLE}
+        columns["modal_frequency_bound_95_hz"] = self.modal_frequency_bound_95_hz
+        columns["damping_ratio_bound_95"] = self.damping_ratio_bound_95
+        return [{name: float(values[row]) for name, values in columns.items()} for row in range(self.time_s.size)]
+
+
+_SCALARS = ("reference", "start_s", "stop_s", "floor_m", "drive_mode_shape")
+_ARRAYS = tuple(entry.name for entry in fields(DecayMode) if entry.name not in _SCALARS)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DecayBackbone(Result):
+    """Modes of one free decay.
+
+    Parameters
+    ----------
+    modes
+        The modes that were evaluated, lowest frequency first.
+    channels
+        The channels of the record.
+    specimen
+        Name of what was tested.
+    notes
+        Remarks, one line each: what is in the record besides, and what was not evaluated and why.
+    """
+
+    modes: tuple[DecayMode, ...]
+    channels: tuple[Channel, ...]
+    specimen: str = ""
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        if not self.modes:
+            raise IdentificationError("modes: a decay needs at least one")
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Return arrays by name, and the JSON-able attributes that go with them."""
+        arrays = {f"mode_{n}/{name}": getattr(mode, name) for n, mode in enumerate(self.modes) for name in _ARRAYS}
+        modes = [{name: getattr(mode, name) for name in _SCALARS} for mode in self.modes]
+        channels = [vars(channel) for channel in self.channels]
+        return arrays, {"modes": modes, "channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "DecayBackbone":
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
+        try:
+            modes = []
+            for n, scalars in enumerate(attributes["modes"]):
+                values: dict[str, Any] = {name: np.asarray(arrays[f"mode_{n}/{name}"]) for name in _ARRAYS}
+                modes.append(DecayMode(**values, **scalars))
+            channels = tuple(Channel(**channel) for channel in attributes["channels"])
+            return cls(
+                modes=tuple(modes),
+                channels=channels,
+                specimen=str(attributes["specimen"]),
+                notes=tuple(attributes["notes"]),
+            )
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"decay: {error} is missing or does not fit") from None
+
+    def mode(self, near_hz: float | None = None) -> DecayMode:
+        """Return the mode nearest to a frequency; without one, the only mode there is."""
+        if near_hz is None:
+            if len(self.modes) > 1:
+                listed = ", ".join(f"{mode.modal_frequency_hz[-1]:.4g} Hz" for mode in self.modes)
+                raise IdentificationError(f"near_hz: the decay has {len(self.modes)} modes ({listed}); name one")
+            return self.modes[0]
+        return min(self.modes, key=lambda mode: abs(float(mode.modal_frequency_hz[-1]) - near_hz))
+
+    def nonlinear_mode(self, near_hz: float | None = None) -> NonlinearMode:
+        """Return one mode as a nonlinear mode, which predictions, figures and comparisons take.
+
+        The force is the one that would hold the amplitude at phase resonance, and the modal amplitude is that of
+        ``drive_mode_shape``; both are NaN without it.
+        """
+        mode = self.mode(near_hz)
+        shape = np.nan if mode.drive_mode_shape is None else abs(mode.drive_mode_shape)
+        omega = 2.0 * np.pi * mode.modal_frequency_hz
+        force = 2.0 * mode.damping_ratio * omega**2 * mode.amplitude_m / shape**2
+        unknown = np.full(mode.time_s.size, np.nan)
+        size = np.abs(mode.harmonics_m[:, 1:])
+        resonant = np.full((mode.time_s.size, 2), np.nan, np.complex128)
+        resonant[:, 1] = 1j * force
+        relative = mode.damping_ratio_std / mode.damping_ratio
+        errors = {
+            "force_n": (np.abs(force * relative), np.abs(force) * mode.damping_ratio_systematic / mode.damping_ratio),
+            "amplitude_m": (mode.amplitude_std_m, 0.0 * unknown),
+            "phase_lag_deg": (0.0 * force, 0.0 * force),
+            "modal_frequency_hz": (mode.modal_frequency_std_hz, mode.modal_frequency_systematic_hz),
+            "damping_ratio": (mode.damping_ratio_std, mode.damping_ratio_systematic),
+            "modal_amplitude": (mode.amplitude_std_m / shape, 0.0 * force),
+        }
+        values: dict[str, Any] = {
+            "force_n": force,
+            "amplitude_m": mode.amplitude_m,
+            "phase_lag_deg": np.full(force.size, 90.0),
+            "modal_frequency_hz": mode.modal_frequency_hz,
+            "damping_ratio": mode.damping_ratio,
+            "modal_amplitude": mode.amplitude_m / shape,
+        }
+        return NonlinearMode(
+            **values,
+            frequency_hz=mode.frequency_hz,
+            damping_ratio_total_power=unknown,
+            damping_ratio_uncorrected=unknown,
+            apparent_mass_kg=np.full(force.size, 1.0 / shape**2),
+            mac=unknown,
+            force_purity=unknown,
+            response_purity=size[:, 0] / np.linalg.norm(size, axis=1),
+            fit_residual=unknown,
+            force_harmonics=resonant,
+            response_harmonics_m=mode.harmonics_m,
+            source="free decay",
+            specimen=self.specimen,
+            notes=self.notes,
+            drive_mode_shape=mode.drive_mode_shape,
+            **_error_fields(values, errors),
+        )
+
+
+def _error_fields(values: dict[str, Any], errors: dict[str, tuple[Float, Float]]) -> dict[str, Any]:
+    """Standard errors and intervals of a nonlinear mode: bounds of systematic errors count as two standard errors."""
+    count = len(values["force_n"])
+    table = {name: np.full((count, len(QUANTITIES)), np.nan) for name in ("random_std", "systematic_std")}
+    intervals = np.full((count, len(QUANTITIES), 2), np.nan)
+    found: dict[str, Any] = {}
+    for name, (random, bound) in errors.items():
+        column = QUANTITIES.index(name)
+        table["random_std"][:, column], table["systematic_std"][:, column] = random, 0.5 * bound
+        half = 1.96 * random + bound
+        intervals[:, column] = np.stack([values[name] - half, values[name] + half], axis=-1)
+        found[STANDARD_ERRORS[name]] = np.hypot(random, 0.5 * bound)
+    return {**found, **table, "interval_95": intervals}
+
+
+def _slope(along: Float, values: Float) -> Float:
+    if along.size < 2:
+        return np.zeros(along.size)
+    return np.asarray(np.gradient(values, along))

@@ -1,0 +1,224 @@
+"""Decays under a force, as that of an exciter that hangs on the structure: its part is taken out through the measured force.
+
+The exciter may damp and detune the vibration many times more than the structure itself. The slow flow of force and motion
+gives stiffness and damping of the structure alone at every instant (`identification.slow_flows.slow_flow`); they are fitted
+around levels of the amplitude as for a continuous backbone, the window's bias taken out.
+
+What is left of the accuracy: noise, the bend of the curves within a fit, and errors that force and motion do not share. The
+damping is the difference of two rates, that of the decay and that of the exciter's force. A relative error e of
+``drive_mode_shape^2`` or of the gain of the force against that of the motion shows in it multiplied by their ratio.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.channels import find_role
+from identification.decays.result import DecayMode
+from identification.errors import IdentificationError
+from identification.slow_flows.continuous import fit_around
+from identification.slow_flows.fits import noise_variances
+from identification.slow_flows.slow_flow import SlowFlow
+
+__all__ = ["decay_with_force"]
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+_HALF_WIDTHS = (0.35, 0.5, 0.8, 1.2)  # in ln(amplitude)
+_DEGREE, _HIGHER_DEGREE = 1, 2
+_FEWEST_INSTANTS = 5
+_NEIGHBOURS = 2
+_CURVATURE = 2.0  # bound of the error over the difference between fits of two degrees
+_WORST = 0.25
+"""Relative standard error of the damping above which a level is left out."""
+_WINDOW_PERIODS = 1.5
+_UNKNOWN, _RISEN = 0.2, 1.2
+"""Standard error of the damping at an instant over the rate of decay, and a rise of the amplitude, at which a decay ends."""
+_MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    amplitude_m: float
+    stiffness: float
+    damping: float
+    stiffness_std: float
+    damping_std: float
+    apart: tuple[float, float]
+    """Differences of stiffness and damping to the fit of the other degree, beyond noise, squared; may be below zero."""
+
+
+def decay_with_force(
+    flow: SlowFlow,
+    *,
+    start_s: float,
+    stop_s: float | None = None,
+    number: int = 10,
+    drive_mode_shape_std: float = 0.0,
+    residual_std_m_n: float = 0.0,
+) -> DecayMode:
+    """Return the properties of the mode without the exciter, from the slow flow of its decay.
+
+    Parameters
+    ----------
+    flow
+        Slow flow of the record; what lies before ``start_s`` only keeps its ends away.
+    start_s
+        Where the free decay begins. The first window and a half after it are left out.
+    stop_s
+        Where it ends; at the noise, or with the record, if None.
+    number
+        Number of levels in equal ratios of the amplitude.
+    drive_mode_shape_std
+        Standard error of the slow flow's mode shape, kg^-1/2; it counts among the systematic errors.
+    residual_std_m_n
+        Standard error of the slow flow's receptance of the other modes, m/N; likewise.
+
+    Raises
+    ------
+    IdentificationError
+        If too few instants are above the noise, or the noise leaves the damping unknown at every level.
+    """
+    quiet = _quiet(flow)
+    decay = _decay(flow, start_s, stop_s, quiet)
+    size = decay.amplitude_m
+    levels = np.geomspace(size[0], size[-1], number + 2)[1:-1]
+    tables = [_at_width(decay, levels, width, quiet) for width in _HALF_WIDTHS]
+    errors = np.array([_pooled(table) for table in tables])  # widths by levels by (k, c)
+    cost = np.array(
+        [
+            [
+                np.inf if one is None else np.hypot(one.damping_std, bound[1]) / abs(one.damping)
+                for one, bound in zip(table, bounds, strict=True)
+            ]
+            for table, bounds in zip(tables, errors, strict=True)
+        ]
+    )
+    keep = np.flatnonzero(cost.min(axis=0) < _WORST)
+    if not keep.size:
+        raise IdentificationError(
+            "samples: the noise and the exciter leave the damping unknown at every level; record from a higher level, or take "
+            "the exciter off"
+        )
+    best = cost.argmin(axis=0)
+    chosen = [found for n in keep if (found := tables[best[n]][n]) is not None]
+    bounds = np.array([errors[best[n], n] for n in keep])
+    return _mode(decay, chosen, bounds, drive_mode_shape_std, residual_std_m_n)
+
+
+def _quiet(flow: SlowFlow) -> float:
+    """Variance of the noise of ``g X`` from the force alone, (m/s^2)^2, where the vibration is gone."""
+    return float(np.median(flow.force_noise[-max(4, flow.time_s.size // 4) :])) / _MEDIAN
+
+
+def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -> SlowFlow:
+    """Return the instants of the decay, from a window after its beginning to the noise."""
+    rest = flow.select(flow.time_s > start_s + _WINDOW_PERIODS / float(np.median(flow.frequency_hz)))
+    if stop_s is not None:
+        rest = rest.select(rest.time_s <= stop_s)
+    if rest.time_s.size < _FEWEST_INSTANTS:
+        raise IdentificationError(f"start_s: {rest.time_s.size} instants of the slow flow after {start_s:g} s")
+    size = rest.amplitude_m
+    early = slice(0, _FEWEST_INSTANTS)
+    decay_1_s, omega = (float(np.median(np.abs(part[early]))) for part in (rest.growth_1_s, rest.rate_1_s))
+    unknown = np.sqrt(quiet) > _UNKNOWN * decay_1_s * omega * size
+    below = np.flatnonzero(unknown | (size > _RISEN * np.minimum.accumulate(size)))
+    count = int(below[0]) if below.size else size.size
+    if count < _FEWEST_INSTANTS:
+        raise IdentificationError(
+            f"samples: the decay is above the noise for {count} instants of the slow flow, needs {_FEWEST_INSTANTS}"
+        )
+    return rest.select(np.arange(size.size) < count)
+
+
+def _at_width(decay: SlowFlow, levels: Float, width: float, quiet: float) -> list[_Level | None]:
+    """Fit around all levels; None where there are too few instants. The noise is that of a level and its neighbours."""
+    fits = [
+        [fit_around(decay, float(np.log(level)), width, degree) for degree in (_DEGREE, _HIGHER_DEGREE)]
+        if np.count_nonzero(np.abs(np.log(decay.amplitude_m / level)) < width) >= _FEWEST_INSTANTS
+        else None
+        for level in levels
+    ]
+    out: list[_Level | None] = []
+    for n, (level, both) in enumerate(zip(levels, fits, strict=True)):
+        if both is None:
+            out.append(None)
+            continue
+        near = [some[1] for some in fits[max(0, n - _NEIGHBOURS) : n + _NEIGHBOURS + 1] if some is not None]
+        noise = np.maximum(noise_variances(near), [quiet, 0.0])
+        (k_std, c_std), (k_further, c_further) = (fit.standard_errors(noise) for fit in both)
+        apart = (
+            (both[1].stiffness - both[0].stiffness) ** 2 - max(k_further**2 - k_std**2, 0.0),
+            (both[1].damping - both[0].damping) ** 2 - max(c_further**2 - c_std**2, 0.0),
+        )
+        out.append(_Level(float(level), both[0].stiffness, both[0].damping, k_std, c_std, apart))
+    return out
+
+
+def _pooled(table: Sequence[_Level | None]) -> Float:
+    """float[n, 2]: bounds of the systematic errors of stiffness and damping, averaged over neighbouring levels."""
+    square = np.array([(np.nan, np.nan) if one is None else one.apart for one in table])
+    out = np.full(square.shape, np.nan)
+    for n in range(len(table)):
+        near = square[max(0, n - _NEIGHBOURS) : n + _NEIGHBOURS + 1]
+        near = near[np.isfinite(near[:, 0])]
+        if near.size:
+            out[n] = _CURVATURE * np.sqrt(np.maximum(near.mean(axis=0), 0.0))
+    return out
+
+
+def _mode(decay: SlowFlow, levels: Sequence[_Level], bounds: Float, shape_std: float, residual_std: float) -> DecayMode:
+    amplitude, stiffness, damping = (
+        np.array([getattr(one, name) for one in levels]) for name in ("amplitude_m", "stiffness", "damping")
+    )
+    std = np.array([(one.stiffness_std, one.damping_std) for one in levels])
+    omega = np.sqrt(stiffness)
+    falling, growth = np.log(decay.amplitude_m), decay.growth_1_s
+
+    def at(values: NDArray[np.generic]) -> Complex:
+        order = np.argsort(falling)
+        place = np.log(amplitude)
+        real = np.interp(place, falling[order], np.real(values)[order])
+        return np.asarray(real + 1j * np.interp(place, falling[order], np.imag(values)[order]))
+
+    pull = at(decay.drive_mode_shape**2 * decay.force[:, 1] / decay.drive_m)
+    turning = at(decay.rate_1_s).imag
+    for error in (
+        2.0 * shape_std / abs(decay.drive_mode_shape) * pull,
+        residual_std / decay.drive_mode_shape**2 * pull**2,
+    ):
+        bounds = bounds + 1.96 * np.abs(np.stack([error.real, error.imag / turning], axis=-1))
+    if amplitude.size > 1:  # what changes with the amplitude lags behind it, to first order in the rate of decay
+        lag = np.abs(np.gradient(stiffness, np.log(amplitude)) * at(growth).real) / stiffness
+        bounds[:, 1] += lag
+    drive = find_role(decay.channels, "drive")
+    deflection = np.full((amplitude.size, len(decay.channels)), complex(np.nan, np.nan))
+    for row, channel in enumerate(decay.channels):
+        if channel.role in ("drive", "response"):
+            deflection[:, row] = at(decay.deflection_ratio(channel.name))
+    harmonics = np.full((amplitude.size, decay.harmonics.shape[2]), complex(np.nan, np.nan))
+    harmonics[:, 1] = amplitude
+    return DecayMode(
+        amplitude_m=amplitude,
+        amplitude_std_m=np.zeros(amplitude.size),
+        time_s=at(decay.time_s).real,
+        frequency_hz=at(decay.frequency_hz).real,
+        modal_frequency_hz=omega / (2.0 * np.pi),
+        modal_frequency_std_hz=std[:, 0] / (4.0 * np.pi * omega),
+        modal_frequency_systematic_hz=bounds[:, 0] / (4.0 * np.pi * omega),
+        damping_ratio=0.5 * damping / omega,
+        damping_ratio_std=0.5 * std[:, 1] / omega,
+        damping_ratio_systematic=0.5 * bounds[:, 1] / omega,
+        decay_ratio=-at(growth).real / omega,
+        deflection=deflection,
+        harmonics_m=harmonics,
+        force_n=pull * amplitude / decay.drive_mode_shape**2,
+        reference=decay.channels[drive].name,
+        start_s=float(decay.time_s[0]),
+        stop_s=float(decay.time_s[-1]),
+        floor_m=float(np.sqrt(np.median(decay.noise[:, 0])) / float(np.median(stiffness))),
+        drive_mode_shape=decay.drive_mode_shape,
+    )
