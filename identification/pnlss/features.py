@@ -200,6 +200,12 @@ class Features:
         factors = np.concatenate([np.prod(size**self.exponents, axis=1), np.ones(len(weights))])
         return replace(self, weights=weights, limits=self.limits / size), factors
 
+    def with_saturating(self, weights: ArrayLike) -> "Features":
+        """Return these features and further ones of `saturating` behind them."""
+        more = np.reshape(np.asarray(weights, dtype=float), (-1, self.variables + 1))
+        functions = (*self.functions, *["tanh"] * len(more)) if self.functions else ()
+        return replace(self, weights=np.vstack([self.weights, more]), functions=functions)
+
     def bounded(self, limits: ArrayLike) -> "Features":
         """Return the same features with monomials that clip variables at ``limits`` (float[n_variables])."""
         return replace(self, limits=np.asarray(limits, dtype=float))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
+from identification.pnlss.compared_starts import STARTS, best_of_starts, interrupted
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
 from identification.pnlss.fitting.checks import check_enough, check_signals
@@ -22,7 +23,7 @@ from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.saturating_starts import STARTS, best_of_starts, interrupted, random_start
+from identification.pnlss.saturating_starts import saturating_starts
 
 __all__ = ["identify_pnlss"]
 
@@ -78,8 +79,8 @@ def identify_pnlss(
     settings
         Settings of the fit over time; None for the defaults.
     seed
-        Seed of the random initial directions of saturating features. There are eight starts; the better half continues after
-        each of 10, 20 and 60 iterations.
+        Seed of the random directions from which saturating features take their starts. Twelve starts are proposed, four are
+        begun to fit, and the better half continues after each of 10 and 30 iterations.
     progress
         Called after every iteration of the fit over time, and of the fits of compared starts (`FitProgress.stage`).
 
@@ -114,7 +115,7 @@ def identify_pnlss(
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     if any(counts):
         random = np.random.default_rng(seed)
-        starts = [random_start(begin, experiments, phi, chi, counts, random) for _ in range(STARTS)]
+        starts = saturating_starts(begin, experiments, phi, chi, counts, random, STARTS)
         data: dict[str, Any] = {"validation": validation, "settings": chosen, "progress": progress}
         start, found = best_of_starts(starts, experiments, **data)
         if not found.interrupted:

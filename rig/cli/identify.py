@@ -85,7 +85,8 @@ def identify(
         ),
     ] = None,
     iterations: Annotated[
-        int | None, typer.Option(help="Most iterations of a PNLSS model's fit.", show_default="100")
+        int | None,
+        typer.Option(help="Most iterations of a PNLSS model's fit; it ends sooner.", show_default="1000"),
     ] = None,
     validation: Annotated[
         list[Path] | None,
@@ -178,6 +179,8 @@ def identify(
             lines.close()
     save(found, output)
     show_file(output, json)
+    if kind == "pnlss" and found.fit is not None and found.fit.limited:
+        print(f"rig: the fit was {found.fit.stopped}; --resume with more --iterations goes on", file=sys.stderr)
     if kind == "pnlss" and found.fit is not None and found.fit.interrupted:
         print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
         raise typer.Exit(1)

@@ -114,6 +114,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
             "training_error": fit.training_error,
             "validation_error": fit.validation_error,
             "stopped": fit.stopped,
+            "limited": fit.limited,
             "interrupted": fit.interrupted,
             "seconds": float(fit.history.seconds[-1]),
         },
@@ -148,9 +149,11 @@ def _say(summary: dict[str, Any]) -> None:
         judged = number(fit["validation_error"], ".3f", 100.0)
         print(
             f"iteration {fit['chosen']} of {fit['iterations']} chosen: error {number(fit['training_error'], '.3f', 100.0)} % "
-            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; {fit['stopped']}; "
+            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; "
             f"{number(summary['seconds'], '.1f')} s in all"
         )
+        more = "; more --iterations go on with --resume" if fit["limited"] else ""
+        print(f"why the fit ended: {fit['stopped']}{more}")
     say_scatter(summary["scatter"])
     say_errors(summary)
 

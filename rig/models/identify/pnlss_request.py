@@ -26,7 +26,7 @@ class PnlssOptions(Options):
     saturating: int | None = None
     """Number of saturating features. They replace the monomials unless degrees are given; none if None."""
     iterations: int | None = None
-    """Largest number of iterations of the fit; 100 if None."""
+    """Largest number of iterations of the fit; 1000 if None."""
     resume: Path | None = None
     """File of an earlier fit to the same data, which is continued."""
 
