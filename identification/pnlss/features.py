@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.kernels import TANH, Table, feature_derivatives, feature_values
+from identification.pnlss.kernels import CUBE, SQUARE, TANH, Table, feature_derivatives, feature_values
 from identification.validation import finite_array, read_only
 
 __all__ = ["FUNCTIONS", "FeatureFunction", "Features", "with_weights"]
@@ -41,6 +41,8 @@ class FeatureFunction(NamedTuple):
 
 FUNCTIONS: dict[str, FeatureFunction] = {
     "tanh": FeatureFunction(TANH, np.tanh),
+    "square": FeatureFunction(SQUARE, lambda s: s * s),
+    "cube": FeatureFunction(CUBE, lambda s: s * s * s),
 }
 """Functions by name; the name is used in files and in the names of features."""
 

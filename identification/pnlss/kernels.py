@@ -7,6 +7,8 @@ import numpy as np
 from vibrolock.compiled import inner_kernel, kernel
 
 __all__ = [
+    "CUBE",
+    "SQUARE",
     "TANH",
     "Matrices",
     "Table",
@@ -22,8 +24,8 @@ __all__ = [
     "workspace",
 ]
 
-TANH = 0
-"""Code of tanh as the function g in features ``g(w . v + b) - g(b)``; codes are listed in `features.FUNCTIONS`."""
+TANH, SQUARE, CUBE = 0, 1, 2
+"""Codes of the function g in features ``g(w . v + b) - g(b)``; they are listed in `features.FUNCTIONS`."""
 
 
 class Table(NamedTuple):
@@ -83,12 +85,20 @@ def within_limits(table: Table, v: np.ndarray) -> bool:
 @inner_kernel
 def function_value(code: int, s: float) -> float:
     """Return ``g(s)`` for the function g with this code. To add a function, add a branch ``if code == ...`` ahead of tanh."""
+    if code == SQUARE:
+        return float(s * s)
+    if code == CUBE:
+        return float(s * s * s)
     return float(np.tanh(s))
 
 
 @inner_kernel
 def function_slope(code: int, s: float, value: float) -> float:
     """Return ``g'(s)``, given ``value = g(s)``; branches as in `function_value`."""
+    if code == SQUARE:
+        return float(2.0 * s)
+    if code == CUBE:
+        return float(3.0 * s * s)
     return 1.0 - value**2
 
 
