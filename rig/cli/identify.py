@@ -84,6 +84,10 @@ def identify(
             help="Saturating features (tanh) of a PNLSS model, in place of the monomials; with --degrees, beside them.",
         ),
     ] = None,
+    constant_input: Annotated[
+        bool,
+        typer.Option("--constant-input", help="A constant input of a PNLSS model beside the others, against offsets."),
+    ] = False,
     iterations: Annotated[
         int | None,
         typer.Option(help="Most iterations of a PNLSS model's fit; it ends sooner.", show_default="1000"),
@@ -157,6 +161,7 @@ def identify(
             degrees=degrees,
             output_polynomials=False if no_output_polynomials else None,
             saturating=saturating,
+            constant_input=True if constant_input else None,
             iterations=iterations,
             resume=output if resume else None,
         ),

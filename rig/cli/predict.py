@@ -54,6 +54,22 @@ def predict(
             "--planned-sweep", metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."
         ),
     ] = None,
+    planned_multisines: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--planned-multisine",
+            metavar="PLAN",
+            help="Simulate the multisines of this plan, yet to be made, with a PNLSS or structured model; may be repeated.",
+        ),
+    ] = None,
+    constants: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--constant",
+            metavar="NAME=VALUE",
+            help="Hold this input of a PNLSS model at a value; may be repeated. That of --constant-input holds by itself.",
+        ),
+    ] = None,
     exciter: Annotated[
         Path | None,
         typer.Option(
@@ -105,6 +121,8 @@ def predict(
         sweeps=tuple(sweeps or ()),
         multisines=tuple(multisines or ()),
         planned=tuple(planned or ()),
+        planned_multisines=tuple(planned_multisines or ()),
+        constants=tuple(constants or ()),
         exciter=exciter,
         zero_crossings=zero_crossings,
         modes=modes,

@@ -38,6 +38,8 @@ def identified_pnlss(
     begun, scatter = time.perf_counter(), None
     earlier = None if options.resume is None else _earlier(options.resume)
     data = fit_data(paths, of_data, "PNLSS", like=None if earlier is None else earlier.model)
+    if options.constant_input:
+        data = data.with_constant_input()
     data = replace(data, notes=(*data.notes, *_remarks(data, paths)))
     if earlier is not None and earlier.fit is not None:
         if earlier.scatter is not None or of_data.scattering:

@@ -25,6 +25,8 @@ class PnlssOptions(Options):
     """Whether monomials also act on the outputs; yes if None."""
     saturating: int | None = None
     """Number of saturating features. They replace the monomials unless degrees are given; none if None."""
+    constant_input: bool | None = None
+    """Whether the model has a constant input of 1 beside the others, whose effect compensates offsets; no if None."""
     iterations: int | None = None
     """Largest number of iterations of the fit; 1000 if None."""
     resume: Path | None = None

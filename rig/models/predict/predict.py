@@ -106,10 +106,13 @@ def _check_mode(request: PredictionRequest) -> None:
         raise ConfigurationError(
             "`exciter`: is for sweeps, and none is given; add `sweeps` or `planned`, or leave it out"
         )
-    if request.multisines:
-        raise ConfigurationError(
-            "`multisines`: means nothing to a nonlinear mode; a PNLSS or structured model simulates multisines"
-        )
+    for name, given in (("multisines", request.multisines), ("planned_multisines", request.planned_multisines)):
+        if given:
+            raise ConfigurationError(
+                f"`{name}`: means nothing to a nonlinear mode; a PNLSS or structured model simulates multisines"
+            )
+    if request.constants:
+        raise ConfigurationError("`constants`: means nothing to a nonlinear mode, which has one input; leave it out")
 
 
 def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:

@@ -6,6 +6,7 @@ seven of these, chosen by the other three, and simulated on the whole arrow.
 """
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,7 +106,7 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
         fits[name] = fitted(data, count, seed=seed)
         took = fits[name].history.seconds[-1]
         say(f"{name}: iteration {fits[name].chosen} of {fits[name].history.iterations}, {took:.1f} s")
-    chosen = min(fits, key=lambda name: fits[name].validation_error)
+    chosen = _chosen({name: fit.model for name, fit in fits.items()}, data)
     first = fits[chosen]
     linear = {} if first.linear is None else _figures(first.linear, data)
     lines = [Line("linear start", linear)]
@@ -125,7 +126,8 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
         lines=tuple(lines),
         published=_PUBLISHED,
         notes=(
-            f"the arrow: the first {_ARROW} samples; models are chosen by {_CHOOSING} multisines, which are not fitted",
+            f"the arrow: the first {_ARROW} samples; models are judged by {_CHOOSING} multisines, which are not fitted",
+            "chosen: the model with the fewest parameters within one standard error of the best on these multisines",
             "published figures are of the whole arrow and second-hand, from lists in later works",
         ),
         panels=(_panel(first.model, data.test[0]),),
@@ -134,15 +136,31 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
     )
 
 
+def _chosen(models: Mapping[str, PnlssModel], data: Oscillator) -> str:
+    """Return the smallest model within one standard error of the best on validation data.
+
+    The one-standard-error rule (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees, 1984, Section 3.4.3):
+    differences below it are chance, and of two models that fit alike the smaller one extrapolates better.
+    """
+    errors = {name: pnlss_errors(model, data.validation).rms[:, 0] for name, model in models.items()}
+    best = min(errors.values(), key=lambda error: float(np.mean(error)))
+    most = np.mean(best) + np.std(best, ddof=1) / np.sqrt(best.size)
+    alike = [name for name, error in errors.items() if np.mean(error) <= most]
+    return min(alike, key=lambda name: _parameters(models[name]))
+
+
+def _parameters(model: PnlssModel) -> int:
+    inner = model.state_features.parameters + model.output_features.parameters
+    return sum(part.size for part in model.linear_part) + model.nonlinear_coefficients + inner
+
+
 def _figures(model: PnlssModel, data: Oscillator) -> dict[str, float]:
     groups = {"arrow_mv": data.test, "validation_mv": data.validation, "estimation_mv": data.estimation}
     errors = {key: pnlss_errors(model, group) for key, group in groups.items()}
     found = {key: 1e3 * float(np.sqrt(np.mean(error.rms**2))) for key, error in errors.items()}
-    features = model.state_features.parameters + model.output_features.parameters
-    linear = sum(part.size for part in model.linear_part)
     found |= {
         "range_use": float(errors["arrow_mv"].range_use[0]),
-        "parameters": float(linear + model.nonlinear_coefficients + features),
+        "parameters": float(_parameters(model)),
     }
     return {key: value for key, value in found.items() if np.isfinite(value)}
 
