@@ -39,6 +39,7 @@ def identify_pnlss(
     output_degrees: Iterable[int] | None = None,
     variables: Variables = "all",
     saturating: int | tuple[int, int] = 0,
+    function: str = "tanh",
     state_features: Features | None = None,
     output_features: Features | None = None,
     validation: Sequence[Experiment] = (),
@@ -67,6 +68,8 @@ def identify_pnlss(
         Number of saturating features in the state equation, or numbers in the state and the output equation; 10 to 15 suffice
         for a hysteresis. If one number is given, the output equation has as many, unless all outputs are displacements or
         velocities, on which forces do not act instantaneously.
+    function
+        Function of the saturating features: ``tanh``, ``square``, ``cube``, or ``"module:name"`` of your own (`Features`).
     state_features, output_features
         User-defined features, in place of those that the settings above describe; their coefficients begin at zero.
     validation
@@ -115,7 +118,7 @@ def identify_pnlss(
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     if any(counts):
         random = np.random.default_rng(seed)
-        starts = saturating_starts(begin, experiments, phi, chi, counts, random, STARTS)
+        starts = saturating_starts(begin, experiments, phi, chi, counts, random, STARTS, function)
         data: dict[str, Any] = {"validation": validation, "settings": chosen, "progress": progress}
         start, found = best_of_starts(starts, experiments, **data)
         if not found.interrupted:

@@ -7,7 +7,7 @@ Krishnaprasad, Asilomar Conference, 1993). That is regression, without a simulat
 of one simulation each, and the best of them are begun to fit (`identification.pnlss.compared_starts`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
-from identification.pnlss.features import Features
+from identification.pnlss.features import Features, function_of
 from identification.pnlss.linear_residual import Residual, linear_residual
 from identification.pnlss.model import PnlssModel
 
@@ -28,8 +28,11 @@ _MOBILITIES = (1e-2, 1e-1, 1e-3)
 _PROPOSALS = 12
 _POOL = 300
 """Directions from which each start takes its features."""
-_STEEP = (0.3, 3.0)
-"""Range of the standard deviation of weights, for variables of RMS one: features from nearly linear to nearly a sign."""
+_STEEP = (0.3, 1.0)
+"""Range of the standard deviation of weights, for variables of RMS one: from nearly linear to saturated at peaks."""
+_OFF_CENTRE = 0.3
+"""Standard deviation of biases relative to that of weights. A feature far off the centre acts in few samples, and a fit can
+drive it out of them all: it then fits these samples alone, and is wrong by far where other data reach there."""
 _SAMPLES = 10_000
 """Most samples of the regression."""
 _PENALTY = 1e-6
@@ -46,15 +49,17 @@ def saturating_starts(
     counts: tuple[int, int],
     random: np.random.Generator,
     wanted: int,
+    function: str = "tanh",
 ) -> list[PnlssModel]:
     """Return ``wanted`` models with the features ``phi`` and ``chi`` and ``counts`` additional saturating ones, best first.
 
-    Coefficients of the features ``phi`` and ``chi`` are zero. All starts are bounded under the inputs of the experiments.
+    ``function``: name of another function in place of tanh. Coefficients of the features ``phi`` and ``chi`` are zero. All
+    starts are bounded under the inputs of the experiments.
     """
     residuals = _residuals(linear, experiments)
     found = []
     for number in range(max(_PROPOSALS, wanted)):
-        start = _proposed(linear, residuals[number % len(residuals)], phi, chi, counts, random)
+        start = _proposed(linear, residuals[number % len(residuals)], phi, chi, counts, random, function)
         found.append(_bounded(linear, start, experiments))
     return [model for _, model in sorted(found, key=lambda pair: pair[0])[:wanted]]
 
@@ -85,14 +90,18 @@ def _proposed(
     chi: Features,
     counts: tuple[int, int],
     random: np.random.Generator,
+    function: str,
 ) -> PnlssModel:
     """Return the linear model with features and coefficients by regression on the residual."""
     n = linear.states
-    size = _rms(residual.variables)
-    states = _regression(residual.variables / size[:, None], residual.disturbance, residual.weight, counts[0], random)
-    outputs = _regression(residual.variables / size[:, None], residual.misfit, residual.weight, counts[1], random)
+    size, of = _rms(residual.variables), function_of(function).of
+    states = _regression(
+        residual.variables / size[:, None], residual.disturbance, residual.weight, counts[0], random, of
+    )
+    outputs = _regression(residual.variables / size[:, None], residual.misfit, residual.weight, counts[1], random, of)
     grown = [
-        own.with_saturating(weights / np.append(size, 1.0)) for own, (weights, _, _) in ((phi, states), (chi, outputs))
+        own.with_functions(weights / np.append(size, 1.0), function)
+        for own, (weights, _, _) in ((phi, states), (chi, outputs))
     ]
     start = linear.with_features(*grown)
     e, f = np.array(start.e), np.array(start.f)
@@ -110,7 +119,7 @@ def _proposed(
 
 
 def _regression(
-    v: Float, target: Float, weight: Float, count: int, random: np.random.Generator
+    v: Float, target: Float, weight: Float, count: int, random: np.random.Generator, of: Callable[[Float], Float]
 ) -> tuple[Float, Float, Float]:
     """Explain ``target`` (float[n_rows, n]) by variables ``v`` of RMS one and ``count`` features of them.
 
@@ -121,8 +130,9 @@ def _regression(
     if not count:
         return np.zeros((0, len(v) + 1)), np.zeros((rows, len(v))), np.zeros((rows, 0))
     pool = random.normal(size=(max(_POOL, 2 * count), len(v) + 1))
+    pool[:, -1] *= _OFF_CENTRE
     pool *= np.exp(random.uniform(np.log(_STEEP[0]), np.log(_STEEP[1]), size=(len(pool), 1)))
-    phi = np.tanh(pool[:, :-1] @ v + pool[:, -1:]) - np.tanh(pool[:, -1:])
+    phi = of(pool[:, :-1] @ v + pool[:, -1:]) - of(pool[:, -1:])
     size = _rms(target)
     by = np.sqrt(weight / np.mean(weight))
     aim = target / size[:, None] * by

@@ -27,6 +27,8 @@ _AHEAD = 1000
 """Samples of the period before, in which the transient decays."""
 _SHOWN = 1200
 """Samples of the test that are drawn."""
+_SETTINGS = FitSettings(iterations=300, patience=80)
+"""The error of so short a validation record scatters from iterate to iterate, hence the patience."""
 _NOISE = "noise of the averaged training data: -108 dB; the tests have none"
 
 
@@ -85,7 +87,7 @@ def fitted(data: HystereticData, *, settings: FitSettings | None = None, **asked
         states=_STATES,
         linear=linear_pnlss([data.whole], states=_STATES),
         validation=[data.validation],
-        settings=settings,
+        settings=_SETTINGS if settings is None else settings,
         **asked,  # type: ignore[arg-type]
     )
 
