@@ -2,11 +2,14 @@
 
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-__all__ = ["call_at"]
+from vibrolock.compiled import kernel
+
+__all__ = ["call_at", "call_each"]
 
 
 def _call_at(typing: Any, address: Any, s: Any) -> Any:
@@ -21,3 +24,10 @@ def _call_at(typing: Any, address: Any, s: Any) -> Any:
 
 
 call_at: Any = intrinsic(_call_at)
+
+
+@kernel
+def call_each(address: int, s: np.ndarray, out: np.ndarray) -> None:
+    """Write the function at ``address`` of each number of ``s`` (float[n]) to ``out``."""
+    for k in range(s.size):
+        out[k] = call_at(address, s[k])

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from vibrolock.by_address import call_each
 
 __all__ = ["UserFunction", "is_users", "user_function"]
 
@@ -32,8 +33,10 @@ class UserFunction(NamedTuple):
 
     def of(self, s: Float) -> Float:
         """Return g of an array."""
-        function = _PROTOTYPE(self.address)
-        return np.array([function(float(value)) for value in np.ravel(s)]).reshape(np.shape(s))
+        given = np.array(s, dtype=np.float64).ravel()
+        out = np.empty(given.size)
+        call_each(self.address, given, out)
+        return out.reshape(np.shape(s))
 
 
 def is_users(name: str) -> bool:

@@ -84,6 +84,17 @@ def identify(
             help="Saturating features (tanh) of a PNLSS model, in place of the monomials; with --degrees, beside them.",
         ),
     ] = None,
+    function: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Function of the saturating features: tanh, square, cube, or MODULE:NAME of your own.",
+            show_default="tanh",
+        ),
+    ] = None,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the function of --function, or of the model that goes on.")
+    ] = False,
     constant_input: Annotated[
         bool,
         typer.Option("--constant-input", help="A constant input of a PNLSS model beside the others, against offsets."),
@@ -161,6 +172,8 @@ def identify(
             degrees=degrees,
             output_polynomials=False if no_output_polynomials else None,
             saturating=saturating,
+            function=function,
+            trust_code=True if trust_code else None,
             constant_input=True if constant_input else None,
             iterations=iterations,
             resume=output if resume else None,

@@ -102,7 +102,7 @@ def predict(
         bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
     ] = False,
     trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="Import the functions that a structured model names.")
+        bool, typer.Option("--trust-code", help="Import the functions that a structured or PNLSS model names.")
     ] = False,
     overwrite: Overwrite = False,
     json: Json = False,

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from identification import (
     PnlssFit,
     PnlssModel,
 )
+from identification.pnlss.user_functions import is_users
+from rig.errors import ConfigurationError
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.models.files.simulated import (
     SimulatedModel,
@@ -24,7 +27,7 @@ from rig.models.files.simulated import (
 )
 from rig.text.console import number
 
-__all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
+__all__ = ["PNLSS", "IdentifiedPnlss", "check_trusted", "functions_of", "poles_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,6 +75,21 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
         fit=fit,
         **unpacked_errors(arrays, attributes),
     )
+
+
+def functions_of(model: PnlssModel) -> list[str]:
+    """Return the functions of the user, ``module:name``, that a model names. To simulate it, they are imported."""
+    named = (*model.state_features.functions, *model.output_features.functions)
+    return [name for name in dict.fromkeys(named) if is_users(name)]
+
+
+def check_trusted(path: Path | None, model: PnlssModel, trusted: bool) -> None:
+    """Raise `ConfigurationError` if a model names code of a user that is not trusted."""
+    if (functions := functions_of(model)) and not trusted:
+        raise ConfigurationError(
+            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
+            "`trust_code`"
+        )
 
 
 def poles_of(model: PnlssModel) -> list[dict[str, float]]:

@@ -63,7 +63,7 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     kind = kind_of(model)
     if kind not in (known := (NONLINEAR_MODE.name, PNLSS.name, STRUCTURED.name, FORCE_SURFACE.name)):
         raise RecordingError(f"{model}: is a file of kind {kind}; predictions are made with a {', '.join(known)}")
-    if request.trust_code and kind != STRUCTURED.name:
+    if request.trust_code and kind not in (STRUCTURED.name, PNLSS.name):
         raise ConfigurationError(f"`trust_code`: means nothing to a {kind}, which names no code; leave it out")
     for simulated in (PNLSS, STRUCTURED):
         if kind == simulated.name:

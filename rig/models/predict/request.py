@@ -51,7 +51,7 @@ class PredictionRequest:
     allow_extrapolation: bool = False
     """Whether to predict beyond twice the largest identified modal amplitude."""
     trust_code: bool = False
-    """Whether to import the functions that a structured model names."""
+    """Whether to import the functions that a structured or PNLSS model names."""
 
     def __post_init__(self) -> None:
         asked = (self.forces_n, self.voltages_v, self.sweeps, self.multisines, self.references)

@@ -10,6 +10,7 @@ from identification import (
     Exciter,
     FrequencyResponse,
     IdentificationError,
+    PnlssModel,
     PredictionError,
     Predictions,
     ResponseBand,
@@ -21,7 +22,7 @@ from rig.errors import ConfigurationError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.files import load_as
 from rig.models.files.kind import FileKind
-from rig.models.files.pnlss import IdentifiedPnlss
+from rig.models.files.pnlss import IdentifiedPnlss, check_trusted
 from rig.models.files.structured import IdentifiedStructured, functions_of
 from rig.models.predict.constants import constants_of
 from rig.models.predict.driven_models import DrivenModel, frequency_response_at
@@ -48,7 +49,9 @@ def simulated_predictions(
     """
     found: IdentifiedPnlss | IdentifiedStructured = load_as(kind, path)
     model = found.model
-    if isinstance(model, StructuredModel) and (functions := functions_of(model)) and not request.trust_code:
+    if isinstance(model, PnlssModel):
+        check_trusted(path, model, request.trust_code)
+    elif (functions := functions_of(model)) and not request.trust_code:
         raise ConfigurationError(
             f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
             "`trust_code`"
