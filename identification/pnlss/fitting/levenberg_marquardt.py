@@ -26,8 +26,8 @@ _SMALLEST, _LARGEST = 1e-16, 1e8
 """Range of dampings that are tried."""
 _WORTH = 0.01
 """A smaller damping is tried if its predicted gain exceeds the gain achieved by more than this share."""
-_LATELY = 40
-"""Iterations whose gain is told where there is no patience."""
+_LATELY = 10
+"""Last iterations whose gain a fit that was stopped tells; half of them if there are fewer than twice as many."""
 _STALLED = 5
 """A fit ends after this many successive iterations without a gain above the tolerance."""
 
@@ -172,9 +172,9 @@ def _ending(iterates: Iterates, settings: FitSettings) -> Ending | None:
 def _at_limit(history: FitHistory, settings: FitSettings) -> Ending:
     """Return the end of a fit that may not go on, with what its last iterations gained."""
     limit = f"stopped at its limit of {settings.iterations} iterations"
-    last = min(history.iterations, settings.patience or _LATELY)
+    last = max(min(history.iterations // 2, _LATELY), 1)
     gain = history.gained(last)
-    if not last or not gain > settings.least_gain:
+    if not history.iterations or not gain > settings.least_gain:
         return Ending(limit)
     error = "validation" if history.validated else "training"
     lately = f"the last {last}" if last > 1 else "the last one"
