@@ -3,9 +3,6 @@
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from vibrolock.compiled import kernel
 
@@ -14,6 +11,8 @@ __all__ = ["call_at", "call_each"]
 
 def _call_at(typing: Any, address: Any, s: Any) -> Any:
     """Call a function ``double (*)(double)`` at an address, without Python."""
+    from llvmlite import ir
+    from numba import types
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         prototype = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()])
@@ -23,7 +22,25 @@ def _call_at(typing: Any, address: Any, s: Any) -> Any:
     return types.float64(types.int64, types.float64), generate
 
 
-call_at: Any = intrinsic(_call_at)
+class _OnUse:
+    """An intrinsic that is made when numba asks for its type, as kernels are: declaring it loads no compiler."""
+
+    def __init__(self, definition: Any) -> None:
+        self._defn = definition
+        self._made: Any = None
+
+    @property
+    def _numba_type_(self) -> Any:
+        from numba.core.registry import cpu_target
+        from numba.extending import intrinsic
+
+        if self._made is None:
+            self._made = intrinsic(self._defn)
+            cpu_target.typing_context.refresh()
+        return cpu_target.typing_context.resolve_value_type(self._made)
+
+
+call_at: Any = _OnUse(_call_at)
 
 
 @kernel
