@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from identification.pnlss.features import FUNCTIONS
-from identification.pnlss.user_functions import is_users
 from rig.errors import ConfigurationError
 from rig.models.identify.data_request import Options
 
@@ -49,6 +47,9 @@ class PnlssOptions(Options):
         self.chosen_degrees  # noqa: B018 refused here, not when it is asked for
         if self.function is None:
             return
+        from identification.pnlss.features import FUNCTIONS  # only on use: nothing else here needs models
+        from identification.pnlss.user_functions import is_users
+
         if not self.saturating:
             raise ConfigurationError(f"`function` = {self.function}: is of features; add `saturating`, their number")
         if self.function not in FUNCTIONS and not is_users(self.function):
