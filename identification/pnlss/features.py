@@ -6,7 +6,8 @@ monomials beforehand and computes those of functions in `identification.pnlss.fi
 
 A feature ``g(w . v + b) - g(b)`` applies a function g to a weighted sum of the variables. To add a function g, add an entry
 with a new code to `FUNCTIONS`, and a branch with this code to the kernels `function_value` and `function_slope`
-(`identification.pnlss.kernels`). Simulation, fit, harmonic balance, files and names then support it.
+(`identification.pnlss.kernels`). Simulation, fit, harmonic balance, files and names then support it. A function of the user
+needs neither: it is given as ``"module:name"``.
 
 The monomials are those of Paduart et al., Automatica 46, 2010. With tanh the functions saturate, as the nonlinear feedback of
 an NL-LFR model does (Schoukens and Toth, IFAC-PapersOnLine 53, 2020).
@@ -21,10 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.kernels import TANH, Table, feature_derivatives, feature_values
+from identification.pnlss.kernels import CUBE, SQUARE, TANH, Table, feature_derivatives, feature_values
+from identification.pnlss.user_functions import UserFunction, is_users, user_function
 from identification.validation import finite_array, read_only
 
-__all__ = ["FUNCTIONS", "FeatureFunction", "Features", "with_weights"]
+__all__ = ["FUNCTIONS", "FeatureFunction", "Features", "function_of", "with_weights"]
 
 Float = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -37,12 +39,27 @@ class FeatureFunction(NamedTuple):
     """Code of the function in the kernels."""
     of: Callable[[Float], Float]
     """g evaluated on an array, for its values at rest."""
+    slope: int = 0
+    """Address of the derivative of a user's function."""
 
 
 FUNCTIONS: dict[str, FeatureFunction] = {
     "tanh": FeatureFunction(TANH, np.tanh),
+    "square": FeatureFunction(SQUARE, lambda s: s * s),
+    "cube": FeatureFunction(CUBE, lambda s: s * s * s),
 }
 """Functions by name; the name is used in files and in the names of features."""
+
+
+def function_of(name: str) -> FeatureFunction:
+    """Return a function by its name in `FUNCTIONS`, or that of a user, which is imported and compiled.
+
+    Raises `IdentificationError` if there is no such function.
+    """
+    if name in FUNCTIONS:
+        return FUNCTIONS[name]
+    found = user_function(name)
+    return FeatureFunction(found.address, found.of, found.slope_address)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,7 +75,9 @@ class Features:
     weights
         float[n_functions, variables + 1]: feature ``g(w . v + b) - g(b)``, zero at rest, b in the last column.
     functions
-        Name of g in `FUNCTIONS` for every row of ``weights``; empty if all are ``tanh``.
+        Name of g for every row of ``weights``, empty if all are ``tanh``: one of `FUNCTIONS`, or ``"module:name"`` of a
+        function of your own, of one number. It is imported when the features are evaluated, and compiled; its derivative is
+        that in ``"module:name:slope"``, or taken by finite differences.
     limits
         float[variables], magnitude at which monomials clip a variable; inf for none. Limits keep the features bounded and
         have no effect within the limits.
@@ -92,11 +111,11 @@ class Features:
         object.__setattr__(self, "limits", read_only(limits, np.float64))
         functions = tuple(self.functions)
         object.__setattr__(self, "functions", () if set(functions) <= {"tanh"} else functions)
-        unknown = [name for name in functions if name not in FUNCTIONS]
+        unknown = [name for name in functions if name not in FUNCTIONS and not is_users(name)]
         if unknown or len(functions) not in (0, len(self.weights)):
             raise IdentificationError(
                 f"functions: are {', '.join(functions)} for {len(self.weights)} rows of weights, needs one of "
-                f"{', '.join(FUNCTIONS)} for each"
+                f"{', '.join(FUNCTIONS)} for each, or 'module:name' of your own"
             )
         if np.any(self.exponents < 0) or np.any(self.exponents.sum(axis=1) < 2):
             raise IdentificationError("exponents: have a negative power or a degree below 2, which is the linear part")
@@ -153,8 +172,11 @@ class Features:
         for row, powers in zip(factors, self.exponents, strict=True):
             used = np.repeat(np.arange(self.variables), powers)
             row[: used.size] = used
-        codes = np.array([FUNCTIONS[name].code for name in self._functions], dtype=np.int64)
-        table = Table(factors, np.array(self.limits), self.weights, np.zeros(len(codes)), codes)
+        functions = [function_of(name) for name in self._functions]
+        codes, slopes = (
+            np.array([getattr(function, name) for function in functions], dtype=np.int64) for name in ("code", "slope")
+        )
+        table = Table(factors, np.array(self.limits), self.weights, np.zeros(len(codes)), codes, slopes)
         return with_weights(table, np.array(self.weights))
 
     @property
@@ -200,6 +222,12 @@ class Features:
         factors = np.concatenate([np.prod(size**self.exponents, axis=1), np.ones(len(weights))])
         return replace(self, weights=weights, limits=self.limits / size), factors
 
+    def with_functions(self, weights: ArrayLike, function: str = "tanh") -> "Features":
+        """Return these features and further ones behind them: a function of weighted sums, float[n, n_variables + 1]."""
+        more = np.reshape(np.asarray(weights, dtype=float), (-1, self.variables + 1))
+        functions = (*self._functions, *[function] * len(more))
+        return replace(self, weights=np.vstack([self.weights, more]), functions=functions)
+
     def bounded(self, limits: ArrayLike) -> "Features":
         """Return the same features with monomials that clip variables at ``limits`` (float[n_variables])."""
         return replace(self, limits=np.asarray(limits, dtype=float))
@@ -214,7 +242,9 @@ class Features:
 def with_weights(table: Table, weights: Float) -> Table:
     """Return the table with other weights (float[n_functions, n_variables + 1])."""
     at_rest = np.empty(len(weights))
-    for function in FUNCTIONS.values():
-        own = table.codes == function.code
-        at_rest[own] = function.of(weights[own, -1])
+    known = {function.code: function for function in FUNCTIONS.values()}
+    for code in np.unique(table.codes):
+        own = table.codes == code
+        of = known[int(code)].of if int(code) in known else UserFunction(int(code), 0, ()).of
+        at_rest[own] = of(weights[own, -1])
     return table._replace(weights=weights, at_rest=at_rest)

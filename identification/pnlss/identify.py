@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
+from identification.pnlss.compared_starts import STARTS, best_of_starts, interrupted
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
 from identification.pnlss.fitting.checks import check_enough, check_signals
@@ -22,7 +23,7 @@ from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.pnlss.model import PnlssModel
-from identification.pnlss.saturating_starts import STARTS, best_of_starts, interrupted, random_start
+from identification.pnlss.saturating_starts import saturating_starts
 
 __all__ = ["identify_pnlss"]
 
@@ -38,6 +39,7 @@ def identify_pnlss(
     output_degrees: Iterable[int] | None = None,
     variables: Variables = "all",
     saturating: int | tuple[int, int] = 0,
+    function: str = "tanh",
     state_features: Features | None = None,
     output_features: Features | None = None,
     validation: Sequence[Experiment] = (),
@@ -66,6 +68,8 @@ def identify_pnlss(
         Number of saturating features in the state equation, or numbers in the state and the output equation; 10 to 15 suffice
         for a hysteresis. If one number is given, the output equation has as many, unless all outputs are displacements or
         velocities, on which forces do not act instantaneously.
+    function
+        Function of the saturating features: ``tanh``, ``square``, ``cube``, or ``"module:name"`` of your own (`Features`).
     state_features, output_features
         User-defined features, in place of those that the settings above describe; their coefficients begin at zero.
     validation
@@ -79,8 +83,8 @@ def identify_pnlss(
     settings
         Settings of the fit over time; None for the defaults.
     seed
-        Seed of the random initial directions of saturating features. There are eight starts; the better half continues after
-        each of 10, 20 and 60 iterations.
+        Seed of the random directions from which saturating features take their starts. Twelve starts are proposed, four are
+        begun to fit, and the better half continues after each of 10 and 30 iterations.
     progress
         Called after every iteration of the fit over time, and of the fits of compared starts (`FitProgress.stage`).
 
@@ -115,7 +119,7 @@ def identify_pnlss(
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     if any(counts):
         random = np.random.default_rng(seed)
-        starts = [random_start(begin, experiments, phi, chi, counts, random) for _ in range(STARTS)]
+        starts = saturating_starts(begin, experiments, phi, chi, counts, random, STARTS, function)
         data: dict[str, Any] = {"validation": validation, "settings": chosen, "progress": progress}
         start, found = best_of_starts(starts, experiments, **data)
         if not found.interrupted:

@@ -4,9 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vibrolock.by_address import call_at
 from vibrolock.compiled import inner_kernel, kernel
 
 __all__ = [
+    "CUBE",
+    "SQUARE",
     "TANH",
     "Matrices",
     "Table",
@@ -22,8 +25,12 @@ __all__ = [
     "workspace",
 ]
 
-TANH = 0
-"""Code of tanh as the function g in features ``g(w . v + b) - g(b)``; codes are listed in `features.FUNCTIONS`."""
+TANH, SQUARE, CUBE = 0, 1, 2
+"""Codes of the function g in features ``g(w . v + b) - g(b)``; they are listed in `features.FUNCTIONS`."""
+_ADDRESSES = 4096
+"""From here on a code is the address of a function of the user (`identification.pnlss.user_functions`)."""
+_STEP = 6e-6
+"""Relative step of the derivatives of such functions: the cube root of the rounding error."""
 
 
 class Table(NamedTuple):
@@ -39,6 +46,8 @@ class Table(NamedTuple):
     """float[n_functions], values ``g(b)`` at rest."""
     codes: np.ndarray
     """int[n_functions], code of the function g of each row."""
+    slopes: np.ndarray
+    """int[n_functions], address of the derivative of a user's function; 0 for finite differences and for functions of ours."""
 
 
 class Matrices(NamedTuple):
@@ -83,12 +92,27 @@ def within_limits(table: Table, v: np.ndarray) -> bool:
 @inner_kernel
 def function_value(code: int, s: float) -> float:
     """Return ``g(s)`` for the function g with this code. To add a function, add a branch ``if code == ...`` ahead of tanh."""
+    if code == SQUARE:
+        return float(s * s)
+    if code == CUBE:
+        return float(s * s * s)
+    if code >= _ADDRESSES:
+        return float(call_at(code, s))
     return float(np.tanh(s))
 
 
 @inner_kernel
-def function_slope(code: int, s: float, value: float) -> float:
-    """Return ``g'(s)``, given ``value = g(s)``; branches as in `function_value`."""
+def function_slope(code: int, slope: int, s: float, value: float) -> float:
+    """Return ``g'(s)``, given ``value = g(s)`` and the address of a user's derivative; branches as in `function_value`."""
+    if code == SQUARE:
+        return float(2.0 * s)
+    if code == CUBE:
+        return float(3.0 * s * s)
+    if code >= _ADDRESSES:
+        if slope != 0:
+            return float(call_at(slope, s))
+        step = _STEP * max(abs(s), 1.0)
+        return float((call_at(code, s + step) - call_at(code, s - step)) / (2.0 * step))
     return 1.0 - value**2
 
 
@@ -143,9 +167,9 @@ def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: n
                     product *= min(max(v[k], -table.limits[k]), table.limits[k])
             slope[i, j] += product
     for i in range(table.weights.shape[0]):
-        s, code = weighted_sum(table, i, v), table.codes[i]
-        steep[i, 0] = function_slope(code, s, function_value(code, s))
-        steep[i, 1] = function_slope(code, table.weights[i, v.size], table.at_rest[i])
+        s, code, at = weighted_sum(table, i, v), table.codes[i], table.slopes[i]
+        steep[i, 0] = function_slope(code, at, s, function_value(code, s))
+        steep[i, 1] = function_slope(code, at, table.weights[i, v.size], table.at_rest[i])
         for j in range(v.size):
             slope[count + i, j] = steep[i, 0] * table.weights[i, j]
 

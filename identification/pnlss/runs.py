@@ -34,6 +34,7 @@ def simulated_run(
     with np.errstate(over="ignore", invalid="ignore"):
         error = np.linalg.norm(run.outputs[:, experiment.counted_from :] - measured, axis=1) / size
     at = run.unbounded_at
+    counted = run.outputs[:, experiment.counted_from :] if at is None else np.full(measured.shape, np.nan)
     return SimulatedRun(
         name=experiment.name,
         level=experiment.level,
@@ -42,6 +43,8 @@ def simulated_run(
         range_use=run.range_use,
         unbounded_at_s=None if at is None else at / experiment.sample_rate_hz,
         use=use,
+        rms=np.sqrt(np.mean(counted**2, axis=1)),
+        peak=np.max(np.abs(counted), axis=1),
     )
 
 

@@ -38,7 +38,11 @@ class SimulatedRun:
         Time at which the simulation became unbounded, from the first sample of the record (even if that sample does not
         count); None if it stayed bounded.
     use
-        Use of the experiment: ``training``, ``validation`` or ``test``.
+        Use of the experiment: ``training``, ``validation`` or ``test``; ``planned`` for one that has not been measured, whose
+        errors are NaN.
+    rms, peak
+        float[n_outputs], RMS and largest magnitude of the simulated outputs over the samples that count, in their units; NaN
+        if unknown or unbounded.
     """
 
     name: str
@@ -48,14 +52,20 @@ class SimulatedRun:
     range_use: float
     unbounded_at_s: float | None = None
     use: str = "test"
+    rms: Float = field(default_factory=_unknown)
+    peak: Float = field(default_factory=_unknown)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
-        object.__setattr__(self, "error", read_only(self.error, np.float64))
-        if self.error.shape != (len(self.outputs),):
-            raise IdentificationError(
-                f"error: shape {self.error.shape}, needs one for each of {len(self.outputs)} outputs"
-            )
+        for name in ("rms", "peak"):
+            if np.ndim(getattr(self, name)) == 0:
+                object.__setattr__(self, name, np.full(len(self.outputs), np.nan))
+        for name in ("error", "rms", "peak"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+            if getattr(self, name).shape != (len(self.outputs),):
+                raise IdentificationError(
+                    f"{name}: shape {getattr(self, name).shape}, needs one for each of {len(self.outputs)} outputs"
+                )
 
     @property
     def bounded(self) -> bool:
@@ -64,12 +74,17 @@ class SimulatedRun:
 
     def row(self) -> dict[str, object]:
         """Return JSON-able numbers by name; None for numbers that are unknown or not finite."""
-        errors = {name: _finite(value) for name, value in zip(self.outputs, self.error, strict=True)}
+        errors, rms, peak = (
+            {name: _finite(value) for name, value in zip(self.outputs, values, strict=True)}
+            for values in (self.error, self.rms, self.peak)
+        )
         return {
             "name": self.name,
             "use": self.use,
             "level": _finite(self.level),
             "errors": errors,
+            "rms": rms,
+            "peak": peak,
             "range_use": _finite(self.range_use),
             "unbounded": not self.bounded,
             "unbounded_at_s": self.unbounded_at_s,

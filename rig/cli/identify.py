@@ -104,8 +104,24 @@ def identify(
             help="Saturating features (tanh) of a PNLSS model, in place of the monomials; with --degrees, beside them.",
         ),
     ] = None,
+    function: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Function of the saturating features: tanh, square, cube, or MODULE:NAME of your own.",
+            show_default="tanh",
+        ),
+    ] = None,
+    trust_code: Annotated[
+        bool, typer.Option("--trust-code", help="Import the function of --function, or of the model that goes on.")
+    ] = False,
+    constant_input: Annotated[
+        bool,
+        typer.Option("--constant-input", help="A constant input of a PNLSS model beside the others, against offsets."),
+    ] = False,
     iterations: Annotated[
-        int | None, typer.Option(help="Most iterations of a PNLSS model's fit.", show_default="100")
+        int | None,
+        typer.Option(help="Most iterations of a PNLSS model's fit; it ends sooner.", show_default="1000"),
     ] = None,
     validation: Annotated[
         list[Path] | None,
@@ -207,6 +223,9 @@ def identify(
             degrees=degrees,
             output_polynomials=False if no_output_polynomials else None,
             saturating=saturating,
+            function=function,
+            trust_code=True if trust_code else None,
+            constant_input=True if constant_input else None,
             iterations=iterations,
             resume=output if resume else None,
         ),
@@ -236,6 +255,8 @@ def identify(
             lines.close()
     save(found, output)
     show_file(output, json)
+    if kind == "pnlss" and found.fit is not None and found.fit.limited:
+        print(f"rig: the fit was {found.fit.stopped}; --resume with more --iterations goes on", file=sys.stderr)
     if kind == "pnlss" and found.fit is not None and found.fit.interrupted:
         print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
         raise typer.Exit(1)

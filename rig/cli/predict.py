@@ -54,6 +54,22 @@ def predict(
             "--planned-sweep", metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."
         ),
     ] = None,
+    planned_multisines: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--planned-multisine",
+            metavar="PLAN",
+            help="Simulate the multisines of this plan, yet to be made, with a PNLSS or structured model; may be repeated.",
+        ),
+    ] = None,
+    constants: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--constant",
+            metavar="NAME=VALUE",
+            help="Hold this input of a PNLSS model at a value; may be repeated. That of --constant-input holds by itself.",
+        ),
+    ] = None,
     exciter: Annotated[
         Path | None,
         typer.Option(
@@ -86,7 +102,7 @@ def predict(
         bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
     ] = False,
     trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="Import the functions that a structured model names.")
+        bool, typer.Option("--trust-code", help="Import the functions that a structured or PNLSS model names.")
     ] = False,
     overwrite: Overwrite = False,
     json: Json = False,
@@ -105,6 +121,8 @@ def predict(
         sweeps=tuple(sweeps or ()),
         multisines=tuple(multisines or ()),
         planned=tuple(planned or ()),
+        planned_multisines=tuple(planned_multisines or ()),
+        constants=tuple(constants or ()),
         exciter=exciter,
         zero_crossings=zero_crossings,
         modes=modes,

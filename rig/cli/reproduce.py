@@ -1,4 +1,4 @@
-"""``rig reproduce``: the whole campaign of the paper on a virtual rig, with its tables and figures."""
+"""``rig reproduce``: the whole campaign of the paper on a virtual rig, or a reference study on data of others."""
 
 import contextlib
 import sys
@@ -8,18 +8,35 @@ from typing import Annotated
 import typer
 
 from rig.cli.options import Json
+from rig.errors import ConfigurationError
 
 __all__ = ["reproduce_"]
 
 
 def reproduce_(
-    specimen: Annotated[str, typer.Argument(help="magnet-beam or friction-beam.")],
+    context: typer.Context,
+    specimen: Annotated[
+        str,
+        typer.Argument(
+            help="magnet-beam or friction-beam; or a reference study on measured data: silverbox, bouc-wen, brake-reuss."
+        ),
+    ],
     output: Annotated[
         Path,
         typer.Option("-o", "--output", metavar="FOLDER", help="Folder to keep everything in; taken up if it exists."),
     ],
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Folder with the files of a reference study; without it, where to get them."
+        ),
+    ] = None,
     models: Annotated[
-        str, typer.Option(metavar="N", help="Models of each training set, or paper: as many as the paper has.")
+        str,
+        typer.Option(
+            metavar="N",
+            help="Models of each training set, or paper: as many as the paper has. Of a reference study: to choose from.",
+        ),
     ] = "5",
     scatter: Annotated[
         float,
@@ -58,16 +75,28 @@ def reproduce_(
     seed: Annotated[int, typer.Option(help="Seed of noise, scatter and phases.", min=0)] = 0,
     json: Json = False,
 ) -> None:
-    """Record the paper's campaign on a virtual rig, identify all its models, and hold their predictions against the rig."""
+    """Record the paper's campaign on a virtual rig, identify all its models, and hold their predictions against the rig.
+
+    A reference study identifies models from the files in ``--data`` and puts published figures beside ours.
+    """
+    from rig.reproduce.references.studies import STUDIES
+
+    if specimen in STUDIES:
+        _reference(context, specimen, output, data, models, seed, json)
+        return
     from rig.bench import load_bench
     from rig.reproduce.figures import draw_study
     from rig.reproduce.options import Options
     from rig.reproduce.report import say_study, write_tables
-    from rig.reproduce.specimens import specimen_of
+    from rig.reproduce.specimens import SPECIMENS, specimen_of
     from rig.reproduce.study import reproduce
     from rig.text.console import print_json
 
+    if specimen not in SPECIMENS:
+        raise ConfigurationError(f"`specimen` {specimen!r}: allowed is {', '.join([*SPECIMENS, *STUDIES])}")
     of = specimen_of(specimen)
+    if data is not None:
+        raise ConfigurationError(f"`data` {data}: is for reference studies, {', '.join(STUDIES)}; leave it out")
     options = Options(
         specimen=of,
         bench=load_bench(of.name if bench is None else bench),
@@ -95,6 +124,35 @@ def reproduce_(
         print_json(study.summary())
     else:
         say_study(study)
+
+
+_OF_REFERENCES = ("specimen", "output", "data", "models", "seed", "json")
+
+
+def _reference(
+    context: typer.Context, name: str, output: Path, data: Path | None, models: str, seed: int, json: bool
+) -> None:
+    """Run a reference study."""
+    from rig.reproduce.references.data import found
+    from rig.reproduce.references.output import prepared, say_reference, summary_of, write_reference
+    from rig.reproduce.references.studies import STUDIES
+    from rig.text.console import print_json
+
+    for option in context.params:
+        source = context.get_parameter_source(option)
+        if option not in _OF_REFERENCES and source is not None and source.name != "DEFAULT":
+            raise ConfigurationError(f"`{option}`: is of the paper's campaign, not of {name}; leave it out")
+    if not models.isdecimal() or not int(models):
+        raise ConfigurationError(f"`models` {models}: allowed is a number from 1")
+    study = STUDIES[name]
+    paths = found(study.data, data)
+    prepared(output)
+    result = study.run(paths, int(models), seed, _say)
+    write_reference(result, study.data, output)
+    if json:
+        print_json(summary_of(result, study.data))
+    else:
+        say_reference(result, study.data)
 
 
 def _say(line: str) -> None:

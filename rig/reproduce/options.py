@@ -133,7 +133,7 @@ class Options:
         of = self.specimen
         usual = max(of.iterations, _SATURATING) if self.saturating else of.iterations
         most = usual if self.iterations is None else self.iterations
-        return FitSettings(iterations=most, patience=of.patience)
+        return FitSettings(iterations=most, patience=of.patience, least_gain=0.0)
 
     @property
     def variant(self) -> str:

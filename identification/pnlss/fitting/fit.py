@@ -77,7 +77,7 @@ def fit_pnlss(
     parameters = Parameters(scales.model(start if resume is None else resume.last), estimated)
     problem = Problem(parameters, scales, experiments, validation, settings)
     iterates = _begin(problem) if resume is None else _resumed(problem, scales, resume)
-    stopped, interrupted = iterate(problem, iterates, progress)
+    ending = iterate(problem, iterates, progress)
 
     def physical(vector: Float) -> tuple[PnlssModel, Float]:
         begins = parameters.initial_states(vector) * scales.states
@@ -94,8 +94,9 @@ def fit_pnlss(
         last_initial_states=last_begins,
         state_scale=scales.states,
         settings=settings,
-        stopped=stopped,
-        interrupted=interrupted,
+        stopped=ending.reason,
+        limited=ending.limited,
+        interrupted=ending.interrupted,
     )
 
 

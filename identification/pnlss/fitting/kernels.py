@@ -149,9 +149,9 @@ def _slopes(table: Table, v: np.ndarray, features: np.ndarray, steep: np.ndarray
     """Write the slope of each function at its weighted sum, and at its bias."""
     first = v.size + table.factors.shape[0]
     for f in range(table.weights.shape[0]):
-        code, at_rest = table.codes[f], table.at_rest[f]
-        steep[f, 0] = function_slope(code, weighted_sum(table, f, v), features[first + f] + at_rest)
-        steep[f, 1] = function_slope(code, table.weights[f, v.size], at_rest)
+        code, at, at_rest = table.codes[f], table.slopes[f], table.at_rest[f]
+        steep[f, 0] = function_slope(code, at, weighted_sum(table, f, v), features[first + f] + at_rest)
+        steep[f, 1] = function_slope(code, at, table.weights[f, v.size], at_rest)
 
 
 @unlocked_kernel

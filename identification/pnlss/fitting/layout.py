@@ -73,6 +73,7 @@ def slopes_of(system: System, weights: Float) -> Slopes:
         np.zeros((0, variables + 1)),
         np.zeros(0),
         np.zeros(0, dtype=np.int64),
+        np.zeros(0, dtype=np.int64),
     )
     return Slopes(
         whole.ravel(),

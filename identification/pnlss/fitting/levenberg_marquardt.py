@@ -6,6 +6,7 @@ Normal equations are scaled to columns of unit norm and decomposed once; each da
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from identification.pnlss.fitting.result import FitHistory
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.fitting.threads import threads
 
-__all__ = ["Iterates", "Steps", "iterate"]
+__all__ = ["Ending", "Iterates", "Steps", "iterate"]
 
 Float = NDArray[np.float64]
 
@@ -25,6 +26,8 @@ _SMALLEST, _LARGEST = 1e-16, 1e8
 """Range of dampings that are tried."""
 _WORTH = 0.01
 """A smaller damping is tried if its predicted gain exceeds the gain achieved by more than this share."""
+_LATELY = 10
+"""Last iterations whose gain a fit that was stopped tells; half of them if there are fewer than twice as many."""
 _STALLED = 5
 """A fit ends after this many successive iterations without a gain above the tolerance."""
 
@@ -120,41 +123,64 @@ class Iterates:
             self.best = vector
 
 
-def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgress], None] | None) -> tuple[str, bool]:
-    """Iterate until there is a reason to stop; return that reason and whether it was an interrupt."""
+class Ending(NamedTuple):
+    """Why the iterations ended."""
+
+    reason: str
+    limited: bool = False
+    """Whether the settings allow no further iteration, while the last ones still lowered the error."""
+    interrupted: bool = False
+
+
+def iterate(problem: Problem, iterates: Iterates, progress: Callable[[FitProgress], None] | None) -> Ending:
+    """Iterate until there is a reason to stop, and return it."""
     settings = problem.settings
     try:
-        while (reason := _reason(iterates, settings)) is None:
+        while (ending := _ending(iterates, settings)) is None:
             with threads() as count:
                 equations = problem.equations(iterates.vector, count)
                 if not (np.all(np.isfinite(equations.hessian)) and np.all(np.isfinite(equations.gradient))):
-                    return "the sensitivities of the last iterate leave all bounds", False
+                    return Ending("the sensitivities of the last iterate leave all bounds")
                 found = _descend(problem, Steps(equations, settings.truncation), iterates)
                 if found is None:
-                    return "no step of any damping fits better", False
+                    return Ending("no step of any damping fits better")
                 iterates.add(problem, *found)
             if progress is not None:
                 progress(_told(iterates, settings))
     except KeyboardInterrupt:
-        return "interrupted", True
+        return Ending("interrupted", interrupted=True)
     except np.linalg.LinAlgError:
-        return "the normal equations of the last iterate could not be decomposed", False
-    return reason, False
+        return Ending("the normal equations of the last iterate could not be decomposed")
+    return ending
 
 
-def _reason(iterates: Iterates, settings: FitSettings) -> str | None:
-    done = len(iterates.training) - 1
-    if done >= settings.iterations:
-        return f"{done} iterations"
-    since = done - iterates.history.best
-    if settings.patience and since >= settings.patience and not np.isnan(iterates.validation[-1]):
-        return f"{since} iterations without a smaller validation error"
+def _ending(iterates: Iterates, settings: FitSettings) -> Ending | None:
+    """Return why no further iteration is made; None if one is."""
+    history = iterates.history
     errors = np.array(iterates.training[-_STALLED - 1 :])
     if errors[-1] <= 0.0:
-        return "no error is left"
+        return Ending("no error is left")
+    if settings.patience and history.since_gain(settings.least_gain) >= settings.patience:
+        error = "validation" if history.validated else "training"
+        least = f" by {100 * settings.least_gain:g} %" if settings.least_gain else ""
+        return Ending(f"{settings.patience} iterations did not lower the {error} error{least}")
     if errors.size > _STALLED and np.all(np.diff(errors) > -settings.tolerance * errors[:-1]):
-        return f"{_STALLED} iterations whose gain was below {settings.tolerance:g}"
-    return None
+        return Ending(f"{_STALLED} iterations whose gain was below {settings.tolerance:g}")
+    return _at_limit(history, settings) if history.iterations >= settings.iterations else None
+
+
+def _at_limit(history: FitHistory, settings: FitSettings) -> Ending:
+    """Return the end of a fit that may not go on, with what its last iterations gained."""
+    limit = f"stopped at its limit of {settings.iterations} iterations"
+    last = max(min(history.iterations // 2, _LATELY), 1)
+    gain = history.gained(last)
+    if not history.iterations or not gain > settings.least_gain:
+        return Ending(limit)
+    error = "validation" if history.validated else "training"
+    lately = f"the last {last}" if last > 1 else "the last one"
+    return Ending(
+        f"{limit} while it still paid: {lately} lowered the {error} error by {100 * gain:.2g} %", limited=True
+    )
 
 
 def _descend(problem: Problem, steps: Steps, iterates: Iterates) -> tuple[Float, float, float] | None:

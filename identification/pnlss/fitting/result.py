@@ -48,11 +48,33 @@ class FitHistory:
         return int(self.training_error.size) - 1
 
     @property
+    def validated(self) -> bool:
+        """Whether there is validation data."""
+        return not bool(np.all(np.isnan(self.validation_error)))
+
+    @property
+    def judged(self) -> Float:
+        """float[n], the error that chooses the iterate: of the validation data, or of the training data without such."""
+        errors = self.validation_error if self.validated else self.training_error
+        return np.where(np.isnan(errors), np.inf, errors)
+
+    @property
     def best(self) -> int:
-        """Iteration with the smallest validation error, or the smallest training error if there is no validation data."""
-        validated = not bool(np.all(np.isnan(self.validation_error)))
-        errors = self.validation_error if validated else self.training_error
-        return int(np.argmin(np.where(np.isnan(errors), np.inf, errors)))
+        """Iteration with the smallest error `judged`."""
+        return int(np.argmin(self.judged))
+
+    def since_gain(self, share: float) -> int:
+        """Number of iterations since the error `judged` was last lowered by ``share`` of what it was before."""
+        mark, at = self.judged[0], 0
+        for iteration, error in enumerate(self.judged):
+            if error < mark * (1.0 - share):
+                mark, at = error, iteration
+        return self.iterations - at
+
+    def gained(self, iterations: int) -> float:
+        """Share by which the last ``iterations`` lowered the smallest error `judged`; NaN if no run before was bounded."""
+        before = float(np.min(self.judged[: max(self.judged.size - iterations, 1)]))
+        return 1.0 - float(np.min(self.judged)) / before if 0.0 < before < np.inf else float(np.nan)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -80,6 +102,8 @@ class PnlssFit(Result):
         Settings of the fit, as given.
     stopped
         Why the fit ended, in one line.
+    limited
+        Whether it ended because the settings allow no further iteration, while the last ones still lowered the error.
     interrupted
         Whether the fit was interrupted. The result so far is complete, and ``resume`` continues from it.
     """
@@ -94,6 +118,7 @@ class PnlssFit(Result):
     state_scale: Float
     settings: FitSettings
     stopped: str
+    limited: bool = False
     interrupted: bool = False
 
     def __post_init__(self) -> None:
@@ -114,7 +139,8 @@ class PnlssFit(Result):
         """Return arrays by name, and the JSON-able attributes that go with them."""
         arrays: dict[str, NDArray[Any]] = {f"history/{name}": value for name, value in vars(self.history).items()}
         arrays |= {name: getattr(self, name) for name in ("initial_states", "last_initial_states", "state_scale")}
-        attributes: dict[str, Any] = {"chosen": self.chosen, "stopped": self.stopped, "interrupted": self.interrupted}
+        attributes: dict[str, Any] = {"chosen": self.chosen, "stopped": self.stopped}
+        attributes |= {"limited": self.limited, "interrupted": self.interrupted}
         attributes["settings"] = {
             key: [list(v) if isinstance(v, tuple) else v for v in value] if isinstance(value, tuple) else value
             for key, value in asdict(self.settings).items()
@@ -146,6 +172,7 @@ class PnlssFit(Result):
                 settings=FitSettings(**given),
                 chosen=int(attributes["chosen"]),
                 stopped=str(attributes["stopped"]),
+                limited=bool(attributes.get("limited", False)),  # not in files of earlier versions
                 interrupted=bool(attributes["interrupted"]),
                 initial_states=arrays["initial_states"],
                 last_initial_states=arrays["last_initial_states"],

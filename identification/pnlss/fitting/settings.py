@@ -18,9 +18,13 @@ class FitSettings:
     Parameters
     ----------
     iterations
-        Largest number of iterations, including those of a fit that is resumed.
+        Largest number of iterations, including those of a fit that is resumed. A fit that reaches it was stopped, and says
+        what its last iterations still gained.
     patience
-        Stop after this many iterations without a smaller validation error; 0 for never.
+        Stop once this many iterations have not lowered the error by ``least_gain``; 0 for never. The error is that of the
+        validation data, or of the training data if there is no validation data.
+    least_gain
+        Share of the error; 0 for any gain.
     tolerance
         Stop once the training error has fallen by less than this share in each of five successive iterations.
     outputs
@@ -47,8 +51,9 @@ class FitSettings:
         If a value is out of its range.
     """
 
-    iterations: int = 100
-    patience: int = 30
+    iterations: int = 1000
+    patience: int = 40
+    least_gain: float = 1e-3
     tolerance: float = 1e-6
     outputs: OutputWeighting = "rms"
     ridge: float = 0.0
@@ -62,6 +67,7 @@ class FitSettings:
         for name, allowed, fine in (
             ("iterations", "0 and above", self.iterations >= 0),
             ("patience", "0 and above", self.patience >= 0),
+            ("least_gain", "0 and above, below 1", 0.0 <= self.least_gain < 1.0),
             ("tolerance", "0 and above, below 1", 0.0 <= self.tolerance < 1.0),
             ("outputs", ", ".join(get_args(OutputWeighting)), self.outputs in get_args(OutputWeighting)),
             ("ridge", "0 and above, finite", 0.0 <= self.ridge < float("inf")),
@@ -95,7 +101,9 @@ class FitSettings:
 class FitProgress:
     """Progress of a fit.
 
-    Parameters ---------- iteration, iterations
+    Parameters
+    ----------
+    iteration, iterations
         Number of this iteration, and the largest number of iterations.
     training_error, validation_error
         Relative RMS errors; NaN without validation data, inf for an unbounded run.

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from identification import (
     PnlssFit,
     PnlssModel,
 )
+from identification.pnlss.user_functions import is_users
+from rig.errors import ConfigurationError
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.models.files.simulated import (
     SimulatedModel,
@@ -24,7 +27,7 @@ from rig.models.files.simulated import (
 )
 from rig.text.console import number
 
-__all__ = ["PNLSS", "IdentifiedPnlss", "poles_of"]
+__all__ = ["PNLSS", "IdentifiedPnlss", "check_trusted", "functions_of", "poles_of"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -74,6 +77,21 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
     )
 
 
+def functions_of(model: PnlssModel) -> list[str]:
+    """Return the functions of the user, ``module:name``, that a model names. To simulate it, they are imported."""
+    named = (*model.state_features.functions, *model.output_features.functions)
+    return [name for name in dict.fromkeys(named) if is_users(name)]
+
+
+def check_trusted(path: Path | None, model: PnlssModel, trusted: bool) -> None:
+    """Raise `ConfigurationError` if a model names code of a user that is not trusted."""
+    if (functions := functions_of(model)) and not trusted:
+        raise ConfigurationError(
+            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
+            "`trust_code`"
+        )
+
+
 def poles_of(model: PnlssModel) -> list[dict[str, float]]:
     """Natural frequencies (Hz) and damping ratios of the linear part, lowest first, one per pair of poles."""
     values = np.linalg.eigvals(model.a).astype(complex)
@@ -114,6 +132,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
             "training_error": fit.training_error,
             "validation_error": fit.validation_error,
             "stopped": fit.stopped,
+            "limited": fit.limited,
             "interrupted": fit.interrupted,
             "seconds": float(fit.history.seconds[-1]),
         },
@@ -148,9 +167,11 @@ def _say(summary: dict[str, Any]) -> None:
         judged = number(fit["validation_error"], ".3f", 100.0)
         print(
             f"iteration {fit['chosen']} of {fit['iterations']} chosen: error {number(fit['training_error'], '.3f', 100.0)} % "
-            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; {fit['stopped']}; "
+            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; "
             f"{number(summary['seconds'], '.1f')} s in all"
         )
+        more = "; more --iterations go on with --resume" if fit["limited"] else ""
+        print(f"why the fit ended: {fit['stopped']}{more}")
     say_scatter(summary["scatter"])
     say_errors(summary)
 

@@ -46,5 +46,7 @@ def _history(axis: "Axes", fit: "PnlssFit") -> None:
         axis.axvline(bad, color=SECOND, lw=0.5, alpha=0.3, label=label)
     axis.set(xlabel="iteration", ylabel="relative error, %")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if fit.limited:
+        axis.set_title("stopped while it still paid", loc="right")
     plain_log(axis)
     axis.legend()

@@ -1,5 +1,6 @@
 """Files of predictions."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,10 @@ from identification import (
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["CUT", "PREDICTIONS"]
+__all__ = ["CUT", "PLANNED", "PREDICTIONS"]
 
+PLANNED = "planned"
+"""Use of a multisine that has not been measured."""
 CUT = "the response from "
 """Beginning of the note on a response that was cut off. The note on the first path precedes that on the second."""
 _ERRORS = ("peak %", "frequency %", "envelope %")
@@ -123,9 +126,10 @@ def _say(summary: dict[str, Any]) -> None:
                 for s in summary["sweeps"]
             ],
         )
-    if summary["multisines"]:
+    recorded = [run for run in summary["multisines"] if run["use"] != PLANNED]
+    if recorded:
         print("multisines: relative errors, %")
-        names = list(summary["multisines"][0]["errors"])
+        names = list(recorded[0]["errors"])
         print_table(
             ("realisation", "use", *names, "range use"),
             [
@@ -135,12 +139,13 @@ def _say(summary: dict[str, Any]) -> None:
                     *("-" if r["unbounded"] else number(r["errors"].get(name), ".3f", 100.0) for name in names),
                     "unbounded" if r["unbounded"] else number(r["range_use"], ".2f"),
                 )
-                for r in summary["multisines"]
+                for r in recorded
             ],
         )
-        lost = sum(r["unbounded"] for r in summary["multisines"])
+        lost = sum(r["unbounded"] for r in recorded)
         if lost:
-            print(f"{lost} of {len(summary['multisines'])} runs unbounded")
+            print(f"{lost} of {len(recorded)} runs unbounded")
+    _say_planned([run for run in summary["multisines"] if run["use"] == PLANNED])
     of_sweeps = summary["errors"][sum(bool(r["error"]) for r in summary["frequency_responses"]) :]
     if of_sweeps:
         print("errors: predicted over reference, minus one")
@@ -162,6 +167,25 @@ def _say(summary: dict[str, Any]) -> None:
             if note not in shown:
                 print(f"note: {part['name']}: {note}")
             shown.add(note)
+
+
+def _say_planned(runs: Sequence[dict[str, Any]]) -> None:
+    """Print what the outputs reach in multisines that have not been measured."""
+    if not runs:
+        return
+    print("planned multisines: RMS and largest value of the outputs, in their units")
+    names = list(runs[0]["rms"])
+    print_table(
+        ("realisation", *(f"{name} {what}" for name in names for what in ("RMS", "largest")), "range use"),
+        [
+            (
+                r["name"],
+                *(number(r[which][name], ".4g") for name in names for which in ("rms", "peak")),
+                "unbounded" if r["unbounded"] else number(r["range_use"], ".2f"),
+            )
+            for r in runs
+        ],
+    )
 
 
 def _errors(error: dict[str, Any] | None) -> tuple[str, str, str]:

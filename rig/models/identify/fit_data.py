@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import TypeVar, cast
@@ -41,6 +41,13 @@ class FitData:
     """Recording of each experiment, of the training and then of the validation data."""
     notes: tuple[str, ...]
     """Remarks on the data for the user, one line each."""
+
+    def with_constant_input(self) -> "FitData":
+        """Return the data with an input of 1 in every experiment."""
+        training, validation = (
+            tuple(one.with_constant_input() for one in several) for several in (self.training, self.validation)
+        )
+        return replace(self, training=training, validation=validation)
 
     @property
     def fingerprint(self) -> str:

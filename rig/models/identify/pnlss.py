@@ -14,7 +14,7 @@ from identification import (
 )
 from rig.errors import ConfigurationError, RecordingError
 from rig.models.files.files import load_as
-from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
+from rig.models.files.pnlss import PNLSS, IdentifiedPnlss, check_trusted
 from rig.models.identify.data_files import exciter_in
 from rig.models.identify.data_fingerprints import uses_of
 from rig.models.identify.data_request import DataOptions
@@ -36,7 +36,11 @@ def identified_pnlss(
     """
     begun, scatter = time.perf_counter(), None
     earlier = None if options.resume is None else _earlier(options.resume)
+    if earlier is not None:
+        check_trusted(options.resume, earlier.model, bool(options.trust_code))
     data = fit_data(paths, of_data, "PNLSS", like=None if earlier is None else earlier.model)
+    if options.constant_input:
+        data = data.with_constant_input()
     data = replace(data, notes=(*data.notes, *_remarks(data, paths)))
     if earlier is not None and earlier.fit is not None:
         if earlier.scatter is not None or of_data.scattering:
@@ -60,6 +64,7 @@ def identified_pnlss(
             degrees=options.chosen_degrees,
             output_degrees=() if options.output_polynomials is False else None,
             saturating=options.saturating_features,
+            function=options.function or "tanh",
             settings=settings,
             progress=progress,
         )

@@ -25,8 +25,14 @@ class PnlssOptions(Options):
     """Whether monomials also act on the outputs; yes if None."""
     saturating: int | None = None
     """Number of saturating features. They replace the monomials unless degrees are given; none if None."""
+    function: str | None = None
+    """Function of the saturating features: ``tanh``, ``square``, ``cube``, or ``module:name`` of the user; tanh if None."""
+    trust_code: bool | None = None
+    """Whether to import the function of the user, or those that the model to be continued names."""
+    constant_input: bool | None = None
+    """Whether the model has a constant input of 1 beside the others, whose effect compensates offsets; no if None."""
     iterations: int | None = None
-    """Largest number of iterations of the fit; 100 if None."""
+    """Largest number of iterations of the fit; 1000 if None."""
     resume: Path | None = None
     """File of an earlier fit to the same data, which is continued."""
 
@@ -39,6 +45,21 @@ class PnlssOptions(Options):
             if value is not None and value < least:
                 raise ConfigurationError(f"`{name}` = {value}: allowed is {least} and above")
         self.chosen_degrees  # noqa: B018 refused here, not when it is asked for
+        if self.function is None:
+            return
+        from identification.pnlss.features import FUNCTIONS  # only on use: nothing else here needs models
+        from identification.pnlss.user_functions import is_users
+
+        if not self.saturating:
+            raise ConfigurationError(f"`function` = {self.function}: is of features; add `saturating`, their number")
+        if self.function not in FUNCTIONS and not is_users(self.function):
+            raise ConfigurationError(
+                f"`function` = {self.function}: allowed are {', '.join(FUNCTIONS)}, or module:name of your own"
+            )
+        if is_users(self.function) and not self.trust_code:
+            raise ConfigurationError(
+                f"`function` = {self.function}: is code, and is not imported unless you trust it: `trust_code`"
+            )
 
     @property
     def chosen_degrees(self) -> tuple[int, ...]:

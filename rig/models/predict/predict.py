@@ -63,7 +63,7 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
     kind = kind_of(model)
     if kind not in (known := (NONLINEAR_MODE.name, PNLSS.name, STRUCTURED.name, FORCE_SURFACE.name)):
         raise RecordingError(f"{model}: is a file of kind {kind}; predictions are made with a {', '.join(known)}")
-    if request.trust_code and kind != STRUCTURED.name:
+    if request.trust_code and kind not in (STRUCTURED.name, PNLSS.name):
         raise ConfigurationError(f"`trust_code`: means nothing to a {kind}, which names no code; leave it out")
     for simulated in (PNLSS, STRUCTURED):
         if kind == simulated.name:
@@ -106,10 +106,13 @@ def _check_mode(request: PredictionRequest) -> None:
         raise ConfigurationError(
             "`exciter`: is for sweeps, and none is given; add `sweeps` or `planned`, or leave it out"
         )
-    if request.multisines:
-        raise ConfigurationError(
-            "`multisines`: means nothing to a nonlinear mode; a PNLSS or structured model simulates multisines"
-        )
+    for name, given in (("multisines", request.multisines), ("planned_multisines", request.planned_multisines)):
+        if given:
+            raise ConfigurationError(
+                f"`{name}`: means nothing to a nonlinear mode; a PNLSS or structured model simulates multisines"
+            )
+    if request.constants:
+        raise ConfigurationError("`constants`: means nothing to a nonlinear mode, which has one input; leave it out")
 
 
 def _strangers(mode: NonlinearMode, steady: Sequence[_Compared]) -> list[str]:

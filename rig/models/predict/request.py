@@ -32,6 +32,10 @@ class PredictionRequest:
     """Recordings whose realisations a PNLSS or structured model simulates."""
     planned: tuple[str, ...] = ()
     """Plans of future sweeps, by name or file."""
+    planned_multisines: tuple[str, ...] = ()
+    """Plans of future multisines, by name or file, which a PNLSS or structured model simulates."""
+    constants: tuple[str, ...] = ()
+    """Inputs of a PNLSS model that are constant, as NAME=VALUE."""
     zero_crossings: str | None = None
     """Read the imposed force from its zero crossings, as in the founding paper: ``half-periods`` or ``periods``. By default the
     force is demodulated."""
@@ -47,12 +51,14 @@ class PredictionRequest:
     allow_extrapolation: bool = False
     """Whether to predict beyond twice the largest identified modal amplitude."""
     trust_code: bool = False
-    """Whether to import the functions that a structured model names."""
+    """Whether to import the functions that a structured or PNLSS model names."""
 
     def __post_init__(self) -> None:
-        if not (self.forces_n or self.voltages_v or self.sweeps or self.multisines or self.planned or self.references):
+        asked = (self.forces_n, self.voltages_v, self.sweeps, self.multisines, self.references)
+        if not any((*asked, self.planned, self.planned_multisines)):
             raise ConfigurationError(
-                "nothing to predict: give `forces_n`, `voltages_v`, `sweeps`, `planned`, `multisines` or `references`"
+                "nothing to predict: give `forces_n`, `voltages_v`, `sweeps`, `planned`, `multisines`, `planned_multisines` or "
+                "`references`"
             )
         for name, values, unit in (
             ("forces_n", self.forces_n, "N"),

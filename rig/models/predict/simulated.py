@@ -1,15 +1,16 @@
 """Predictions by PNLSS and structured models: steady vibrations, recorded sweeps, recorded multisines."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from identification import (
     Exciter,
     FrequencyResponse,
     IdentificationError,
+    PnlssModel,
     PredictionError,
     Predictions,
     ResponseBand,
@@ -21,10 +22,12 @@ from rig.errors import ConfigurationError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.files import load_as
 from rig.models.files.kind import FileKind
-from rig.models.files.pnlss import IdentifiedPnlss
+from rig.models.files.pnlss import IdentifiedPnlss, check_trusted
 from rig.models.files.structured import IdentifiedStructured, functions_of
+from rig.models.predict.constants import constants_of
 from rig.models.predict.driven_models import DrivenModel, frequency_response_at
 from rig.models.predict.multisines import simulated_multisines
+from rig.models.predict.planned_multisines import planned_multisines
 from rig.models.predict.request import PredictionRequest
 from rig.models.predict.simulated_steady import Held, Reference, compared, default_held
 from rig.models.predict.simulated_sweep_models import SimulatedSweepModels
@@ -46,27 +49,34 @@ def simulated_predictions(
     """
     found: IdentifiedPnlss | IdentifiedStructured = load_as(kind, path)
     model = found.model
-    if isinstance(model, StructuredModel) and (functions := functions_of(model)) and not request.trust_code:
+    if isinstance(model, PnlssModel):
+        check_trusted(path, model, request.trust_code)
+    elif (functions := functions_of(model)) and not request.trust_code:
         raise ConfigurationError(
             f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
             "`trust_code`"
         )
     _check(request, model, path)
     exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
+    constants = constants_of(model, request.constants, path)
+    fixed: dict[str, Any] = {"exciter": exciter, **({"held_inputs": constants} if constants else {})}
     held = cast(Held, request.held or default_held(model, exciter))
     references_held = default_held(model, exciter)
     alone = request.forces_without_reference([one.measured for one in references], references_held)
     steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
-        (frequency_response_at(model, level, force=one, exciter=exciter), None, None)
+        (frequency_response_at(model, level, force=one, **fixed), None, None)
         for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
-    bands = [_band(found, one, exciter) for one, _, _ in steady]
-    steady += [compared(model, exciter, one, whole=_asked(request, alone, one.measured)) for one in references]
-    models = SimulatedSweepModels(model, exciter)
+    bands = [_band(found, one, fixed) for one, _, _ in steady]
+    steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
+    models = SimulatedSweepModels(model, exciter, constants)
     swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
     swept += [one for plan in request.planned for one in planned_simulated_sweeps(plan, models)]
-    runs, said = simulated_multisines(request.multisines, found, model.specimen)
+    runs, said = simulated_multisines(request.multisines, found, model.specimen, constants)
+    for plan in request.planned_multisines:
+        more, remarks = planned_multisines(plan, model, exciter, constants)
+        runs, said = (*runs, *more), (*said, *remarks)
     if any(bands):
         said = (*said, "bands and +- of responses: of runs that nobody has measured, by the scatter of the model alone")
     elif found.scatter is not None:
@@ -92,7 +102,7 @@ def simulated_predictions(
 
 
 def _band(
-    found: IdentifiedPnlss | IdentifiedStructured, predicted: SteadyPrediction, exciter: Exciter | None
+    found: IdentifiedPnlss | IdentifiedStructured, predicted: SteadyPrediction, fixed: Mapping[str, Any]
 ) -> ResponseBand | None:
     """Return the band of a response over fresh runs; None for a model without scatter, or if most have no such response."""
     if found.scatter is None:
@@ -100,9 +110,7 @@ def _band(
     drawn: list[SteadyPrediction] = []
     for model in found.scatter.fresh(found.model, _DRAWS):
         with suppress(IdentificationError):
-            drawn.append(
-                frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), exciter=exciter)
-            )
+            drawn.append(frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), **fixed))
     return band_of_responses(drawn) if len(drawn) > _DRAWS // 2 else None
 
 
@@ -117,7 +125,7 @@ def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
     for name in (name for name, is_given in given.items() if is_given):
         raise ConfigurationError(
             f"`{name}`: means nothing to a {which} model, which answers `forces_n`, `voltages_v`, `references`, `sweeps`, "
-            "`planned` and `multisines`"
+            "`planned`, `multisines` and `planned_multisines`"
         )
     steady = bool(request.forces_n or request.voltages_v or request.references)
     swept = bool(request.sweeps or request.planned)
@@ -134,12 +142,16 @@ def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
             "drive point among `outputs`"
         )
     if request.exciter is None and "force" in inputs:
-        for name, asked in (("voltages_v", request.voltages_v), ("planned", request.planned)):
+        for name, asked in (
+            ("voltages_v", request.voltages_v),
+            ("planned", request.planned),
+            ("planned_multisines", request.planned_multisines),
+        ):
             if asked:
                 raise ConfigurationError(f"`{name}`: gives a voltage, and {path} is driven by a force; add `exciter`")
     if request.exciter is not None and "force" not in inputs:
         raise ConfigurationError(f"`exciter`: is inside {path}, whose input is the voltage; leave it out")
-    if request.exciter is not None and not (steady or swept):
+    if request.exciter is not None and not (steady or swept or request.planned_multisines):
         raise ConfigurationError(
             "`exciter`: means nothing to `multisines`, which takes the recorded force; leave it out"
         )

@@ -1,7 +1,8 @@
 """Steady vibrations of PNLSS and structured models, compared with stepped sines."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -51,26 +52,25 @@ def default_held(model: DrivenModel, exciter: Exciter | None) -> Held:
 
 
 def compared(
-    model: DrivenModel, exciter: Exciter | None, reference: Reference, *, whole: bool = False
+    model: DrivenModel, fixed: Mapping[str, Any], reference: Reference, *, whole: bool = False
 ) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
     """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare.
 
-    At a held level, only the band of the reference is predicted, or the ``whole`` band of the model.
+    ``fixed`` has the ``exciter``, and ``held_inputs`` if the model has constant ones. At a held level, only the band of the
+    reference is predicted, or the ``whole`` band of the model.
     """
     measured, over = reference.measured, reference.over
-    held, notes = default_held(model, exciter), []
+    held, notes = default_held(model, fixed["exciter"]), []
     low: float | None = None if whole else (1.0 - _MARGIN) * float(measured.frequency_hz.min())
     high: float | None = None if whole else (1.0 + _MARGIN) * float(measured.frequency_hz.max())
     if measured.controlled == "force":
-        predicted = frequency_response_at(
-            model, measured.level, force=held, exciter=exciter, lowest_hz=low, highest_hz=high
-        )
+        predicted = frequency_response_at(model, measured.level, force=held, lowest_hz=low, highest_hz=high, **fixed)
     elif measured.controlled == "voltage" and held == "fundamental":
         predicted = frequency_response_at(
-            model, measured.level, force="voltage", exciter=exciter, lowest_hz=low, highest_hz=high
+            model, measured.level, force="voltage", lowest_hz=low, highest_hz=high, **fixed
         )
     else:
-        predicted = _point_by_point(model, exciter, held, measured)
+        predicted = _point_by_point(model, fixed, held, measured)
         over = "frequency"
         if reference.over_asked and reference.over != over:
             notes.append(f"compared point by point, not over {reference.over}: each point has its own force")
@@ -84,7 +84,7 @@ def compared(
 
 
 def _point_by_point(
-    model: DrivenModel, exciter: Exciter | None, held: Held, measured: FrequencyResponse
+    model: DrivenModel, fixed: Mapping[str, Any], held: Held, measured: FrequencyResponse
 ) -> SteadyPrediction:
     """Predict the vibration at the force of each point.
 
@@ -107,7 +107,7 @@ def _point_by_point(
         for start, way in ways:
             try:
                 for frequency_hz, force_n in way:
-                    start = steady_state_at(model, force_n, frequency_hz, force=held, exciter=exciter, near=start)
+                    start = steady_state_at(model, force_n, frequency_hz, force=held, near=start, **fixed)
             except IdentificationError:
                 continue
             tried += [] if start is None else [start]

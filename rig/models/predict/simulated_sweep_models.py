@@ -1,6 +1,7 @@
 """Sweeps of a PNLSS or structured model, alone or with its exciter: simulated, then demodulated."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from identification import (
 from identification.channels import MOTION_ORDER, find_role
 from identification.pnlss.simulators import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
+from rig.models.predict.constants import all_inputs, driving
 from rig.models.predict.driven_models import DrivenModel, coupled_run
 
 __all__ = ["SimulatedSweepModels", "SweepGiven"]
@@ -54,11 +56,13 @@ class SimulatedSweepModels:
     """The model."""
     exciter: Exciter | None
     """Exciter that drives a force-driven model from the voltage; without it, the recorded force drives the model."""
+    constants: Mapping[str, float] = field(default_factory=dict)
+    """Values of the inputs that are constant, by name."""
 
     @property
     def inputs(self) -> tuple[Channel, ...]:
         """Channels that drive the simulation."""
-        return self.model.inputs if self.exciter is None else (VOLTAGE,)
+        return driving(self.model.inputs, self.constants) if self.exciter is None else (VOLTAGE,)
 
     def predict(self, given: SweepGiven) -> SweepPrediction:
         """Return the fundamentals of the simulated sweep; of an unbounded run, only those before it diverged."""
@@ -110,11 +114,12 @@ class SimulatedSweepModels:
             source = self.exciter.source
             return coupled.force_n, channel, coupled, [f"holds for the exciter of {source} alone", *coupled.notes]
         run: SimulatedMotion
+        inputs = all_inputs(model, given.inputs, self.constants)
         if isinstance(model, PnlssModel):
-            run = model.simulate(given.inputs, initial_state=given.initial_state)
+            run = model.simulate(inputs, initial_state=given.initial_state)
         else:
-            run = model.simulate(given.inputs)
-        for channel, imposed in zip(model.inputs, given.inputs, strict=True):
+            run = model.simulate(inputs)
+        for channel, imposed in zip(model.inputs, inputs, strict=True):
             if channel.role == "force":
                 return imposed, channel, run, []
         row, channel = channels["force"]

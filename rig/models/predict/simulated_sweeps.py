@@ -26,6 +26,7 @@ from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD, rows_f
 from rig.measurements.experiments.records import sweep_pieces
 from rig.measurements.experiments.signals import Signals
 from rig.measurements.points_left_out import points_left_out
+from rig.models.predict.constants import with_constants
 from rig.models.predict.driven_models import DrivenModel
 from rig.models.predict.simulated_sweep_models import SimulatedSweepModels, SweepGiven
 from rig.models.predict.sweeps import Swept, force_and_drive, planned, strangers
@@ -146,7 +147,7 @@ def _recorded(recording: Recording, number: int, models: SimulatedSweepModels) -
     begin = None
     if found.initial_state == "estimated":
         if models.exciter is None and isinstance(model, PnlssModel):
-            begin = estimated_initial_state(model, found)
+            begin = estimated_initial_state(model, with_constants(found, model, models.constants))
         else:
             said.append(f"{recording.path}: {name} does not begin at rest, but is simulated as if it did")
     row = find_role(model.outputs, "drive")

@@ -66,6 +66,8 @@ def _check(request: PredictionRequest) -> None:
         "sweeps": bool(request.sweeps),
         "multisines": bool(request.multisines),
         "planned": bool(request.planned),
+        "planned_multisines": bool(request.planned_multisines),
+        "constants": bool(request.constants),
         "exciter": request.exciter is not None,
         "modes": request.modes is not None,
         "allow_extrapolation": request.allow_extrapolation,

@@ -326,6 +326,21 @@ def test_progress_says_which_start_is_compared(capsys):
             "identify lines.h5 --model pnlss --validation lines.h5",
             "lines.h5: is among the files that the model is fitted to",
         ),
+        ("identify lines.h5 --model pnlss --function cube", "--function = cube: is of features; add --saturating"),
+        (
+            "identify lines.h5 --model pnlss --saturating 2 --function sinus",
+            "allowed are tanh, square, cube, or module:name",
+        ),
+        (
+            "identify lines.h5 --model pnlss --saturating 2 --function mine:g",
+            "--function = mine:g: is code, and is not imported unless you trust it: --trust-code",
+        ),
+        ("identify lines.h5 --model linear --constant-input", "--constant-input: means nothing to --model linear"),
+        ("predict F.h5 --multisine lines.h5 --constant force=1", "--constant: hold all inputs of F.h5"),
+        (
+            "predict F.h5 --planned-multisine magnet-beam/multisine-1",
+            "--planned-multisine: gives a voltage, and F.h5 is",
+        ),
         ("identify lines.h5 --model pnlss --hold-out 3", "no level has more than 3 realisations; allowed is 0 to 2"),
         (
             "predict lines.h5 --frequency-response 0.1",

@@ -185,7 +185,11 @@ def test_what_is_in_the_folder_is_not_made_again(folder, tmp_path):
 @pytest.mark.parametrize(
     ("line", "status", "said"),
     [
-        ("reproduce tower -o x", 1, "specimen 'tower': allowed is magnet-beam, friction-beam"),
+        (
+            "reproduce tower -o x",
+            1,
+            "specimen 'tower': allowed is magnet-beam, friction-beam, silverbox",
+        ),
         ("reproduce magnet-beam -o x --models some", 1, "--models some: allowed is a number from 1, or paper"),
         ("reproduce magnet-beam -o x --scatter 1", 1, "--scatter 1: allowed is 0 to 0.05"),
         ("reproduce magnet-beam -o x --bench real.toml", 1, "which only a virtual bench tells"),

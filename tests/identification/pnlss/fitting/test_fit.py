@@ -14,6 +14,7 @@ from identification.pnlss.fitting.normal_equations import normal_equations
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.problem import Problem
 from identification.pnlss.fitting.records import records_of
+from identification.pnlss.fitting.result import FitHistory
 from tests.identification.pnlss.systems import (
     disturbed,
     experiment,
@@ -91,6 +92,40 @@ def test_the_iterate_with_the_smallest_validation_error_is_chosen_and_patience_e
     assert "validation" in fit.stopped
     assert pnlss_errors(fit.model, validation).overall[0] == pytest.approx(errors[fit.chosen], rel=1e-9)
     assert pnlss_errors(fit.last, validation).overall[0] == pytest.approx(errors[-1], rel=1e-9)
+
+
+def test_a_fit_that_is_stopped_while_it_pays_says_so_and_one_that_has_arrived_does_not() -> None:
+    system = nonlinear_system(2, 1, 1)
+    experiments = [experiment(system, 600, noise=0.01)]
+    start = disturbed(system, 0.1)
+    short = fit_pnlss(start, experiments, settings=FitSettings(iterations=3))
+    errors = short.history.training_error
+    lowered = 100 * (1 - errors[-1] / errors[-2])
+    assert short.limited
+    assert short.stopped == (
+        f"stopped at its limit of 3 iterations while it still paid: the last one lowered the training error by {lowered:.2g} %"
+    )
+    assert PnlssFit.from_arrays(*short.to_arrays()).limited
+    whole = fit_pnlss(start, experiments, resume=short)
+    assert not whole.limited
+    assert "limit" not in whole.stopped
+    assert whole.training_error < 1.02 * 0.01 < short.training_error
+    idle = fit_pnlss(whole.last, experiments, settings=FitSettings(iterations=2))
+    assert (idle.limited, idle.stopped) == (False, "stopped at its limit of 2 iterations")
+
+
+def test_what_lowers_the_error_by_next_to_nothing_is_no_gain() -> None:
+    errors = np.array([1.0, 0.5, 0.4999, 0.4998, 0.4, 0.39999])
+    nothing = np.full(errors.size, np.nan)
+    past = FitHistory(training_error=errors, validation_error=nothing, damping=nothing, seconds=nothing)
+    assert past.since_gain(1e-3) == 1  # the fourth iteration was the last that paid
+    assert past.since_gain(0.0) == 0
+    assert past.gained(2) == pytest.approx(1 - 0.39999 / 0.4998)
+    rising = np.array([np.inf, np.inf, 0.5, 0.6, 0.7, 0.8])
+    judged = FitHistory(training_error=errors, validation_error=rising, damping=nothing, seconds=nothing)
+    assert judged.since_gain(1e-3) == 3
+    assert judged.gained(2) == 0.0
+    assert np.isnan(judged.gained(5))
 
 
 def test_validation_runs_begin_where_their_first_samples_say() -> None:
