@@ -1,4 +1,4 @@
-"""Functions of the user in features: found by name, compiled, called by their address (decision 0090)."""
+"""Functions of the user in features: found by name, compiled, called by their address (decision 0087)."""
 
 import ctypes
 import importlib
