@@ -93,7 +93,7 @@ def reproduce_(
     from rig.text.console import print_json
 
     if specimen not in SPECIMENS:
-        raise ConfigurationError(f"`specimen` {specimen!r}: allowed is {', '.join([*SPECIMENS, *STUDIES])}")
+        raise ConfigurationError(f"specimen {specimen!r}: allowed is {', '.join([*SPECIMENS, *STUDIES])}")
     of = specimen_of(specimen)
     if data is not None:
         raise ConfigurationError(f"`data` {data}: is for reference studies, {', '.join(STUDIES)}; leave it out")

@@ -43,6 +43,8 @@ NOT_RUN = {
     ("docs/how-to/sdynpy.md", "SDynPy brings Qt and VTK; run by hand with SDynPy 0.23.0"),
     ("README.md", "needs the device"),
     ("docs/how-to/replay-a-recording.md", "runs until Ctrl-C"),
+    ("docs/how-to/measure-a-decay.md", "a recording of one's own"),
+    ("docs/how-to/reproduce-a-reference-study.md", "needs data that are not part of this project"),
     ("docs/how-to/choose-block-queue-and-watchdog.md", "needs the device"),
     ("docs/how-to/compare-ways-to-run.md", "needs the device"),
     ("docs/how-to/compare-ways-to-run.md", "takes a minute by the clock"),

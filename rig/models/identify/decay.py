@@ -16,7 +16,6 @@ from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, decays, point_rows
 from rig.models.files.time_data import TIME_DATA
-from rig.models.identify.data_files import time_records_in
 from rig.models.identify.decay_request import DecayOptions
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -79,6 +78,8 @@ def _measured(path: Path, options: DecayOptions, near_hz: Sequence[float]) -> De
 
 def _record_of(path: Path, point: int | None) -> _Record:
     """Return one record of time data."""
+    from rig.models.identify.data_files import time_records_in  # loads what recordings need not wait for
+
     found = time_records_in(path)
     if point is None and len(found.records) > 1:
         raise ConfigurationError(

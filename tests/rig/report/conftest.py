@@ -16,6 +16,7 @@ CHANGES = {
     "magnet-beam/backbone": {"levels_v": [0.4, 0.8], "record_periods": 8},
     "magnet-beam/stepped-phase-fast": {"levels_n": [0.25], "start_deg": -110.0, "stop_deg": -80.0, "step_deg": 15.0},
     "magnet-beam/continuous-backbone": {},
+    "magnet-beam/decay": {"levels_v": [0.8]},
     "magnet-beam/response-controlled": {
         "levels_m": [0.00045, 0.00055, 0.0007],
         "phase_lags_deg": [-120.0, -100.0, -80.0, -60.0],
