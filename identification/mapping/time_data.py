@@ -114,8 +114,8 @@ class TimeDataMapping(MappingTable):
     """Name of a noise-free channel, such as the voltage of the generator, for frequency responses; the force if left out."""
     csv: CsvLayout | None = None
     """Layout of a CSV file that does not begin with one line of names."""
-    channels: Annotated[tuple[SampledChannel, ...], Field(min_length=2)]
-    """The channels."""
+    channels: Annotated[tuple[SampledChannel, ...], Field(min_length=1)]
+    """The channels: a force and motions, or motions alone for a free decay."""
 
     @model_validator(mode="after")
     def _fits(self) -> "TimeDataMapping":

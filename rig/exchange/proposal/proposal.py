@@ -67,8 +67,6 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
     force = next((c for c in channels if c.role == "force"), channels[0])
     period, transient, band, at_rest = _periods(force, channels, rate, samples)
     missing = [] if rate else ["sample_rate_hz"]
-    if len(channels) < 2:
-        missing.append("a second channel")
     return Proposal(
         channels=tuple(channels[:_MOST_CHANNELS]),
         left_out=len(channels) - len(channels[:_MOST_CHANNELS]),
@@ -141,9 +139,9 @@ def _with_unique_names(channels: Sequence[ProposedChannel]) -> list[ProposedChan
 
 
 def _with_roles(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
-    """Return the channels with one force and one drive point at most, and a role for each."""
+    """Return the channels with one force and one drive point at most, and a role for each. One alone is a motion."""
     out = list(channels)
-    if not any(channel.role == "force" for channel in out):
+    if len(out) > 1 and not any(channel.role == "force" for channel in out):
         at = next((i for i, c in enumerate(out) if c.role == "monitor"), None)
         if at is None:  # by the names: V1 before V2
             open_ = [i for i, c in enumerate(out) if not c.role] or list(range(len(out)))
@@ -173,11 +171,14 @@ def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float |
 def _periods(
     force: ProposedChannel, channels: Sequence[ProposedChannel], rate: float | None, samples: int
 ) -> tuple[int, int, tuple[float, float] | None, bool]:
-    """Return samples of a period (0: in the axes, or none), transient periods, excited band, whether all begins at rest."""
+    """Return samples of a period (0: in the axes, or none), transient periods, excited band, whether all begins at rest.
+
+    A motion without a force is taken for a decay, which has no period although it seems to repeat.
+    """
     records = [_first_record(channel) for channel in channels]
     signal = _first_record(force)
     in_axes = "period" in force.axes
-    size = samples if in_axes else period_of(signal)
+    size = samples if in_axes else period_of(signal) if force.role == "force" else 0
     if not size:
         rest = all(_quiet(record) for record in records)
         return 0, 0, None, rest

@@ -116,3 +116,23 @@ def test_wrong_words_are_named(capsys, monkeypatch, tmp_path, line, message):
     assert message in err
     assert err.count("\n") == 1
     assert not (tmp_path / "m.toml").exists()
+
+
+def test_a_motion_without_a_force_is_a_decay_and_has_no_period(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    times = np.arange(12000) / 2000.0
+    motion = np.exp(-2.0 * np.pi * 40.0 * 0.01 * times) * np.cos(2.0 * np.pi * 40.0 * times)
+    scipy.io.savemat("decay.mat", {"x": motion, "fs": 2000.0})
+    for line in (
+        "new mapping decay.mat -o decay.toml",
+        "import decay.mat --mapping decay.toml -o decay.h5",
+        "identify decay.h5 --model decay -o backbone.h5 --json",
+    ):
+        capsys.readouterr()
+        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
+        with pytest.raises(SystemExit) as left:
+            main()
+        assert not left.value.code, capsys.readouterr().err
+    table = tomllib.loads((tmp_path / "decay.toml").read_text(encoding="utf-8"))
+    assert [channel["role"] for channel in table["channels"]] == ["drive"]
+    assert "period_samples" not in table
