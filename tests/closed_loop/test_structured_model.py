@@ -30,12 +30,11 @@ def error(model, experiment):
 
 def test_two_realisations_give_a_model_for_all_levels(levels):
     modes, (quiet, trained, loud) = levels
-    fit = identification.fit_structured(modes, trained[:2])
-    assert len(fit.names) == 22
+    fit = identification.fit_structured(modes, trained[:2], support=6000.0)  # of the rig's exciter, as it is identified
+    assert len(fit.names) == 21
     assert max(error(fit.model, one) for one in trained[2:]) < 0.006
     assert max(error(fit.model, one) for one in quiet) < 0.012
     assert np.median([error(fit.model, one) for one in loud]) < 0.1
-    assert fit.model.support_n_m > 0.0
 
 
 def test_two_levels_together_give_a_model_for_all_levels(levels):

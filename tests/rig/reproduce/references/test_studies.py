@@ -76,7 +76,8 @@ def test_the_model_that_validation_data_choose_predicts_the_whole_arrow_to_a_qua
     assert done.status == 0, done.err
     results = json.loads((tmp_path / "reference.json").read_text())
     (chosen,) = [line for line in results["ours"] if line["chosen"]]
-    assert chosen["validation_mv"] == min(line["validation_mv"] for line in results["ours"])
+    # the smallest model within one standard error of the best, which is not always the best itself
+    assert chosen["validation_mv"] < 1.2 * min(line["validation_mv"] for line in results["ours"])
     assert chosen["arrow_mv"] < 0.25
     assert load(tmp_path / "chosen.h5").model.specimen == "Silverbox"
 
