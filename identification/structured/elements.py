@@ -76,6 +76,17 @@ class NonlinearElement:
         return np.asarray(self.direction / self.scale_m)
 
     @property
+    def at_rest(self) -> tuple[float, float]:
+        """Stiffness (J) and damping (J s) for small x, with all sliders stuck."""
+        near = _DELTA * self.reach
+        slope = sum(
+            float(np.diff(one.force(np.array([-near, near])))[0]) for one in self.laws if isinstance(one, Spring)
+        )
+        damping = sum(float(one.damping(np.zeros(1))[0]) for one in self.laws if isinstance(one, Damper))
+        stuck = float(np.sum(self.sliders(self.laws)[:, 0]))
+        return slope * self.scale_m / (2.0 * near) + stuck, damping * self.scale_m**2
+
+    @property
     def nodes(self) -> Float:
         """float[NODES]: the displacements x of the tables."""
         return np.linspace(-self.reach, self.reach, NODES)

@@ -21,6 +21,7 @@ from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
+from identification.structured.modal_test import ModalTest
 from identification.structured.model import LEAD, StructuredModel
 from identification.structured.parameters import Parameters
 from identification.structured.start import linear_start, with_element
@@ -34,10 +35,17 @@ _ROUGH, _FINE = 1e-3, 1e-5
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
 _EVALUATIONS = 100
 _STAGES = {
-    False: ((0.05, False), (0.01, False), (0.0, False)),
-    True: ((0.05, False), (0.01, False), (0.01, True), (0.0, True)),
+    False: ((0.05, False, False), (0.01, False, False), (0.0, False, False), (0.0, False, True)),
+    True: (
+        (0.05, False, False),
+        (0.01, False, False),
+        (0.01, True, False),
+        (0.0, True, False),
+        (0.0, True, True),
+    ),
 }
-"""Damping ratio of the leading forces in each fit, and whether the support is free; by whether it is asked for."""
+"""Damping ratio of the leading forces in each fit, whether the support is free, and whether directions are; by whether the
+support is asked for. While forces lead, or the law is far from right, directions would take on what these get wrong."""
 _MISFIT = 0.01
 """Relative misfit of the samples against which the errors of the modal test are weighed at first; later that of the fit before,
 if it is smaller."""
@@ -207,11 +215,10 @@ def _fitted(
     """Fit all numbers, in stages with less and less of the leading forces."""
     tied = (find_role(start.outputs, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
-    moves = [int(np.argmax(np.abs(element.direction[:led]))) for element in start.elements]
     found, evaluations, misfit = start, 0, _MISFIT
     measured = np.arange(len(linear.omega)) < led
     slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
-    for ratio, free in _STAGES[support]:
+    for ratio, free, turned in _STAGES[support]:
         if free and not found.support_n_m:
             found = replace(found, support_n_m=stiffness)
         # the last fit is free for so long before it counts that nothing is left of the lead
@@ -229,9 +236,9 @@ def _fitted(
             else None
             for e, count in zip(settled, lengths, strict=True)
         ]
-        parameters = Parameters(start, tied, free)
-        problem = _Problem(parameters, settled, leads, parameters.expected(modes, linear, moves), misfit)
-        vector, more = problem.solve(parameters.vector(found), _ROUGH if ratio else _FINE)
+        parameters = Parameters(start, tied, free, turned)
+        problem = _Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
+        vector, more = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found, evaluations = parameters.model(vector), evaluations + more
         problem.triangle(vector)
         misfit = min(_MISFIT, problem.error)
@@ -250,12 +257,11 @@ class _Problem:
         parameters: Parameters,
         experiments: Sequence[Experiment],
         leads: Sequence[Lead | None],
-        expected: tuple[Float, Float],
+        test: ModalTest,
         misfit: float,
     ) -> None:
         self.parameters, self.experiments, self.stopped = parameters, experiments, ""
-        self._expected, std = expected
-        self._trust = misfit / std
+        self._test, self._misfit = test, misfit
         self.leads = leads
         outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
         self.count = outputs.size
@@ -267,6 +273,7 @@ class _Problem:
                 )
         self._known: tuple[bytes, Float] | None = None
         self._parts: list[Float] = []
+        self._tested = np.zeros((0, 0))
         self.error = np.nan
         """RMS of the residual of the last vector over that of the outputs."""
 
@@ -277,8 +284,8 @@ class _Problem:
             with threads() as count, ThreadPoolExecutor(count) as pool:
                 parts = list(pool.map(partial(self._of_one, model), self.experiments, self.leads))
             self._parts = parts
-            prior = np.column_stack([np.diag(self._trust), self._trust * (vector - self._expected)])
-            self._known = vector.tobytes(), _triangle(np.concatenate([*parts, prior]))
+            self._tested = self._test.rows(vector)
+            self._known = vector.tobytes(), _triangle(np.concatenate([*parts, self._misfit * self._tested]))
             self.error = float(np.sqrt(sum(part[:, -1] @ part[:, -1] for part in parts) / self.count))
         return self._known[1]
 
@@ -290,7 +297,8 @@ class _Problem:
         jacobian = self.triangle(vector)[:, :-1]
         inverse = np.linalg.pinv(jacobian.T @ jacobian)
         freedom = max(1.0 - vector.size / self.count, 0.5)
-        middle = np.diag((self._trust * self.error) ** 2)
+        told = self.error * self._misfit * self._tested[:, :-1]
+        middle = told.T @ told
         for part, one in zip(self._parts, self.experiments, strict=True):
             variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
             middle = middle + variance * part[:, :-1].T @ part[:, :-1]

@@ -279,8 +279,7 @@ class StructuredModel(Result):
         """
         if not self.elements:
             return self
-        system = self.system
-        poles, shapes = small_vibrations(self.omega, self.damping_ratio, system.phi, system.tables)
+        poles, shapes = small_vibrations(self.omega, self.damping_ratio, self.elements)
         return replace(
             self,
             frequency_hz=np.abs(poles) / (2.0 * np.pi),

@@ -1,12 +1,10 @@
 """Free parameters of a structured model in one vector, and derivatives by them from those of the kernels."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.linear.modes import LinearModes
 from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
 from identification.structured.held_support import renew
 from identification.structured.leading import Lead, not_led, own_shapes
@@ -19,8 +17,6 @@ Float = NDArray[np.float64]
 
 _NEAR = float(np.log(2.0))
 """Logarithm of the factor within which a frequency stays."""
-_FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
-"""What a modal test is trusted to: relative errors that are added to its own, and those of the residual mode."""
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 
 
@@ -28,7 +24,7 @@ _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 class Parameters:
     """Which numbers of a model are free, and their order in a vector.
 
-    Logarithms of frequencies and damping ratios; input shapes; of each element the direction without its largest component
+    Logarithms of frequencies and damping ratios; input shapes; of each element the direction without its leading component
     (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move them; the support's
     stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
 
@@ -40,11 +36,14 @@ class Parameters:
         Outputs at the first input: by reciprocity their shapes are the input's.
     support
         Whether the support is free.
+    turned
+        Whether directions are free.
     """
 
     start: StructuredModel
     tied: tuple[int, ...]
     support: bool
+    turned: bool = True
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,10 +65,14 @@ class Parameters:
         return [o for o in range(len(self.start.outputs)) if o not in self.tied]
 
     def _kept(self, element: NonlinearElement) -> list[int]:
-        """Free components of a direction; none if it is that of a place."""
-        if element.between:
+        """Free components of a direction: all but that of the mode that gives most of its static compliance.
+
+        Of a place none is free.
+        """
+        if element.between or not self.turned:
             return []
-        return [i for i in range(element.direction.size) if i != int(np.argmax(np.abs(element.direction)))]
+        most = int(np.argmax(np.abs(element.direction) / self.start.omega))
+        return [i for i in range(element.direction.size) if i != most]
 
     def vector(self, model: StructuredModel) -> Float:
         """Return the free numbers of a model."""
@@ -81,32 +84,6 @@ class Parameters:
             parts.append(np.array([model.support_n_m]))
         parts += [model.output_shapes[self._untied].ravel(), model.direct.ravel()]
         return np.concatenate(parts)
-
-    def expected(self, modes: LinearModes, linear: StructuredModel, free: Sequence[int]) -> tuple[Float, Float]:
-        """Return what a modal test says of the numbers, and its standard deviations; infinite where it says nothing.
-
-        ``linear`` is the model of the test. Frequency and damping of the modes ``free``, those of the elements, are left to the
-        data: a joint changes them. The last mode is the residual of the modes above, of which little is known.
-        """
-        count, measured = len(self.start.frequency_hz), len(modes.frequency_hz)
-        inputs, at = len(self.start.inputs), self.names.index
-        names = ("frequency_hz", "damping_ratio", "input_shapes", "output_shapes")
-        vector = self.vector(replace(self.start, **{name: getattr(linear, name) for name in names}))
-        std = np.full(vector.size, np.inf)
-        known = np.arange(count) < measured
-        frequency = np.full(count, _RESIDUAL_STD)
-        damping = np.ones(count)
-        frequency[:measured] = np.hypot(modes.frequency_std_hz / modes.frequency_hz, _FREQUENCY_STD)
-        damping[:measured] = np.hypot(modes.damping_ratio_std / modes.damping_ratio, _DAMPING_STD)
-        frequency[list(free)] = damping[list(free)] = np.inf
-        std[:count], std[count : 2 * count] = frequency, damping
-        largest = np.max(np.abs(self.start.output_shapes), axis=0)
-        shapes = np.where(known, _SHAPE_STD, _RESIDUAL_STD) * largest
-        std[2 * count : 2 * count + count * inputs] = np.repeat(shapes, inputs)
-        if self._untied:
-            first = at(f"shape 1 at {self.start.outputs[self._untied[0]].name}")
-            std[first : first + len(self._untied) * count] = np.tile(shapes, len(self._untied))
-        return vector, std
 
     def bounds(self, vector: Float) -> tuple[Float, Float]:
         """Return least and largest values, so that modes that the data hardly show stay modes."""

@@ -1,28 +1,36 @@
 """Small vibrations of a structure with nonlinear elements about rest, where all sliders stick and springs have their slope."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.structured.elements import Tables
+from identification.structured.elements import NonlinearElement
 
-__all__ = ["small_vibrations"]
+__all__ = ["at_rest", "small_vibrations"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
 
-def small_vibrations(omega: Float, zeta: Float, phi: Float, tables: Tables) -> tuple[Complex, Float]:
+def at_rest(omega: Float, zeta: Float, elements: Sequence[NonlinearElement]) -> tuple[Float, Float]:
+    """Return the matrices of stiffness and damping of small vibrations in modal coordinates, float[n, n] each.
+
+    ``omega`` (rad/s) and ``zeta``, float[n], are those of the linear part. The support is left out.
+    """
+    phi = np.array([element.phi for element in elements]).reshape(len(elements), len(omega))
+    slope, loss = np.array([element.at_rest for element in elements]).reshape(len(elements), 2).T
+    return np.diag(omega**2) + (phi.T * slope) @ phi, np.diag(2.0 * zeta * omega) + (phi.T * loss) @ phi
+
+
+def small_vibrations(omega: Float, zeta: Float, elements: Sequence[NonlinearElement]) -> tuple[Complex, Float]:
     """Return poles (rad/s, upper half, lowest first) and shapes without damping in modal coordinates, float[n, n] by columns.
 
-    ``omega`` (rad/s) and ``zeta``, float[n], are those of the linear part, ``phi`` float[n_elements, n]. The support is left
-    out. Raises `IdentificationError` if a mode does not oscillate and fade.
+    Arguments are those of `at_rest`. Raises `IdentificationError` if a mode does not oscillate and fade.
     """
-    n, middle, cells = len(omega), tables.dampers.shape[1] // 2, tables.dampers.shape[1] - 1
-    slope = tables.springs[:, 1, middle] * cells / (2.0 * tables.limits[:, 0])
-    stuck = np.array([np.sum(tables.sliders[a:b, 0]) for a, b in zip(tables.first, tables.first[1:], strict=False)])
-    stiffness = np.diag(omega**2) + (phi.T * (slope + stuck)) @ phi
-    damping = np.diag(2.0 * zeta * omega) + (phi.T * tables.dampers[:, middle]) @ phi
+    n = len(omega)
+    stiffness, damping = at_rest(omega, zeta, elements)
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
     poles = poles[poles.imag > 0.0]
     if len(poles) < n or np.any(poles.real >= 0.0):
