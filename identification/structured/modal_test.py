@@ -55,7 +55,7 @@ class ModalTest:
         centre = np.maximum(vector, self._parameters.bounds(vector)[0] + step)  # numbers from 0 go no further down
         columns = [self._change(vector, k, at, h) for k, (at, h) in enumerate(zip(centre, step, strict=True))]
         left = self._seen(self._parameters.model(vector)) - self._expected
-        return np.column_stack([*columns, left]) / self.std[:, None]
+        return np.asarray(np.column_stack([*columns, left]) / self.std[:, None])
 
     def _change(self, vector: Float, number: int, centre: float, step: float) -> Float:
         less, more = vector.copy(), vector.copy()

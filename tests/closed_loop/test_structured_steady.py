@@ -27,7 +27,8 @@ def model():
             found.append(run.experiments())
             if number == 1:
                 modes = identification.linear_modes(next(iter(run.response_matrices().values())), modes=1)
-    return identification.fit_structured(modes, [*found[1], *found[2]], laws=(PolynomialSpring(), Masing())).model
+    laws = (PolynomialSpring(), Masing.spaced(8, 0.02, 0.9))
+    return identification.fit_structured(modes, [*found[1], *found[2]], laws=laws).model
 
 
 @pytest.fixture(scope="module")
