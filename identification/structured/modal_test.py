@@ -23,7 +23,7 @@ class ModalTest:
 
     In a modal test sliders stick and springs have their slope at rest. What is compared are therefore the modes of
     `StructuredModel.linearised`, with the damping that couples them left out. The last mode is the residual of the modes above,
-    of which little is known.
+    of which little is known. Not modelled: a modal test at a level at which joints slip.
 
     Parameters
     ----------

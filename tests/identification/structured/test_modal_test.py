@@ -67,3 +67,11 @@ def test_a_slider_without_stiffness_has_its_derivative_too():
     change = (seen(parameters.model(more)) - seen(model)) / STEP
     found = (test.rows(vector) * test.std[:, None])[: change.size, number]
     np.testing.assert_allclose(found, change, rtol=1e-3, atol=1e-5)
+
+
+def test_directions_that_wait_are_no_free_numbers_and_come_back_unchanged():
+    model = beam()
+    waiting, free = Parameters(model, (0,), False, turned=False), Parameters(model, (0,), False)
+    assert set(free.names) - set(waiting.names) == {"element 1 direction 2", "element 2 direction 2"}
+    for element, kept in zip(waiting.model(1.01 * waiting.vector(model)).elements, model.elements, strict=True):
+        np.testing.assert_array_equal(element.direction, kept.direction)
