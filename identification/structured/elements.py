@@ -203,7 +203,8 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
                 )  # linear; less may be below zero
             else:
                 change = np.zeros_like(tables.sliders)
-                moved = (element.sliders([more]) - element.sliders([less])) / (2.0 * _NUDGE)
+                way = float(more.vector[k] - less.vector[k])  # less may be at its bound
+                moved = (element.sliders([more]) - element.sliders([less])) / way
                 change[begin : begin + len(moved)] = moved
                 sliders.append(change)
     return Changes(

@@ -20,6 +20,7 @@ from identification.structured.element_trials import ElementTrial
 from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
+from identification.structured.levenberg_marquardt import minimum
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.modal_test import ModalTest
 from identification.structured.model import LEAD, StructuredModel
@@ -31,7 +32,7 @@ __all__ = ["StructuredFit", "fit_structured"]
 
 Float = NDArray[np.float64]
 
-_ROUGH, _FINE = 1e-3, 1e-5
+_ROUGH, _FINE = 1e-2, 1e-4
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
 _EVALUATIONS = 100
 _STAGES = {
@@ -311,29 +312,23 @@ class _Problem:
         both = np.concatenate([derivatives, residual], axis=2) * weight[:, None]
         return _triangle(both.reshape(-1, both.shape[2]))
 
-    def _residual(self, vector: Float) -> Float:
-        return self.triangle(vector)[:, -1]
+    def _cost(self, vector: Float) -> float:
+        """Return the sum of squares."""
+        model = self.parameters.model(vector)
+        with threads() as count, ThreadPoolExecutor(count) as pool:
+            left = sum(pool.map(partial(self._left_of_one, model), self.experiments, self.leads))
+        return left + float(np.sum((self._misfit * self._test.left(vector)) ** 2))
 
-    def _jacobian(self, vector: Float) -> Float:
-        return self.triangle(vector)[:, :-1]
+    def _left_of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> float:
+        weight = np.sqrt(experiment.weight) / self._scale
+        found = self.parameters.outputs(model, experiment.inputs, experiment.counted_from, lead)
+        return float(np.sum(((found - experiment.counted_outputs.T) * weight) ** 2))
 
     def solve(self, vector: Float, tolerance: float) -> tuple[Float, int]:
-        """Return the vector of least squares, and the number of simulations that it took."""
-        from scipy.optimize import least_squares  # only on use: it takes long to load
-
-        found = least_squares(
-            self._residual,
-            vector,
-            jac=self._jacobian,
-            bounds=self.parameters.bounds(vector),
-            x_scale="jac",
-            ftol=tolerance,
-            xtol=None,
-            gtol=None,
-            max_nfev=_EVALUATIONS,
-        )
-        self.stopped = str(found.message)
-        return np.asarray(found.x), int(found.nfev)
+        """Return the vector of least squares, and the number of simulations with derivatives that it took."""
+        found = minimum(self.triangle, self._cost, vector, self.parameters.bounds(vector), tolerance, _EVALUATIONS)
+        self.stopped = found.stopped
+        return found.vector, found.evaluations
 
 
 def _triangle(matrix: Float) -> Float:

@@ -67,7 +67,8 @@ def _between(low: float, high: float) -> Way:
 
 PLAIN = Way(lambda y: y, lambda v: v, "finite numbers")
 POSITIVE = Way(np.log, lambda v: np.exp(np.clip(v, -60.0, 60.0)), "numbers above 0", span=np.log(1e3))
-FROM_ZERO = Way(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 0.0)
+FROM_ZERO = Way(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v, 0.0), "numbers from 0", 1e-12)
+"""A fit goes down to 1e-12: at 0 itself the derivatives by a slider would be those of one that never slips."""
 
 
 @dataclass(frozen=True, eq=False)

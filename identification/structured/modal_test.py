@@ -54,8 +54,11 @@ class ModalTest:
         step = np.maximum(np.abs(vector), 1.0) * _STEP
         centre = np.maximum(vector, self._parameters.bounds(vector)[0] + step)  # numbers from 0 go no further down
         columns = [self._change(vector, k, at, h) for k, (at, h) in enumerate(zip(centre, step, strict=True))]
-        left = self._seen(self._parameters.model(vector)) - self._expected
-        return np.asarray(np.column_stack([*columns, left]) / self.std[:, None])
+        return np.column_stack([np.array(columns).T / self.std[:, None], self.left(vector)])
+
+    def left(self, vector: Float) -> Float:
+        """Return the residuals alone."""
+        return (self._seen(self._parameters.model(vector)) - self._expected) / self.std
 
     def _change(self, vector: Float, number: int, centre: float, step: float) -> Float:
         less, more = vector.copy(), vector.copy()

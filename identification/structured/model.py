@@ -211,9 +211,9 @@ class StructuredModel(Result):
         u = finite_array("inputs", inputs, np.float64, 2)
         if len(u) != len(self.inputs):
             raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
-        return self._run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
+        return self.run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
 
-    def _run(
+    def run(
         self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0
     ) -> Motion:
         """Simulate from rest, with a system from sample to sample; a support that is held is renewed after each stretch."""
@@ -250,7 +250,7 @@ class StructuredModel(Result):
             )
             for first, last in periods_of(begin, end, until, experiment.period_samples)
         ]
-        run_of = self._run(stretches, longer.inputs, np.ascontiguousarray(ends), longer.counted_from)
+        run_of = self.run(stretches, longer.inputs, np.ascontiguousarray(ends), longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         names = ("outputs", "displacement", "velocity", "acceleration")
         return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})

@@ -10,6 +10,7 @@ from identification.structured.held_support import renew
 from identification.structured.leading import Lead, not_led, own_shapes
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
 from identification.structured.sensitivities import run_with_sensitivities
+from identification.structured.steps import System
 
 __all__ = ["Parameters"]
 
@@ -148,12 +149,8 @@ class Parameters:
         self, model: StructuredModel, u: Float, counted_from: int, lead: Lead | None = None
     ) -> tuple[Float, Float]:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
-        system, modes = model.system, len(model.frequency_hz)
-        inputs, ends = len(model.inputs), ends_of_steps(u, model.steps)
-        stretches = [(system, 0, u.shape[1])]
-        if lead is not None:
-            stretches = lead.stretches(system, u.shape[1])
-            ends = lead.inputs(ends, model.steps)
+        system, modes, inputs = model.system, len(model.frequency_hz), len(model.inputs)
+        stretches, ends = _stretches(model, u, lead)
         changes = changes_of(model.elements, system.tables)
         count = 2 * modes + modes * ends.shape[1] + system.phi.size + changes.element.size + 1
         states = np.zeros((u.shape[1], 3, modes))
@@ -183,6 +180,11 @@ class Parameters:
             raw = own_shapes(not_led(raw, system, lead.rate), modes, inputs)
         found = outputs_of(model, u, states)[:, counted_from:].T
         return found, self._by_vector(model, raw, states[counted_from:], u[:, counted_from:])
+
+    def outputs(self, model: StructuredModel, u: Float, counted_from: int, lead: Lead | None = None) -> Float:
+        """Return the counted outputs alone, float[n, n_outputs]."""
+        stretches, ends = _stretches(model, u, lead)
+        return model.run(stretches, u, ends).outputs[:, counted_from:].T
 
     def _by_vector(self, model: StructuredModel, raw: Float, states: Float, u: Float) -> Float:
         """Chain rule from the kernel's parameters to the vector."""
@@ -216,3 +218,13 @@ class Parameters:
             direct[:, output, output * inputs : (output + 1) * inputs] = u.T
         columns.append(direct)
         return np.concatenate(columns, axis=2)
+
+
+def _stretches(
+    model: StructuredModel, u: Float, lead: Lead | None
+) -> tuple[list[tuple[System, int, int]], Float]:
+    """Return the system with the first and last sample of each stretch, and the inputs at the ends of all steps."""
+    ends = ends_of_steps(u, model.steps)
+    if lead is None:
+        return [(model.system, 0, u.shape[1])], ends
+    return lead.stretches(model.system, u.shape[1]), lead.inputs(ends, model.steps)
