@@ -148,6 +148,10 @@ class Changes(NamedTuple):
     """float[P_dampers, NODES]."""
     sliders: np.ndarray
     """float[P_joints, n_sliders, 2]."""
+    first: np.ndarray
+    """int[P_joints]: first slider that a number changes."""
+    last: np.ndarray
+    """int[P_joints]: end of the sliders that it changes."""
 
 
 def tables_of(elements: Sequence[NonlinearElement], softest: Float, stiffest: Float) -> Tables:
@@ -207,12 +211,16 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
                 moved = (element.sliders([more]) - element.sliders([less])) / way
                 change[begin : begin + len(moved)] = moved
                 sliders.append(change)
+    by_slider = np.array(sliders).reshape(len(sliders), len(tables.sliders), 2)
+    changed = np.any(by_slider != 0.0, axis=2)
     return Changes(
         element=np.array(owner, dtype=np.int64),
         springs=np.array(springs).reshape(-1, 3, NODES),
         limits=np.array(limits).reshape(-1, 3),
         dampers=np.array(dampers).reshape(-1, NODES),
-        sliders=np.array(sliders).reshape(len(sliders), len(tables.sliders), 2),
+        sliders=by_slider,
+        first=np.argmax(changed, axis=1) if sliders else np.zeros(0, dtype=np.int64),
+        last=changed.shape[1] - np.argmax(changed[:, ::-1], axis=1) if sliders else np.zeros(0, dtype=np.int64),
     )
 
 

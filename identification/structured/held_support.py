@@ -46,7 +46,7 @@ def renew(system: System, length_s: float, state: Float, sens: Float | None = No
     state, sens
         float[`System.size`], and its derivatives, float[`System.size`, P] (`run_with_sensitivities`); both are changed.
     """
-    n, inputs, stiffness = len(system.omega), system.b.shape[1], float(system.support[0])
+    n, inputs, stiffness = len(system.omega), system.inputs, float(system.support[0])
     b, omega = system.b[:, 0], system.omega
     compliance = float(np.sum((b / omega) ** 2))
     coupling, before = compliance * stiffness, float(state[2 * n])

@@ -14,7 +14,7 @@ from identification.structured.held_support import held, periods_of
 from identification.structured.model import ends_of_steps
 from identification.structured.steps import System, led
 
-__all__ = ["Lead", "not_led", "own_shapes"]
+__all__ = ["Lead", "not_led"]
 
 Float = NDArray[np.float64]
 
@@ -60,11 +60,3 @@ def not_led(derivatives: Float, system: System, rate: Float) -> Float:
     n, own = len(rate), derivatives.copy()
     own[..., :n] -= derivatives[..., n : 2 * n] * (0.5 * rate / system.omega**2)
     return np.asarray(own)
-
-
-def own_shapes(derivatives: Float, n: int, inputs: int) -> Float:
-    """Return derivatives ``[..., P]`` without those by the shapes at the added inputs."""
-    kept = [i * (inputs + n) + j for i in range(n) for j in range(inputs)]
-    end = 2 * n + n * (inputs + n)
-    shapes = derivatives[..., 2 * n : end][..., kept]
-    return np.concatenate([derivatives[..., : 2 * n], shapes, derivatives[..., end:]], axis=-1)

@@ -199,6 +199,7 @@ class StructuredModel(Result):
             omega=omega,
             zeta=np.array(self.damping_ratio),
             b=np.array(self.input_shapes),
+            inputs=len(self.inputs),
             phi=phi,
             tables=tables_of(self.elements, _SOFTEST * static, _STIFFEST * static),
             support=np.array(
@@ -337,6 +338,7 @@ def room_for(system: System, columns: int = 0) -> Room:
         coupling=np.zeros((elements, elements)),
         change=np.zeros((elements, 1)),
         row=np.zeros(columns),
+        stuck=np.zeros(len(system.tables.sliders)),
         unsolved=np.zeros(1, dtype=np.int64),
     )
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
 from identification.structured.held_support import renew
-from identification.structured.leading import Lead, not_led, own_shapes
+from identification.structured.leading import Lead, not_led
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
 from identification.structured.sensitivities import run_with_sensitivities
 from identification.structured.steps import System
@@ -18,6 +18,8 @@ Float = NDArray[np.float64]
 
 _NEAR = float(np.log(2.0))
 """Logarithm of the factor within which a frequency stays."""
+_VECTOR = 16
+"""Compiled loops over columns take so many at once; those that are left they take one by one, which is ten times as slow."""
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 
 
@@ -152,7 +154,8 @@ class Parameters:
         system, modes, inputs = model.system, len(model.frequency_hz), len(model.inputs)
         stretches, ends = _stretches(model, u, lead)
         changes = changes_of(model.elements, system.tables)
-        count = 2 * modes + modes * ends.shape[1] + system.phi.size + changes.element.size + 1
+        count = 2 * modes + modes * inputs + system.phi.size + changes.element.size + 1
+        count += -count % _VECTOR  # columns of zeros before the last
         states = np.zeros((u.shape[1], 3, modes))
         raw = np.zeros((u.shape[1] - counted_from, len(model.outputs), count))
         state, sens = np.zeros(system.size), np.zeros((system.size, count))
@@ -177,7 +180,7 @@ class Parameters:
             if lead is not None:
                 renew(part, (last - first) / model.sample_rate_hz, state, sens)
         if lead is not None:
-            raw = own_shapes(not_led(raw, system, lead.rate), modes, inputs)
+            raw = not_led(raw, system, lead.rate)
         found = outputs_of(model, u, states)[:, counted_from:].T
         return found, self._by_vector(model, raw, states[counted_from:], u[:, counted_from:])
 
@@ -206,7 +209,7 @@ class Parameters:
             at += modes
         for output in self.tied:
             shapes[..., ::inputs] += of_places[:, :, output]
-        columns.append(raw[..., at:-1])
+        columns.append(raw[..., at : at + sum(law.vector.size for e in model.elements for law in e.laws)])
         if self.support:
             columns.append(raw[..., -1:])
         for output in self._untied:

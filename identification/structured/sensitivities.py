@@ -23,11 +23,25 @@ __all__ = ["run_with_sensitivities"]
 
 
 @inner_kernel
+def add(out: np.ndarray, factor: float, row: np.ndarray) -> None:
+    """Add a multiple of a row."""
+    for c in range(out.size):
+        out[c] += factor * row[c]
+
+
+@inner_kernel
+def clear(row: np.ndarray) -> None:
+    """Write zeros."""
+    for c in range(row.size):
+        row[c] = 0.0
+
+
+@inner_kernel
 def add_linear(
     system: System, room: Room, speed: np.ndarray, place: np.ndarray, mean: float, sens: np.ndarray, rhs: np.ndarray
 ) -> None:
     """Add the explicit derivatives of the forces on the modes at ``place`` and ``speed`` by omega, zeta, b and the support."""
-    n, inputs, support = place.size, room.u.size, system.support
+    n, inputs, support = place.size, system.inputs, system.support
     last = rhs.shape[1] - 1
     steep = 0.0
     if support[2] > 0.0:
@@ -38,8 +52,7 @@ def add_linear(
         for j in range(inputs):
             rhs[i, 2 * n + i * inputs + j] += room.u[j]
         if steep != 0.0:
-            for c in range(last + 1):
-                rhs[i, c] -= system.b[i, 0] * steep * support[0] * sens[2 * n, c]
+            add(rhs[i], -system.b[i, 0] * steep * support[0], sens[2 * n])
             rhs[i, last] -= system.b[i, 0] * steep * mean
 
 
@@ -47,7 +60,7 @@ def add_linear(
 def add_direction(system: System, room: Room, e: int, speed: np.ndarray, place: np.ndarray, rhs: np.ndarray) -> None:
     """Add the explicit derivatives of an element's force on the modes by its direction."""
     n = place.size
-    begin = 2 * n + n * room.u.size + e * n
+    begin = 2 * n + n * system.inputs + e * n
     for k in range(n):
         rhs[k, begin + k] -= room.forces[e, 0]
         change = room.forces[e, 1] * place[k] + room.forces[e, 2] * speed[k]
@@ -73,14 +86,14 @@ def of_acceleration(
             rhs[i, c] = -2.0 * system.zeta[i] * omega * sens[n + i, c] - omega * omega * sens[i, c]
     add_linear(system, room, v, q, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        for c in range(columns):
-            change = 0.0
-            for i in range(n):
-                change += system.phi[e, i] * (room.forces[e, 1] * sens[i, c] + room.forces[e, 2] * sens[n + i, c])
-            for s in range(tables.first[e], tables.first[e + 1]):
-                change += sens[2 * n + 1 + s, c]
-            for i in range(n):
-                rhs[i, c] -= system.phi[e, i] * change
+        clear(room.row)
+        for i in range(n):
+            add(room.row, system.phi[e, i] * room.forces[e, 1], sens[i])
+            add(room.row, system.phi[e, i] * room.forces[e, 2], sens[n + i])
+        for s in range(tables.first[e], tables.first[e + 1]):
+            add(room.row, 1.0, sens[2 * n + 1 + s])
+        for i in range(n):
+            add(rhs[i], -system.phi[e, i], room.row)
         add_direction(system, room, e, v, q, rhs)
     begin, springs, dampers = law_columns(system), changes.springs.shape[0], changes.dampers.shape[0]
     for k in range(springs + dampers):
@@ -98,7 +111,7 @@ def of_acceleration(
 def law_columns(system: System) -> int:
     """Return the first column of the numbers of the laws."""
     n = system.omega.size
-    return int(2 * n + n * system.b.shape[1] + system.phi.size)
+    return int(2 * n + n * system.inputs + system.phi.size)
 
 
 @inner_kernel
@@ -112,7 +125,10 @@ def of_step(
     matrix: np.ndarray,
     rhs: np.ndarray,
 ) -> None:
-    """Write the derivatives of the mean velocities of a step by the parameters; ``half`` gets the middle of the step."""
+    """Write the derivatives of the mean velocities of a step by the parameters; ``half`` gets the middle of the step.
+
+    ``room.stuck`` gets the share of the step over which each slider sticks.
+    """
     n, columns, h, tables = system.omega.size, sens.shape[1], system.step_s, system.tables
     q = state[:n]
     for i in range(n):
@@ -124,19 +140,15 @@ def of_step(
         matrix[i, i] = rigidity(system, i)
     add_linear(system, room, room.mean, half, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        for c in range(columns):
-            change = 0.0
-            for i in range(n):
-                change += system.phi[e, i] * sens[i, c]
-            room.row[c] = change * room.forces[e, 1]
+        clear(room.row)
+        for i in range(n):
+            add(room.row, system.phi[e, i] * room.forces[e, 1], sens[i])
         for s in range(tables.first[e], tables.first[e + 1]):
             at = 2 * n + 1 + s
-            by_r = slide(state[at], tables.sliders[s, 0], tables.sliders[s, 1], h * room.w[e])[3]
-            for c in range(columns):
-                room.row[c] += by_r * sens[at, c]
+            room.stuck[s] = slide(state[at], tables.sliders[s, 0], tables.sliders[s, 1], h * room.w[e])[3]
+            add(room.row, room.stuck[s], sens[at])
         for i in range(n):
-            for c in range(columns):
-                rhs[i, c] -= system.phi[e, i] * room.row[c]
+            add(rhs[i], -system.phi[e, i], room.row)
         add_direction(system, room, e, room.mean, q, rhs)
         for i in range(n):
             for k in range(n):
@@ -162,11 +174,9 @@ def of_law(system: System, room: Room, changes: Changes, state: np.ndarray, k: i
             return float(mean_spring(x, way, changes.springs[k], changes.limits[k])[0])
         row = changes.dampers[k - springs]
         return float(damping_at(x + 0.5 * way, row, tables.limits[e, 0])[0] * room.w[e])
-    total, sign = 0.0, math.copysign(1.0, way)
-    for s in range(tables.first[e], tables.first[e + 1]):
-        stiffness, strength = tables.sliders[s, 0], tables.sliders[s, 1]
-        by = changes.sliders[k - springs - dampers, s]
-        share = slide(state[2 * n + 1 + s], stiffness, strength, way)[3]
+    total, sign, joint = 0.0, math.copysign(1.0, way), k - springs - dampers
+    for s in range(changes.first[joint], changes.last[joint]):
+        by, share = changes.sliders[joint, s], room.stuck[s]
         if share == 1.0:
             total += 0.5 * way * by[0]
         else:
@@ -175,51 +185,52 @@ def of_law(system: System, room: Room, changes: Changes, state: np.ndarray, k: i
 
 
 @inner_kernel
-def end_sliders(
-    system: System, room: Room, changes: Changes, state: np.ndarray, sens: np.ndarray, rhs: np.ndarray
-) -> None:
+def end_sliders(system: System, room: Room, changes: Changes, sens: np.ndarray, rhs: np.ndarray) -> None:
     """Take the sensitivities of the sliders to the end of the step."""
     n, h, tables = system.omega.size, system.step_s, system.tables
-    inputs, begin = system.b.shape[1], law_columns(system)
+    inputs, begin = system.inputs, law_columns(system)
     joints = changes.springs.shape[0] + changes.dampers.shape[0]
     for e in range(system.phi.shape[0]):
         if tables.first[e] == tables.first[e + 1]:
             continue
-        way, direction = h * room.w[e], 2 * n + n * inputs + e * n
-        for c in range(sens.shape[1]):
-            change = 0.0
-            for i in range(n):
-                change += system.phi[e, i] * rhs[i, c]
-            room.row[c] = h * change
+        direction = 2 * n + n * inputs + e * n
+        clear(room.row)
+        for i in range(n):
+            add(room.row, h * system.phi[e, i], rhs[i])
         for i in range(n):
             room.row[direction + i] += h * room.mean[i]
         for s in range(tables.first[e], tables.first[e + 1]):
-            at, stiffness, strength = 2 * n + 1 + s, tables.sliders[s, 0], tables.sliders[s, 1]
-            sticks = slide(state[at], stiffness, strength, way)[3] == 1.0
-            for c in range(sens.shape[1]):
-                sens[at, c] = sens[at, c] + stiffness * room.row[c] if sticks else 0.0
-            for k in range(changes.sliders.shape[0]):
-                by = changes.sliders[k, s]
-                sens[at, begin + joints + k] += way * by[0] if sticks else math.copysign(1.0, way) * by[1]
+            at = 2 * n + 1 + s
+            if room.stuck[s] == 1.0:
+                add(sens[at], tables.sliders[s, 0], room.row)
+            else:
+                clear(sens[at])
+    for k in range(changes.sliders.shape[0]):
+        way = h * room.w[changes.element[joints + k]]
+        for s in range(changes.first[k], changes.last[k]):
+            by, at = changes.sliders[k, s], 2 * n + 1 + s
+            sens[at, begin + joints + k] += way * by[0] if room.stuck[s] == 1.0 else math.copysign(1.0, way) * by[1]
 
 
 @inner_kernel
-def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: np.ndarray) -> None:
+def end_sensitivities(system: System, half: np.ndarray, sens: np.ndarray, rhs: np.ndarray, row: np.ndarray) -> None:
     """Take the sensitivities of displacements, velocities and support to the end of the step."""
-    n, h, inputs = half.size, system.step_s, system.b.shape[1]
+    n, h, inputs = half.size, system.step_s, system.inputs
     alpha, last = 0.5 * h * system.support[1], sens.shape[0] - 1
-    for c in range(sens.shape[1]):
-        moved = 0.0
-        for i in range(n):
-            moved += system.b[i, 0] * (sens[i, c] + 0.5 * h * rhs[i, c])
-            sens[i, c] += h * rhs[i, c]
+    clear(row)
+    for i in range(n):
+        add(row, system.b[i, 0], sens[i])
+        add(row, 0.5 * h * system.b[i, 0], rhs[i])
+        add(sens[i], h, rhs[i])
+        for c in range(sens.shape[1]):
             sens[n + i, c] = 2.0 * rhs[i, c] - sens[n + i, c]
-        before = sens[last, c]
-        if alpha == 0.0:
-            sens[last, c] = before + h * moved
-            continue
-        sens[last, c] = ((1.0 - alpha) * before + 2.0 * alpha * moved) / (1.0 + alpha)
-        sens[2 * n, c] = ((1.0 - alpha) * sens[2 * n, c] + alpha * (before + sens[last, c])) / (1.0 + alpha)
+    if alpha == 0.0:
+        add(sens[last], h, row)
+    else:
+        for c in range(sens.shape[1]):
+            before = sens[last, c]
+            sens[last, c] = ((1.0 - alpha) * before + 2.0 * alpha * row[c]) / (1.0 + alpha)
+            sens[2 * n, c] = ((1.0 - alpha) * sens[2 * n, c] + alpha * (before + sens[last, c])) / (1.0 + alpha)
     for i in range(n):
         if alpha == 0.0:
             sens[last, 2 * n + i * inputs] += h * half[i]
@@ -247,7 +258,7 @@ def run_with_sensitivities(
 ) -> None:
     """As `run`, and write the derivatives of ``outputs . motion`` by the parameters from sample ``counted_from``.
 
-    Parameters, in this order: omega, zeta, b (row by row), phi (row by row), the numbers of the laws as in `Changes`, the
+    Parameters, in this order: omega, zeta, b of the model's inputs (row by row), phi (row by row), the numbers of the laws as in `Changes`, the
     support's stiffness. ``sens``: [`System.size`, P], that of the state. ``motions``: 0, 1, 2 for displacement, velocity,
     acceleration. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P]. ``jacobian``: [N - counted_from, n_outputs, P].
     """
@@ -262,15 +273,13 @@ def run_with_sensitivities(
         if sample >= counted_from:
             of_acceleration(system, room, changes, state, sens, rhs)
             for o in range(outputs.shape[0]):
-                for c in range(sens.shape[1]):
-                    total = 0.0
-                    for i in range(n):
-                        total += outputs[o, i] * (rhs[i, c] if motions[o] == 2 else sens[motions[o] * n + i, c])
-                    jacobian[sample - counted_from, o, c] = total
+                out = jacobian[sample - counted_from, o]  # zero so far
+                for i in range(n):
+                    add(out, outputs[o, i], rhs[i] if motions[o] == 2 else sens[motions[o] * n + i])
         for row in range(first, first + system.steps):
             take_input(system, room, u, row, row + 1, state[2 * n])
             take_step(system, room, q, v, r)
             of_step(system, room, changes, state, half, sens, matrix, rhs)
-            end_sliders(system, room, changes, state, sens, rhs)
-            end_sensitivities(system, half, sens, rhs)
+            end_sliders(system, room, changes, sens, rhs)
+            end_sensitivities(system, half, sens, rhs, room.row)
             end_step(system, room, q, v, state)

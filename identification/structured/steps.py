@@ -51,7 +51,9 @@ class System(NamedTuple):
     zeta: np.ndarray
     """float[n]."""
     b: np.ndarray
-    """float[n, n_inputs]."""
+    """float[n, n_inputs]: shapes at the inputs, the model's first."""
+    inputs: int
+    """Inputs of the model; those after them lead."""
     phi: np.ndarray
     """float[n_elements, n]."""
     tables: Tables
@@ -82,6 +84,8 @@ class Room(NamedTuple):
     change: np.ndarray
     row: np.ndarray
     """float[P]: of the sensitivities."""
+    stuck: np.ndarray
+    """float[n_sliders]: share of a step over which each sticks, of the sensitivities."""
     unsolved: np.ndarray
     """int[1]: steps whose equation was not solved."""
 
@@ -108,10 +112,11 @@ def solve(matrix: np.ndarray, rhs: np.ndarray, n: int, columns: int) -> None:
                 for c in range(columns):
                     rhs[r, c] -= factor * rhs[i, c]
     for i in range(n - 1, -1, -1):
+        for r in range(i + 1, n):
+            for c in range(columns):
+                rhs[i, c] -= matrix[i, r] * rhs[r, c]
         pivot = 1.0 / matrix[i, i]
         for c in range(columns):
-            for r in range(i + 1, n):
-                rhs[i, c] -= matrix[i, r] * rhs[r, c]
             rhs[i, c] *= pivot
 
 
