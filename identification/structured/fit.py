@@ -19,12 +19,12 @@ from identification.pnlss.fitting.threads import threads
 from identification.structured.element_trials import ElementTrial
 from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
-from identification.structured.leading import Lead
+from identification.structured.leading import Lead, with_velocity
 from identification.structured.levenberg_marquardt import minimum
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.modal_test import ModalTest
 from identification.structured.model import LEAD, StructuredModel
-from identification.structured.parameters import Parameters
+from identification.structured.parameters import HIGHEST, Parameters
 from identification.structured.start import linear_start, with_element
 from vibrolock.results import Result
 
@@ -32,7 +32,7 @@ __all__ = ["StructuredFit", "fit_structured"]
 
 Float = NDArray[np.float64]
 
-_ROUGH, _FINE = 1e-2, 1e-4
+_ROUGH, _FINE = 3e-2, 2e-4
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
 _EVALUATIONS = 100
 _STAGES = {
@@ -218,6 +218,7 @@ def _fitted(
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     found, evaluations, misfit = start, 0, _MISFIT
     measured = np.arange(len(linear.omega)) < led
+    rough = min(start.steps, _rough_steps(start))
     slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
     for ratio, free, turned in _STAGES[support]:
         if free and not found.support_n_m:
@@ -225,11 +226,12 @@ def _fitted(
         # the last fit is free for so long before it counts that nothing is left of the lead
         lengths = [0 if ratio or not e.period_samples else settling_periods(e, slowest) for e in experiments]
         settled = [prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
+        begun = start if turned else start.with_steps(rough)
         leads = [
             Lead(
                 2.0 * LEAD * linear.omega * measured,
                 2.0 * ratio * linear.omega * measured,
-                measured_velocity(linear, e, int(measured.sum())),
+                with_velocity(e.inputs, measured_velocity(linear, e, int(measured.sum())), begun.steps),
                 e.counted_from - count * e.period_samples,
                 e.period_samples,
             )
@@ -237,13 +239,19 @@ def _fitted(
             else None
             for e, count in zip(settled, lengths, strict=True)
         ]
-        parameters = Parameters(start, tied, free, turned)
+        parameters = Parameters(begun, tied, free, turned, len(modes.frequency_hz))
         problem = _Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
         vector, more = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found, evaluations = parameters.model(vector), evaluations + more
         problem.triangle(vector)
         misfit = min(_MISFIT, problem.error)
     return _Fitted(found, start, problem, vector, evaluations)
+
+
+def _rough_steps(model: StructuredModel) -> int:
+    """Return steps in a sample for the fits before the last: half of them, as long as every mode may rise by a fifth."""
+    needed = 1.2 * float(np.max(model.frequency_hz)) / (HIGHEST * model.sample_rate_hz)
+    return max(math.ceil(0.5 * model.steps), math.ceil(needed))
 
 
 class _Problem:

@@ -14,7 +14,7 @@ from identification.structured.held_support import held, periods_of
 from identification.structured.model import ends_of_steps
 from identification.structured.steps import System, led
 
-__all__ = ["Lead", "not_led"]
+__all__ = ["Lead", "not_led", "with_velocity"]
 
 Float = NDArray[np.float64]
 
@@ -27,8 +27,8 @@ class Lead:
     ----------
     before, rate
         float[n_modes], rates up to sample ``until`` and from there on, rad/s; 0 for a mode that is not led.
-    velocity
-        float[n_modes, n], measured modal velocities at the samples.
+    ends
+        float[n steps + 1, n_inputs + n_modes], inputs and measured modal velocities at the ends of all steps (`with_velocity`).
     until
         Number of samples that are led at the rate ``before``.
     period
@@ -37,7 +37,7 @@ class Lead:
 
     before: Float
     rate: Float
-    velocity: Float
+    ends: Float
     until: int
     period: int
 
@@ -47,9 +47,10 @@ class Lead:
         ends = zip(systems, (0, self.until), (self.until, samples), strict=True)
         return [(one, *at) for one, a, b in ends for at in periods_of(a, b, self.until, self.period)]
 
-    def inputs(self, ends: Float, steps: int) -> Float:
-        """Return inputs at the ends of steps with one more for each mode."""
-        return np.ascontiguousarray(np.hstack([ends, ends_of_steps(self.velocity, steps)]))
+
+def with_velocity(inputs: Float, velocity: Float, steps: int) -> Float:
+    """Return inputs, [n_inputs, n], and velocities that lead, [n_modes, n], at the ends of steps."""
+    return np.ascontiguousarray(np.hstack([ends_of_steps(inputs, steps), ends_of_steps(velocity, steps)]))
 
 
 def not_led(derivatives: Float, system: System, rate: Float) -> Float:

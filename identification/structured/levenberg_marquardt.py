@@ -14,7 +14,7 @@ __all__ = ["Minimum", "minimum"]
 
 Float = NDArray[np.float64]
 
-_FIRST, _FACTOR = 1e-3, 10.0
+_FIRST, _FACTOR = 1e-3, 3.0
 _SMALLEST, _LARGEST = 1e-12, 1e6
 """Dampings, relative to derivatives of unit norm."""
 _WORTH = 0.1

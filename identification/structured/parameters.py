@@ -12,10 +12,12 @@ from identification.structured.model import StructuredModel, ends_of_steps, outp
 from identification.structured.sensitivities import run_with_sensitivities
 from identification.structured.steps import System
 
-__all__ = ["Parameters"]
+__all__ = ["HIGHEST", "Parameters"]
 
 Float = NDArray[np.float64]
 
+HIGHEST = 0.45
+"""Largest frequency of a mode times the length of a step."""
 _NEAR = float(np.log(2.0))
 """Logarithm of the factor within which a frequency stays."""
 _VECTOR = 16
@@ -27,7 +29,7 @@ _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 class Parameters:
     """Which numbers of a model are free, and their order in a vector.
 
-    Logarithms of frequencies and damping ratios; input shapes; of each element the direction without its leading component
+    Logarithms of frequencies and damping ratios of the modes with free ``poles``; input shapes; of each element the direction without its leading component
     (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move them; the support's
     stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
 
@@ -41,18 +43,26 @@ class Parameters:
         Whether the support is free.
     turned
         Whether directions are free.
+    poles
+        Number of modes whose frequency and damping ratio are free, the first ones; None for all. Those of a mode that stands for
+        all modes above the band are not seen: its ringing at one frequency or another leaves the same residual.
     """
 
     start: StructuredModel
     tied: tuple[int, ...]
     support: bool
     turned: bool = True
+    poles: int | None = None
+
+    @property
+    def _poles(self) -> int:
+        return len(self.start.frequency_hz) if self.poles is None else self.poles
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all free numbers."""
         modes, inputs = self.start.input_shapes.shape
-        out = [f"frequency {i + 1}" for i in range(modes)] + [f"damping {i + 1}" for i in range(modes)]
+        out = [f"{number} {i + 1}" for number in ("frequency", "damping") for i in range(self._poles)]
         out += [f"shape {i + 1} at {self.start.inputs[j].name}" for i in range(modes) for j in range(inputs)]
         for number, element in enumerate(self.start.elements):
             out += [f"element {number + 1} direction {i + 1}" for i in self._kept(element)]
@@ -79,7 +89,8 @@ class Parameters:
 
     def vector(self, model: StructuredModel) -> Float:
         """Return the free numbers of a model."""
-        parts = [np.log(model.frequency_hz), np.log(model.damping_ratio), model.input_shapes.ravel()]
+        poles = self._poles
+        parts = [np.log(model.frequency_hz[:poles]), np.log(model.damping_ratio[:poles]), model.input_shapes.ravel()]
         for element, first in zip(model.elements, self.start.elements, strict=True):
             parts.append(element.direction[self._kept(first)])
         parts += [model.elements[e].laws[law].vector for e, law in laws_in_order(model.elements)]
@@ -90,14 +101,14 @@ class Parameters:
 
     def bounds(self, vector: Float) -> tuple[Float, Float]:
         """Return least and largest values, so that modes that the data hardly show stay modes."""
-        modes = len(self.start.frequency_hz)
+        modes, poles = len(self.start.frequency_hz), self._poles
         least, largest = np.full(vector.size, -np.inf), np.full(vector.size, np.inf)
-        frequency = np.log(self.start.frequency_hz)
-        highest = np.log(0.45 / self.start.step_s)
-        least[:modes], largest[:modes] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
-        least[modes : 2 * modes], largest[modes : 2 * modes] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
+        frequency = np.log(self.start.frequency_hz[:poles])
+        highest = np.log(HIGHEST / self.start.step_s)
+        least[:poles], largest[:poles] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
+        least[poles : 2 * poles], largest[poles : 2 * poles] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
         laws = [self.start.elements[e].laws[law].bounds for e, law in laws_in_order(self.start.elements)]
-        at = modes * (2 + len(self.start.inputs)) + sum(len(self._kept(element)) for element in self.start.elements)
+        at = 2 * poles + modes * len(self.start.inputs) + sum(len(self._kept(element)) for element in self.start.elements)
         for bounds in laws:
             least[at : at + bounds.shape[1]], largest[at : at + bounds.shape[1]] = bounds
             at += bounds.shape[1]
@@ -115,7 +126,8 @@ class Parameters:
             return vector[at - count : at]
 
         modes, inputs = start.input_shapes.shape
-        frequency, damping = np.exp(take(modes)), np.exp(take(modes))
+        frequency, damping, poles = start.frequency_hz.copy(), start.damping_ratio.copy(), self._poles
+        frequency[:poles], damping[:poles] = np.exp(take(poles)), np.exp(take(poles))
         shapes = take(modes * inputs).reshape(modes, inputs)
         directions = [element.direction.copy() for element in start.elements]
         for element, direction in zip(start.elements, directions, strict=True):
@@ -193,7 +205,9 @@ class Parameters:
         """Chain rule from the kernel's parameters to the vector."""
         modes, inputs = model.input_shapes.shape
         by_frequency = model.omega / np.cos(0.5 * model.omega * model.step_s) ** 2
-        columns = [raw[..., : 2 * modes] * np.concatenate([by_frequency, model.damping_ratio])]
+        poles = self._poles
+        columns = [raw[..., :poles] * by_frequency[:poles]]
+        columns.append(raw[..., modes : modes + poles] * model.damping_ratio[:poles])
         shapes = raw[..., 2 * modes : 2 * modes + modes * inputs].copy()
         motions = states[:, model.motions]  # [n, n_outputs, n_modes]
         for output in self.tied:
@@ -227,7 +241,6 @@ def _stretches(
     model: StructuredModel, u: Float, lead: Lead | None
 ) -> tuple[list[tuple[System, int, int]], Float]:
     """Return the system with the first and last sample of each stretch, and the inputs at the ends of all steps."""
-    ends = ends_of_steps(u, model.steps)
     if lead is None:
-        return [(model.system, 0, u.shape[1])], ends
-    return lead.stretches(model.system, u.shape[1]), lead.inputs(ends, model.steps)
+        return [(model.system, 0, u.shape[1])], ends_of_steps(u, model.steps)
+    return lead.stretches(model.system, u.shape[1]), lead.ends

@@ -25,7 +25,8 @@ def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> 
     so that what the data do not tell apart moves together.
     """
     drive = find_role(fit.start.outputs, "drive")
-    parameters = Parameters(fit.start, (drive,), "support" in fit.names)
+    poles = sum(name.startswith("frequency ") for name in fit.names)
+    parameters = Parameters(fit.start, (drive,), "support" in fit.names, poles=poles)
     size = np.sqrt(np.diag(fit.covariance))
     unit = np.where(size > 0.0, size, 1.0)
     values, axes = np.linalg.eigh(fit.covariance / np.outer(unit, unit))
