@@ -39,6 +39,8 @@ __all__ = [
 
 Float = NDArray[np.float64]
 
+_LARGEST_SLIP = 0.9
+"""Largest slip x of a joint's sliders: one that the training data hardly reach is a spring to them, of any stiffness."""
 _MAGNET_REACH = 0.8
 """Share of a magnet's gap beyond which its force goes on as a straight line."""
 
@@ -329,6 +331,11 @@ class Jenkins(Joint):
         return np.array([[self.stiffness_n], [self.stiffness_n * self.slip]])
 
 
+def _slips(count: int, largest: float = _LARGEST_SLIP) -> tuple[float, ...]:
+    """Return slips that grow with the power 1.5 of their number."""
+    return tuple((largest * (np.arange(1, count + 1) / count) ** 1.5).round(4).tolist())
+
+
 @dataclass(frozen=True, eq=False)
 class Masing(Joint):
     """Sliders that slip at given displacements, with free stiffnesses: any joint that follows Masing's rule, in steps.
@@ -342,14 +349,14 @@ class Masing(Joint):
 
     stiffness_n: tuple[float, ...] = (1.0,) * 18
     """Stiffness of each slider, N per unit of x, none below zero."""
-    slips: tuple[float, ...] = tuple(np.geomspace(0.03, 1.0, 18).round(4).tolist())
-    """Displacements x at which they slip. By default each is 1.23 times the one before: of the friction beam's training data, 8
-    sliders at 1.72 times left four times as much."""
+    slips: tuple[float, ...] = _slips(18)
+    """Displacements x at which they slip, growing with the power 1.5 of their number: close together where a joint slips little,
+    and where most of its stiffness is. With equal ratios in their place, fits of the friction beam depended on the ratio."""
 
     @classmethod
-    def spaced(cls, count: int, least: float, largest: float) -> Self:
-        """Return a joint of ``count`` sliders whose slips have equal ratios from ``least`` to ``largest``."""
-        return cls(stiffness_n=(1.0,) * count, slips=tuple(np.geomspace(least, largest, count).round(4).tolist()))
+    def spaced(cls, count: int, largest: float = _LARGEST_SLIP) -> Self:
+        """Return a joint of ``count`` sliders with slips up to ``largest``."""
+        return cls(stiffness_n=(1.0,) * count, slips=_slips(count, largest))
 
     def sliders(self) -> Float:
         """float[2, n]: stiffness and largest force."""

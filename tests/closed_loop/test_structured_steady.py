@@ -27,7 +27,7 @@ def model():
             found.append(run.experiments())
             if number == 1:
                 modes = identification.linear_modes(next(iter(run.response_matrices().values())), modes=1)
-    laws = (PolynomialSpring(), Masing.spaced(8, 0.02, 0.9))
+    laws = (PolynomialSpring(), Masing.spaced(8))
     return identification.fit_structured(modes, [*found[1], *found[2]], laws=laws).model
 
 
