@@ -29,9 +29,9 @@ _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 class Parameters:
     """Which numbers of a model are free, and their order in a vector.
 
-    Logarithms of frequencies and damping ratios of the modes with free ``poles``; input shapes; of each element the direction without its leading component
-    (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move them; the support's
-    stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
+    Logarithms of frequencies and damping ratios of the first ``poles`` modes; input shapes; of each element the direction
+    without its leading component (which sets the scale of x); the numbers of all springs, dampers and joints as their laws move
+    them; the support's stiffness if ``support``; output shapes of outputs that are not ``tied``; ``direct``.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class Parameters:
     turned
         Whether directions are free.
     poles
-        Number of modes whose frequency and damping ratio are free, the first ones; None for all. Those of a mode that stands for
-        all modes above the band are not seen: its ringing at one frequency or another leaves the same residual.
+        Number of modes whose frequency and damping ratio are free, the first ones; None for all. The data do not show those of
+        a mode that stands for all modes above the band: whatever its frequency is, its ringing leaves the same residual.
     """
 
     start: StructuredModel
