@@ -218,6 +218,8 @@ def _fitted(
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     found, evaluations, misfit = start, 0, _MISFIT
     measured = np.arange(len(linear.omega)) < led
+    seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
+    poles = len(linear.frequency_hz if seen else modes.frequency_hz)
     rough = min(start.steps, _rough_steps(start))
     slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
     for ratio, free, turned in _STAGES[support]:
@@ -239,7 +241,7 @@ def _fitted(
             else None
             for e, count in zip(settled, lengths, strict=True)
         ]
-        parameters = Parameters(begun, tied, free, turned, len(modes.frequency_hz))
+        parameters = Parameters(begun, tied, free, turned, poles)
         problem = _Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
         vector, more = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found, evaluations = parameters.model(vector), evaluations + more
