@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from identification import IdentificationError
 from identification.structured.elements import NonlinearElement
 from identification.structured.kernels import damping_at, spring_at
-from identification.structured.laws import PolynomialDamper, PolynomialSpring
+from identification.structured.laws import Masing, PolynomialDamper, PolynomialSpring
 from identification.structured.model import ends_of_steps, room_for
 from identification.structured.parameters import Parameters
 from identification.structured.steps import end_step, run, take_input, take_step
@@ -163,6 +163,35 @@ def test_derivatives_are_those_of_finite_differences(force_n):
         differences = (ends[1] - ends[0]) / (2.0 * step)
         size = np.linalg.norm(exact[..., column])
         assert np.linalg.norm(differences - exact[..., column]) <= 2e-5 * size + 1e-9, name
+
+
+@pytest.mark.parametrize("stiffness_n", [0.0, 1e-12, 3e-5, 1e-2])
+def test_derivatives_by_a_slider_with_almost_no_stiffness_are_those_of_one_that_slips(stiffness_n):
+    """Against forward differences; a fit asks at its lower bound, 1e-12 N, where the number is zero."""
+    joint = Masing(stiffness_n=(0.5, stiffness_n, 0.3), slips=(0.02, 0.1, 1.5))
+    start = beam(elements=(NonlinearElement(direction=[0.9, -0.1], scale_m=1e-5, laws=(joint,)),), support_n_m=0.0)
+    parameters = Parameters(start, (0,), False)
+    vector = np.maximum(parameters.vector(start), parameters.bounds(parameters.vector(start))[0])
+    u, at = multisine(1.0, 4)[:, :400], parameters.names.index("element 1 masing stiffness_n[1]")
+    before, exact = parameters.derivatives(parameters.model(vector), u, 20)
+    step = 1e-7 * np.eye(vector.size)[at]
+    after = parameters.outputs(parameters.model(vector + step), u, 20)
+    differences = (after - before) / step[at]
+    assert np.linalg.norm(differences - exact[..., at]) < 2e-4 * np.linalg.norm(exact[..., at])
+
+
+def test_poles_that_are_not_free_stay_and_leave_the_other_derivatives():
+    start, u = beam(), multisine(1.0, 4)[:, :200]
+    every, some = Parameters(start, (0,), True), Parameters(start, (0,), True, poles=1)
+    kept = [every.names.index(name) for name in some.names]
+    assert set(every.names) - set(some.names) == {"frequency 2", "damping 2"}
+    np.testing.assert_array_equal(some.vector(start), every.vector(start)[kept])
+    moved = some.model(some.vector(start) + 1e-3)
+    np.testing.assert_array_equal(moved.frequency_hz[1:], start.frequency_hz[1:])
+    np.testing.assert_array_equal(moved.damping_ratio[1:], start.damping_ratio[1:])
+    assert np.all(some.bounds(some.vector(start)) == np.array(every.bounds(every.vector(start)))[:, kept])
+    exact = every.derivatives(start, u, 20)[1]
+    np.testing.assert_array_equal(some.derivatives(start, u, 20)[1], exact[..., kept])
 
 
 def _with_limits(model, start, u):
