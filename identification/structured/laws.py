@@ -350,8 +350,9 @@ class Masing(Joint):
     stiffness_n: tuple[float, ...] = (1.0,) * 18
     """Stiffness of each slider, N per unit of x, none below zero."""
     slips: tuple[float, ...] = _slips(18)
-    """Displacements x at which they slip, growing with the power 1.5 of their number: close together where a joint slips little,
-    and where most of its stiffness is. With equal ratios in their place, fits of the friction beam depended on the ratio."""
+    """Displacements x at which they slip, growing with the power 1.5 of their number: close together where a joint slips
+    little, and where most of its stiffness is. With equal ratios in their place, fits of the friction beam depended on the
+    ratio."""
 
     @classmethod
     def spaced(cls, count: int, largest: float = _LARGEST_SLIP) -> Self:

@@ -1,7 +1,7 @@
 """Levenberg-Marquardt iterations whose numbers stay within bounds.
 
-Each step solves a linear least-squares problem with damping and bounds exactly, by an active set. Numbers that belong at a bound
-(sliders that a joint does not need) thereby arrive there; interior-point methods approach it by a share in each iteration.
+Each step solves a linear least-squares problem with damping and bounds exactly, by an active set. Numbers that belong at a
+bound (sliders that a joint does not need) thereby arrive there. Interior methods approach it by a share in each iteration.
 """
 
 from collections.abc import Callable

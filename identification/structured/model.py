@@ -214,9 +214,7 @@ class StructuredModel(Result):
             raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
         return self.run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
 
-    def run(
-        self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0
-    ) -> Motion:
+    def run(self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0) -> Motion:
         """Simulate from rest, with a system from sample to sample; a support that is held is renewed after each stretch."""
         states, state = np.zeros((u.shape[1], 3, len(self.omega))), np.zeros(self.system.size)
         unsolved = 0

@@ -108,7 +108,11 @@ class Parameters:
         least[:poles], largest[:poles] = frequency - _NEAR, np.minimum(frequency + _NEAR, highest)
         least[poles : 2 * poles], largest[poles : 2 * poles] = np.log(_LEAST_DAMPING), np.log(_LARGEST_DAMPING)
         laws = [self.start.elements[e].laws[law].bounds for e, law in laws_in_order(self.start.elements)]
-        at = 2 * poles + modes * len(self.start.inputs) + sum(len(self._kept(element)) for element in self.start.elements)
+        at = (
+            2 * poles
+            + modes * len(self.start.inputs)
+            + sum(len(self._kept(element)) for element in self.start.elements)
+        )
         for bounds in laws:
             least[at : at + bounds.shape[1]], largest[at : at + bounds.shape[1]] = bounds
             at += bounds.shape[1]
@@ -237,9 +241,7 @@ class Parameters:
         return np.concatenate(columns, axis=2)
 
 
-def _stretches(
-    model: StructuredModel, u: Float, lead: Lead | None
-) -> tuple[list[tuple[System, int, int]], Float]:
+def _stretches(model: StructuredModel, u: Float, lead: Lead | None) -> tuple[list[tuple[System, int, int]], Float]:
     """Return the system with the first and last sample of each stretch, and the inputs at the ends of all steps."""
     if lead is None:
         return [(model.system, 0, u.shape[1])], ends_of_steps(u, model.steps)

@@ -258,9 +258,10 @@ def run_with_sensitivities(
 ) -> None:
     """As `run`, and write the derivatives of ``outputs . motion`` by the parameters from sample ``counted_from``.
 
-    Parameters, in this order: omega, zeta, b of the model's inputs (row by row), phi (row by row), the numbers of the laws as in `Changes`, the
-    support's stiffness. ``sens``: [`System.size`, P], that of the state. ``motions``: 0, 1, 2 for displacement, velocity,
-    acceleration. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P]. ``jacobian``: [N - counted_from, n_outputs, P].
+    Parameters, in this order: omega, zeta, b of the model's inputs (row by row), phi (row by row), the numbers of the laws as
+    in `Changes`, zeros if there is room, the support's stiffness. ``sens``: [`System.size`, P], that of the state.
+    ``motions``: 0, 1, 2 for displacement, velocity, acceleration. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P].
+    ``jacobian``: [N - counted_from, n_outputs, P], zero at first.
     """
     n = system.omega.size
     q, v, r, half = state[:n], state[n : 2 * n], state[2 * n + 1 :], matrix[n]

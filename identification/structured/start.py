@@ -168,9 +168,26 @@ class _Equation:
         left = linear.input_shapes[mode] @ inputs - dynamic * coordinates[mode]
         self.left, self.phi, self.q = left[self.lines], phi, q
         self.rate = np.fft.irfft(1j * omega * coordinates[mode], q.size) * q.size
+        self._joints: dict[Law, Complex] = {}
+        self.own = self._spectra([self.q, self.rate])
 
-    def forces(self, law: Law, position: float) -> list[Float]:
-        """Forces of a law over the period for each of its linear numbers at 1, per x."""
+    def columns(self, law: Law, position: float) -> Complex:
+        """Spectra of the forces of a law for each of its linear numbers at 1, per x: the mean, and the lines.
+
+        A joint's do not depend on the position.
+        """
+        if law not in self._joints:
+            found = self._spectra(self._forces(law, position))
+            if not isinstance(law, Joint):
+                return found
+            self._joints[law] = found
+        return self._joints[law]
+
+    def _spectra(self, signals: list[Float]) -> Complex:
+        kept = np.append(0, np.flatnonzero(self.lines))
+        return np.asarray(np.fft.rfft(signals, axis=1)[:, kept] / self.q.size)
+
+    def _forces(self, law: Law, position: float) -> list[Float]:
         x = self.phi * (self.q + position)
         if isinstance(law, Spring):
             return [one.force(x) for one in law.basis()]
@@ -198,32 +215,28 @@ def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omeg
     from scipy.optimize import lsq_linear  # only on use: it takes long to load
 
     linear = [law for law in laws if law.linear]
-    memory = [[part.forces(law, 0.0) if isinstance(law, Joint) else None for law in linear] for part in parts]
     sizes = [np.size(getattr(law, law.linear)) for law in linear]
     ways = [law.free[law.linear] for law in linear]
     least = np.repeat([0.0 if way in (POSITIVE, FROM_ZERO) else -np.inf for way in ways], sizes)
     bounds = np.append(least, [-np.inf, -np.inf]), np.full(least.size + 2, np.inf)
+    left = np.concatenate([part.left for part in parts])
 
-    def solved(position: float) -> tuple[Float, float, list[list[list[Float]]]]:
+    def solved(position: float) -> tuple[Float, float, Float]:
+        """Return the numbers, what they leave, and the mean forces in the first experiment."""
         forces = [
-            [held if held is not None else part.forces(law, position) for law, held in zip(linear, kept, strict=True)]
-            for part, kept in zip(parts, memory, strict=True)
+            part.phi * np.concatenate([part.own[:0], *(part.columns(law, position) for law in linear)])
+            for part in parts
         ]
-        rows = [
-            np.fft.rfft([*(part.phi * f for of in by_law for f in of), part.q, part.rate], axis=1)[:, part.lines].T
-            / part.q.size
-            for part, by_law in zip(parts, forces, strict=True)
-        ]
-        columns, left = np.concatenate(rows), np.concatenate([part.left for part in parts])
+        rows = [np.concatenate([of, part.own])[:, 1:].T for part, of in zip(parts, forces, strict=True)]
+        columns = np.concatenate(rows)
         a, y = np.concatenate([columns.real, columns.imag]), np.concatenate([left.real, left.imag])
         scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
         numbers = lsq_linear(a / scale, y, bounds=bounds, method="bvls").x / scale
-        return numbers, float(np.linalg.norm(a @ numbers - y)), forces
+        return numbers, float(np.linalg.norm(a @ numbers - y)), forces[0][:, 0].real
 
     def unbalanced(position: float) -> float:
-        numbers, _, forces = solved(position)
-        means = [np.mean(f) for of in forces[0] for f in of]
-        return float(parts[0].phi * np.dot(means, numbers[:-2]) + (omega**2 + numbers[-2]) * position)
+        numbers, _, means = solved(position)
+        return float(means @ numbers[:-2] + (omega**2 + numbers[-2]) * position)
 
     still = not any(isinstance(law, Spring) for law in linear)
     numbers, residual, _ = solved(0.0 if still else _root(unbalanced, places))
