@@ -32,8 +32,9 @@ _LEAST_STIFFNESS, _LEAST_DAMPING = 0.25, 0.2
 """What the initial element leaves of stiffness and damping of its mode."""
 _TINY = 1e-6
 """Initial value (N) of a positive number that the regression finds to be zero."""
-_HIGHEST_RESIDUAL = 0.35
-"""Highest frequency of the residual's mode, relative to the rate of the steps: modes far above the band may have none."""
+_HIGHEST_RESIDUAL, _OF_STEPS = 0.6, 0.35
+"""Highest frequency of the residual's mode, relative to the sample rate and to the rate of the steps. Modes far above the band
+may have none. A lower mode with the same static receptance has a larger mass, with which an exciter is simulated more easily."""
 
 
 def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> StructuredModel:
@@ -49,7 +50,7 @@ def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> Stru
     frequency, damping = np.asarray(modes.frequency_hz), np.asarray(modes.damping_ratio)
     inputs, outputs = shapes[drive], shapes[rows]
     if upper[drive] > 0.0:  # receptance upper = b c / w^2
-        upper_hz = min(float(modes.upper_hz), _HIGHEST_RESIDUAL * experiment.sample_rate_hz * steps)
+        upper_hz = min(float(modes.upper_hz), min(_HIGHEST_RESIDUAL, _OF_STEPS * steps) * experiment.sample_rate_hz)
         omega = 2.0 * np.pi * upper_hz
         at_drive = omega * np.sqrt(upper[drive])
         frequency, damping = np.append(frequency, upper_hz), np.append(damping, _RESIDUAL_DAMPING)
