@@ -101,8 +101,10 @@ class _Steps:
         if damping not in self._known:
             count = self._scale.size
             matrix = np.concatenate([self._jacobian, np.sqrt(damping) * np.eye(count)])
-            bounds = tuple((bound - self._vector) * self._scale for bound in self._bounds)
-            step = lsq_linear(matrix, np.concatenate([-self._residual, np.zeros(count)]), bounds, method="bvls").x
+            least, largest = ((bound - self._vector) * self._scale for bound in self._bounds)
+            step = lsq_linear(
+                matrix, np.concatenate([-self._residual, np.zeros(count)]), (least, largest), method="bvls"
+            ).x
             left = self._residual + self._jacobian @ step
             self._known[damping] = step, self.before - float(left @ left)
         return self._known[damping]

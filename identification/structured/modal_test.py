@@ -58,7 +58,7 @@ class ModalTest:
 
     def left(self, vector: Float) -> Float:
         """Return the residuals alone."""
-        return (self._seen(self._parameters.model(vector)) - self._expected) / self.std
+        return np.asarray((self._seen(self._parameters.model(vector)) - self._expected) / self.std)
 
     def _change(self, vector: Float, number: int, centre: float, step: float) -> Float:
         less, more = vector.copy(), vector.copy()

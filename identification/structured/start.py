@@ -34,7 +34,8 @@ _TINY = 1e-6
 """Initial value (N) of a positive number that the regression finds to be zero."""
 _HIGHEST_RESIDUAL, _OF_STEPS = 0.6, 0.35
 """Highest frequency of the residual's mode, relative to the sample rate and to the rate of the steps. Modes far above the band
-may have none. A lower mode with the same static receptance has a larger mass, with which an exciter is simulated more easily."""
+may have none. A lower mode with the same static receptance has a larger mass, and an exciter is simulated more easily with it.
+"""
 
 
 def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> StructuredModel:
