@@ -19,11 +19,11 @@ from identification.pnlss.fitting.threads import threads
 from identification.structured.element_trials import ElementTrial
 from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
-from identification.structured.leading import Lead, with_velocity
+from identification.structured.leading import Lead
 from identification.structured.levenberg_marquardt import minimum
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.modal_test import ModalTest
-from identification.structured.model import LEAD, StructuredModel
+from identification.structured.model import LEAD, StructuredModel, ends_of_steps
 from identification.structured.parameters import HIGHEST, Parameters
 from identification.structured.start import linear_start, with_element
 from vibrolock.results import Result
@@ -233,7 +233,7 @@ def _fitted(
             Lead(
                 2.0 * LEAD * linear.omega * measured,
                 2.0 * ratio * linear.omega * measured,
-                with_velocity(e.inputs, measured_velocity(linear, e, int(measured.sum())), begun.steps),
+                ends_of_steps(np.vstack([e.inputs, measured_velocity(linear, e, int(measured.sum()))]), begun.steps),
                 e.counted_from - count * e.period_samples,
                 e.period_samples,
             )

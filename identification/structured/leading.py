@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.structured.held_support import held, periods_of
-from identification.structured.model import ends_of_steps
 from identification.structured.steps import System, led
 
-__all__ = ["Lead", "not_led", "with_velocity"]
+__all__ = ["Lead", "not_led"]
 
 Float = NDArray[np.float64]
 
@@ -28,7 +27,7 @@ class Lead:
     before, rate
         float[n_modes], rates up to sample ``until`` and from there on, rad/s; 0 for a mode that is not led.
     ends
-        float[n steps + 1, n_inputs + n_modes], inputs and measured modal velocities at the ends of all steps (`with_velocity`).
+        float[n steps + 1, n_inputs + n_modes], inputs and measured modal velocities at the ends of all steps.
     until
         Number of samples that are led at the rate ``before``.
     period
@@ -46,11 +45,6 @@ class Lead:
         systems = [held(led(system, self.before)), held(led(system, self.rate))]
         ends = zip(systems, (0, self.until), (self.until, samples), strict=True)
         return [(one, *at) for one, a, b in ends for at in periods_of(a, b, self.until, self.period)]
-
-
-def with_velocity(inputs: Float, velocity: Float, steps: int) -> Float:
-    """Return inputs, [n_inputs, n], and velocities that lead, [n_modes, n], at the ends of steps."""
-    return np.ascontiguousarray(np.hstack([ends_of_steps(inputs, steps), ends_of_steps(velocity, steps)]))
 
 
 def not_led(derivatives: Float, system: System, rate: Float) -> Float:

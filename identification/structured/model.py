@@ -240,7 +240,7 @@ class StructuredModel(Result):
         longer, until = prolonged(experiment, added), experiment.counted_from
         rate = 2.0 * LEAD * self.omega * (np.arange(modes) < told)
         velocity, free = measured_velocity(self, longer, told), held(self.system)
-        ends = np.hstack([ends_of_steps(longer.inputs, self.steps), ends_of_steps(velocity, self.steps)])
+        ends = ends_of_steps(np.vstack([longer.inputs, velocity]), self.steps)
         stretches = [
             (system, first, last)
             for system, begin, end in (
@@ -249,7 +249,7 @@ class StructuredModel(Result):
             )
             for first, last in periods_of(begin, end, until, experiment.period_samples)
         ]
-        run_of = self.run(stretches, longer.inputs, np.ascontiguousarray(ends), longer.counted_from)
+        run_of = self.run(stretches, longer.inputs, ends, longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         names = ("outputs", "displacement", "velocity", "acceleration")
         return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})
