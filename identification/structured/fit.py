@@ -20,7 +20,7 @@ from identification.structured.element_trials import ElementTrial
 from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
-from identification.structured.levenberg_marquardt import minimum
+from identification.structured.levenberg_marquardt import minimum, triangle_of
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.modal_test import ModalTest
 from identification.structured.model import LEAD, StructuredModel, ends_of_steps
@@ -172,7 +172,8 @@ def fit_structured(
         if found.elements or plan.between:
             start = with_further_element(found, experiments, led, plan, reach)
         else:
-            start = with_element(found, experiments, led, plan.laws, reach)
+            with threads():  # its matrices are too small to share
+                start = with_element(found, experiments, led, plan.laws, reach)
         fitted = _fitted(start, linear, modes, experiments, led, support is True)
         evaluations += fitted.evaluations
         trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
@@ -293,10 +294,11 @@ class _Problem:
         if self._known is None or self._known[0] != vector.tobytes():
             model = self.parameters.model(vector)
             with threads() as count, ThreadPoolExecutor(count) as pool:
-                parts = list(pool.map(partial(self._of_one, model), self.experiments, self.leads))
+                found = pool.map(partial(self._of_one, model), self.experiments, self.leads)
+                self._tested = self._test.rows(vector)  # meanwhile: compiled runs leave the interpreter free
+                parts = list(found)
             self._parts = parts
-            self._tested = self._test.rows(vector)
-            self._known = vector.tobytes(), _triangle(np.concatenate([*parts, self._misfit * self._tested]))
+            self._known = vector.tobytes(), triangle_of(np.concatenate([*parts, self._misfit * self._tested]))
             self.error = float(np.sqrt(sum(part[:, -1] @ part[:, -1] for part in parts) / self.count))
         return self._known[1]
 
@@ -320,7 +322,7 @@ class _Problem:
         found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, lead)
         residual = (found - experiment.counted_outputs.T)[..., None]
         both = np.concatenate([derivatives, residual], axis=2) * weight[:, None]
-        return _triangle(both.reshape(-1, both.shape[2]))
+        return triangle_of(both.reshape(-1, both.shape[2]))
 
     def _cost(self, vector: Float) -> float:
         """Return the sum of squares."""
@@ -339,8 +341,3 @@ class _Problem:
         found = minimum(self.triangle, self._cost, vector, self.parameters.bounds(vector), tolerance, _EVALUATIONS)
         self.stopped = found.stopped
         return found.vector, found.evaluations
-
-
-def _triangle(matrix: Float) -> Float:
-    """Return the triangle of the QR decomposition."""
-    return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)

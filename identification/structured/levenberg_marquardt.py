@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Minimum", "minimum"]
+__all__ = ["Minimum", "minimum", "triangle_of"]
 
 Float = NDArray[np.float64]
 
@@ -68,6 +68,11 @@ def minimum(
         if max(before - best.cost, best.promised) <= tolerance * before:
             return Minimum(vector, count, f"the last iteration gained less than {tolerance:g}")
     return Minimum(vector, evaluations, f"stopped at its limit of {evaluations} iterations")
+
+
+def triangle_of(matrix: Float) -> Float:
+    """Return the triangle of the QR decomposition: columns with the same norms and scalar products."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
 
 
 class _Trial(NamedTuple):

@@ -336,6 +336,7 @@ def room_for(system: System, columns: int = 0) -> Room:
         coupling=np.zeros((elements, elements)),
         change=np.zeros((elements, 1)),
         row=np.zeros(columns),
+        pull=np.zeros(columns),
         stuck=np.zeros(len(system.tables.sliders)),
         unsolved=np.zeros(1, dtype=np.int64),
     )

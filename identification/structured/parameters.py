@@ -9,7 +9,7 @@ from identification.structured.elements import NonlinearElement, changes_of, law
 from identification.structured.held_support import renew
 from identification.structured.leading import Lead, not_led
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
-from identification.structured.sensitivities import run_with_sensitivities
+from identification.structured.sensitivities import Sensitivities, run_with_sensitivities
 from identification.structured.steps import System
 
 __all__ = ["HIGHEST", "Parameters"]
@@ -174,7 +174,7 @@ class Parameters:
         count += -count % _VECTOR  # columns of zeros before the last
         states = np.zeros((u.shape[1], 3, modes))
         raw = np.zeros((u.shape[1] - counted_from, len(model.outputs), count))
-        state, sens = np.zeros(system.size), np.zeros((system.size, count))
+        state, sens = np.zeros(system.size), Sensitivities.of_rest(system, count)
         for part, first, last in stretches:
             run_with_sensitivities(
                 part,
@@ -192,9 +192,10 @@ class Parameters:
                 raw,
             )
             if lead is not None and last == lead.until:
-                sens = not_led(sens, system, lead.before - lead.rate)  # what follows is led at the second rate
+                more = lead.before - lead.rate  # what follows is led at the second rate
+                sens = sens._replace(rows=not_led(sens.rows, system, more), sums=not_led(sens.sums, system, more))
             if lead is not None:
-                renew(part, (last - first) / model.sample_rate_hz, state, sens)
+                renew(part, (last - first) / model.sample_rate_hz, state, sens.rows)
         if lead is not None:
             raw = not_led(raw, system, lead.rate)
         found = outputs_of(model, u, states)[:, counted_from:].T

@@ -1,6 +1,7 @@
 """Compiled run of a structured model with the exact derivatives of its outputs, forward in time."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,31 @@ from identification.structured.steps import (
 )
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["run_with_sensitivities"]
+__all__ = ["Sensitivities", "run_with_sensitivities"]
+
+
+class Sensitivities(NamedTuple):
+    """Derivatives of a state by P parameters.
+
+    A slider that sticks has the derivatives of its stiffness times the displacement of its element, plus a row that stays while
+    it sticks. Steps therefore change the rows of sliders only where one begins to stick or to slip.
+    """
+
+    rows: np.ndarray
+    """float[`System.size`, P]: derivatives of the state; of a slider that sticks, those less stiffness times displacement."""
+    sums: np.ndarray
+    """float[n_elements, P]: sum of the rows of the sliders of an element that stick."""
+    sticks: np.ndarray
+    """bool[n_sliders]."""
+
+    @classmethod
+    def of_rest(cls, system: System, columns: int) -> "Sensitivities":
+        """Return zeros: a state at rest depends on nothing."""
+        return cls(
+            np.zeros((system.size, columns)),
+            np.zeros((len(system.phi), columns)),
+            np.zeros(len(system.tables.sliders), dtype=np.bool_),
+        )
 
 
 @inner_kernel
@@ -57,15 +82,36 @@ def add_linear(
 
 
 @inner_kernel
-def add_direction(system: System, room: Room, e: int, speed: np.ndarray, place: np.ndarray, rhs: np.ndarray) -> None:
-    """Add the explicit derivatives of an element's force on the modes by its direction."""
+def of_displacement(system: System, room: Room, e: int, place: np.ndarray, sens: np.ndarray) -> None:
+    """Write the derivatives of an element's displacement by the parameters into ``room.row``."""
     n = place.size
+    begin = 2 * n + n * system.inputs + e * n
+    clear(room.row)
+    for i in range(n):
+        add(room.row, system.phi[e, i], sens[i])
+        room.row[begin + i] += place[i]
+
+
+@inner_kernel
+def add_direction(system: System, room: Room, e: int, speed: np.ndarray, rhs: np.ndarray) -> None:
+    """Add the derivatives of an element's force on the modes by its direction, except those by its displacement."""
+    n = speed.size
     begin = 2 * n + n * system.inputs + e * n
     for k in range(n):
         rhs[k, begin + k] -= room.forces[e, 0]
-        change = room.forces[e, 1] * place[k] + room.forces[e, 2] * speed[k]
         for i in range(n):
-            rhs[i, begin + k] -= system.phi[e, i] * change
+            rhs[i, begin + k] -= system.phi[e, i] * room.forces[e, 2] * speed[k]
+
+
+@inner_kernel
+def add_sliders(system: System, room: Room, e: int, derivatives: Sensitivities) -> None:
+    """Add the derivatives of the forces of an element's sliders to ``room.pull``, from ``room.row``, those of its displacement."""
+    tables, stiffness = system.tables, 0.0
+    for s in range(tables.first[e], tables.first[e + 1]):
+        if derivatives.sticks[s]:
+            stiffness += tables.sliders[s, 0]
+    add(room.pull, stiffness, room.row)
+    add(room.pull, 1.0, derivatives.sums[e])
 
 
 @inner_kernel
@@ -74,10 +120,11 @@ def of_acceleration(
     room: Room,
     changes: Changes,
     state: np.ndarray,
-    sens: np.ndarray,
+    derivatives: Sensitivities,
     rhs: np.ndarray,
 ) -> None:
     """Write the derivatives of the accelerations at a sample by the parameters."""
+    sens = derivatives.rows
     n, columns, tables = system.omega.size, sens.shape[1], system.tables
     q, v = state[:n], state[n : 2 * n]
     for i in range(n):
@@ -86,15 +133,18 @@ def of_acceleration(
             rhs[i, c] = -2.0 * system.zeta[i] * omega * sens[n + i, c] - omega * omega * sens[i, c]
     add_linear(system, room, v, q, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        clear(room.row)
+        of_displacement(system, room, e, q, sens)
+        clear(room.pull)
+        add(room.pull, room.forces[e, 1], room.row)
         for i in range(n):
-            add(room.row, system.phi[e, i] * room.forces[e, 1], sens[i])
-            add(room.row, system.phi[e, i] * room.forces[e, 2], sens[n + i])
+            add(room.pull, system.phi[e, i] * room.forces[e, 2], sens[n + i])
+        add_sliders(system, room, e, derivatives)
         for s in range(tables.first[e], tables.first[e + 1]):
-            add(room.row, 1.0, sens[2 * n + 1 + s])
+            if not derivatives.sticks[s]:
+                add(room.pull, 1.0, sens[2 * n + 1 + s])
         for i in range(n):
-            add(rhs[i], -system.phi[e, i], room.row)
-        add_direction(system, room, e, v, q, rhs)
+            add(rhs[i], -system.phi[e, i], room.pull)
+        add_direction(system, room, e, v, rhs)
     begin, springs, dampers = law_columns(system), changes.springs.shape[0], changes.dampers.shape[0]
     for k in range(springs + dampers):
         e = changes.element[k]
@@ -121,7 +171,7 @@ def of_step(
     changes: Changes,
     state: np.ndarray,
     half: np.ndarray,
-    sens: np.ndarray,
+    derivatives: Sensitivities,
     matrix: np.ndarray,
     rhs: np.ndarray,
 ) -> None:
@@ -129,7 +179,8 @@ def of_step(
 
     ``room.stuck`` gets the share of the step over which each slider sticks.
     """
-    n, columns, h, tables = system.omega.size, sens.shape[1], system.step_s, system.tables
+    sens = derivatives.rows
+    n, columns, h = system.omega.size, sens.shape[1], system.step_s
     q = state[:n]
     for i in range(n):
         half[i] = q[i] + 0.5 * h * room.mean[i]
@@ -140,16 +191,15 @@ def of_step(
         matrix[i, i] = rigidity(system, i)
     add_linear(system, room, room.mean, half, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
-        clear(room.row)
+        of_displacement(system, room, e, q, sens)
+        clear(room.pull)
+        add(room.pull, room.forces[e, 1], room.row)
+        begin_sticking(system, room, e, state, derivatives)
+        add_sliders(system, room, e, derivatives)
+        of_slips(system, room, e, derivatives)
         for i in range(n):
-            add(room.row, system.phi[e, i] * room.forces[e, 1], sens[i])
-        for s in range(tables.first[e], tables.first[e + 1]):
-            at = 2 * n + 1 + s
-            room.stuck[s] = slide(state[at], tables.sliders[s, 0], tables.sliders[s, 1], h * room.w[e])[3]
-            add(room.row, room.stuck[s], sens[at])
-        for i in range(n):
-            add(rhs[i], -system.phi[e, i], room.row)
-        add_direction(system, room, e, room.mean, q, rhs)
+            add(rhs[i], -system.phi[e, i], room.pull)
+        add_direction(system, room, e, room.mean, rhs)
         for i in range(n):
             for k in range(n):
                 matrix[i, k] += room.forces[e, 2] * system.phi[e, i] * system.phi[e, k]
@@ -160,6 +210,34 @@ def of_step(
         for i in range(n):
             rhs[i, begin + k] -= system.phi[e, i] * change
     solve(matrix, rhs, n, columns)
+
+
+@inner_kernel
+def begin_sticking(system: System, room: Room, e: int, state: np.ndarray, derivatives: Sensitivities) -> None:
+    """Write the share of the step over which each slider of an element sticks; those that begin to stick get their rows."""
+    n, tables = system.omega.size, system.tables
+    for s in range(tables.first[e], tables.first[e + 1]):
+        at = 2 * n + 1 + s
+        stiffness = tables.sliders[s, 0]
+        room.stuck[s] = slide(state[at], stiffness, tables.sliders[s, 1], system.step_s * room.w[e])[3]
+        if room.stuck[s] > 0.0 and not derivatives.sticks[s]:
+            add(derivatives.rows[at], -stiffness, room.row)
+            add(derivatives.sums[e], 1.0, derivatives.rows[at])
+            derivatives.sticks[s] = True
+
+
+@inner_kernel
+def of_slips(system: System, room: Room, e: int, derivatives: Sensitivities) -> None:
+    """Take what sliders lose that slip in this step from the derivatives of their forces, and end their sticking."""
+    n, tables = system.omega.size, system.tables
+    for s in range(tables.first[e], tables.first[e + 1]):
+        if derivatives.sticks[s] and room.stuck[s] < 1.0:
+            own = derivatives.rows[2 * n + 1 + s]
+            add(room.pull, (room.stuck[s] - 1.0) * tables.sliders[s, 0], room.row)
+            add(room.pull, room.stuck[s] - 1.0, own)
+            add(derivatives.sums[e], -1.0, own)
+            clear(own)
+            derivatives.sticks[s] = False
 
 
 @inner_kernel
@@ -185,31 +263,20 @@ def of_law(system: System, room: Room, changes: Changes, state: np.ndarray, k: i
 
 
 @inner_kernel
-def end_sliders(system: System, room: Room, changes: Changes, sens: np.ndarray, rhs: np.ndarray) -> None:
-    """Take the sensitivities of the sliders to the end of the step."""
-    n, h, tables = system.omega.size, system.step_s, system.tables
-    inputs, begin = system.inputs, law_columns(system)
+def end_sliders(system: System, room: Room, changes: Changes, derivatives: Sensitivities) -> None:
+    """Take the derivatives of the sliders by the numbers of their joints to the end of the step."""
+    n = system.omega.size
     joints = changes.springs.shape[0] + changes.dampers.shape[0]
-    for e in range(system.phi.shape[0]):
-        if tables.first[e] == tables.first[e + 1]:
-            continue
-        direction = 2 * n + n * inputs + e * n
-        clear(room.row)
-        for i in range(n):
-            add(room.row, h * system.phi[e, i], rhs[i])
-        for i in range(n):
-            room.row[direction + i] += h * room.mean[i]
-        for s in range(tables.first[e], tables.first[e + 1]):
-            at = 2 * n + 1 + s
-            if room.stuck[s] == 1.0:
-                add(sens[at], tables.sliders[s, 0], room.row)
-            else:
-                clear(sens[at])
     for k in range(changes.sliders.shape[0]):
-        way = h * room.w[changes.element[joints + k]]
+        e, column = changes.element[joints + k], law_columns(system) + joints + k
+        way = system.step_s * room.w[e]
         for s in range(changes.first[k], changes.last[k]):
-            by, at = changes.sliders[k, s], 2 * n + 1 + s
-            sens[at, begin + joints + k] += way * by[0] if room.stuck[s] == 1.0 else math.copysign(1.0, way) * by[1]
+            by, own = changes.sliders[k, s], derivatives.rows[2 * n + 1 + s]
+            if derivatives.sticks[s]:
+                own[column] += way * by[0]
+                derivatives.sums[e, column] += way * by[0]
+            else:
+                own[column] = math.copysign(1.0, way) * by[1]
 
 
 @inner_kernel
@@ -251,7 +318,7 @@ def run_with_sensitivities(
     outputs: np.ndarray,
     motions: np.ndarray,
     counted_from: int,
-    sens: np.ndarray,
+    derivatives: Sensitivities,
     matrix: np.ndarray,
     rhs: np.ndarray,
     jacobian: np.ndarray,
@@ -259,12 +326,13 @@ def run_with_sensitivities(
     """As `run`, and write the derivatives of ``outputs . motion`` by the parameters from sample ``counted_from``.
 
     Parameters, in this order: omega, zeta, b of the model's inputs (row by row), phi (row by row), the numbers of the laws as
-    in `Changes`, zeros if there is room, the support's stiffness. ``sens``: [`System.size`, P], that of the state.
+    in `Changes`, zeros if there is room, the support's stiffness. ``derivatives``: those of the state.
     ``motions``: 0, 1, 2 for displacement, velocity, acceleration. ``matrix``: room, [n + 1, n]. ``rhs``: room, [n, P].
     ``jacobian``: [N - counted_from, n_outputs, P], zero at first.
     """
     n = system.omega.size
     q, v, r, half = state[:n], state[n : 2 * n], state[2 * n + 1 :], matrix[n]
+    sens = derivatives.rows
     for sample in range(states.shape[0]):
         first = sample * system.steps
         take_input(system, room, u, first, first, state[2 * n])
@@ -272,7 +340,7 @@ def run_with_sensitivities(
         for i in range(n):
             states[sample, 0, i], states[sample, 1, i] = q[i], v[i]
         if sample >= counted_from:
-            of_acceleration(system, room, changes, state, sens, rhs)
+            of_acceleration(system, room, changes, state, derivatives, rhs)
             for o in range(outputs.shape[0]):
                 out = jacobian[sample - counted_from, o]  # zero so far
                 for i in range(n):
@@ -280,7 +348,7 @@ def run_with_sensitivities(
         for row in range(first, first + system.steps):
             take_input(system, room, u, row, row + 1, state[2 * n])
             take_step(system, room, q, v, r)
-            of_step(system, room, changes, state, half, sens, matrix, rhs)
-            end_sliders(system, room, changes, sens, rhs)
+            of_step(system, room, changes, state, half, derivatives, matrix, rhs)
+            end_sliders(system, room, changes, derivatives)
             end_sensitivities(system, half, sens, rhs, room.row)
             end_step(system, room, q, v, state)

@@ -15,6 +15,7 @@ from identification.pnlss.experiment import Experiment
 from identification.structured.elements import NonlinearElement
 from identification.structured.kernels import slide_along
 from identification.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, Law, Spring
+from identification.structured.levenberg_marquardt import triangle_of
 from identification.structured.modal_motion import LOWEST, modal_spectra
 from identification.structured.model import StructuredModel
 
@@ -231,7 +232,9 @@ def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omeg
         ]
         rows = [np.concatenate([of, part.own])[:, 1:].T for part, of in zip(parts, forces, strict=True)]
         columns = np.concatenate(rows)
-        a, y = np.concatenate([columns.real, columns.imag]), np.concatenate([left.real, left.imag])
+        both = np.column_stack([columns, left])
+        triangle = triangle_of(np.concatenate([both.real, both.imag]))  # the same norms, in few rows
+        a, y = triangle[:, :-1], triangle[:, -1]
         scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
         numbers = lsq_linear(a / scale, y, bounds=bounds, method="bvls").x / scale
         return numbers, float(np.linalg.norm(a @ numbers - y)), forces[0][:, 0].real

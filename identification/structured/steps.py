@@ -36,7 +36,7 @@ __all__ = [
 
 NEWTON = 60  # iterations at most; a step that is not solved by then is counted
 CAREFUL = 12  # iterations with whole steps; those after them are halved
-EXACT = 1e-13  # change of w that ends Newton's iteration, relative to the velocities that it is made of
+CLOSE = 1e-7  # change of w that ends Newton's iteration, relative to the velocities it is made of: its square is left
 SMALL = 0.01  # weight of displacement over step among them
 
 
@@ -83,7 +83,8 @@ class Room(NamedTuple):
     coupling: np.ndarray
     change: np.ndarray
     row: np.ndarray
-    """float[P]: of the sensitivities."""
+    pull: np.ndarray
+    """float[P] each: of the sensitivities."""
     stuck: np.ndarray
     """float[n_sliders]: share of a step over which each sticks, of the sensitivities."""
     unsolved: np.ndarray
@@ -154,7 +155,6 @@ def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.nd
     if not solved:
         room.unsolved[0] += 1
     for e in range(elements):
-        evaluate(system, room, q, r, e)
         for i in range(q.size):
             room.mean[i] -= system.phi[e, i] * room.forces[e, 0] / rigidity(system, i)
 
@@ -174,7 +174,7 @@ def evaluate(system: System, room: Room, q: np.ndarray, r: np.ndarray, e: int) -
 
 @inner_kernel
 def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: float) -> bool:
-    """Correct the mean velocities of all elements once; return whether they do not change any more."""
+    """Correct mean velocities of all elements once, and their forces along the tangents; return whether the change is small."""
     elements = room.w.size
     for e in range(elements):
         evaluate(system, room, q, r, e)
@@ -191,10 +191,11 @@ def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: floa
     done = True
     for e in range(elements):
         room.w[e] += share * room.change[e, 0]
+        room.forces[e, 0] += share * room.change[e, 0] * room.forces[e, 2]
         size = abs(room.w[e])
         for i in range(q.size):
             size += abs(system.phi[e, i]) * (abs(room.free[i]) + SMALL * abs(q[i]) / system.step_s)
-        if abs(room.change[e, 0]) > EXACT * size + 1e-300:
+        if abs(room.change[e, 0]) > CLOSE * size + 1e-300:
             done = False
     return done
 
