@@ -20,8 +20,8 @@ HIGHEST = 0.45
 """Largest frequency of a mode times the length of a step."""
 _NEAR = float(np.log(2.0))
 """Logarithm of the factor within which a frequency stays."""
-_VECTOR = 16
-"""Compiled loops over columns take so many at once; those that are left they take one by one, which is ten times as slow."""
+_VECTOR = 4
+"""Compiled loops over columns take so many at once, or multiples; those that are left they take one by one."""
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-5, 0.5
 
 

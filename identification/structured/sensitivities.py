@@ -93,19 +93,20 @@ def of_displacement(system: System, room: Room, e: int, place: np.ndarray, sens:
 
 
 @inner_kernel
-def add_direction(system: System, room: Room, e: int, speed: np.ndarray, rhs: np.ndarray) -> None:
-    """Add the derivatives of an element's force on the modes by its direction, except those by its displacement."""
+def add_pull(system: System, room: Room, e: int, speed: np.ndarray, rhs: np.ndarray) -> None:
+    """Add the derivatives of an element's force on the modes, whose size has the derivatives ``room.pull``."""
     n = speed.size
     begin = 2 * n + n * system.inputs + e * n
     for k in range(n):
+        room.pull[begin + k] += room.forces[e, 2] * speed[k]
         rhs[k, begin + k] -= room.forces[e, 0]
-        for i in range(n):
-            rhs[i, begin + k] -= system.phi[e, i] * room.forces[e, 2] * speed[k]
+    for i in range(n):
+        add(rhs[i], -system.phi[e, i], room.pull)
 
 
 @inner_kernel
 def add_sliders(system: System, room: Room, e: int, derivatives: Sensitivities) -> None:
-    """Add the derivatives of the forces of an element's sliders to ``room.pull``, from ``room.row``, those of its displacement."""
+    """Add the derivatives of the forces of an element's sliders to ``room.pull``; ``room.row``: of its displacement."""
     tables, stiffness = system.tables, 0.0
     for s in range(tables.first[e], tables.first[e + 1]):
         if derivatives.sticks[s]:
@@ -142,19 +143,22 @@ def of_acceleration(
         for s in range(tables.first[e], tables.first[e + 1]):
             if not derivatives.sticks[s]:
                 add(room.pull, 1.0, sens[2 * n + 1 + s])
-        for i in range(n):
-            add(rhs[i], -system.phi[e, i], room.pull)
-        add_direction(system, room, e, v, rhs)
+        add_laws_at(system, room, changes, e, q, v)
+        add_pull(system, room, e, v, rhs)
+
+
+@inner_kernel
+def add_laws_at(system: System, room: Room, changes: Changes, e: int, q: np.ndarray, v: np.ndarray) -> None:
+    """Add the derivatives of an element's force at a sample by the numbers of its springs and dampers to ``room.pull``."""
     begin, springs, dampers = law_columns(system), changes.springs.shape[0], changes.dampers.shape[0]
+    x, rate = along(q, system.phi[e]), along(v, system.phi[e])
     for k in range(springs + dampers):
-        e = changes.element[k]
-        x = along(q, system.phi[e])
+        if changes.element[k] != e:
+            continue
         if k < springs:
-            change = spring_at(x, changes.springs[k], changes.limits[k])[0]
+            room.pull[begin + k] += spring_at(x, changes.springs[k], changes.limits[k])[0]
         else:
-            change = damping_at(x, changes.dampers[k - springs], tables.limits[e, 0])[0] * along(v, system.phi[e])
-        for i in range(n):
-            rhs[i, begin + k] -= system.phi[e, i] * change
+            room.pull[begin + k] += damping_at(x, changes.dampers[k - springs], system.tables.limits[e, 0])[0] * rate
 
 
 @inner_kernel
@@ -197,18 +201,11 @@ def of_step(
         begin_sticking(system, room, e, state, derivatives)
         add_sliders(system, room, e, derivatives)
         of_slips(system, room, e, derivatives)
-        for i in range(n):
-            add(rhs[i], -system.phi[e, i], room.pull)
-        add_direction(system, room, e, room.mean, rhs)
+        add_laws(system, room, changes, e, along(q, system.phi[e]))
+        add_pull(system, room, e, room.mean, rhs)
         for i in range(n):
             for k in range(n):
                 matrix[i, k] += room.forces[e, 2] * system.phi[e, i] * system.phi[e, k]
-    begin = law_columns(system)
-    for k in range(changes.element.size):
-        e = changes.element[k]
-        change = of_law(system, room, changes, state, k)
-        for i in range(n):
-            rhs[i, begin + k] -= system.phi[e, i] * change
     solve(matrix, rhs, n, columns)
 
 
@@ -241,25 +238,26 @@ def of_slips(system: System, room: Room, e: int, derivatives: Sensitivities) -> 
 
 
 @inner_kernel
-def of_law(system: System, room: Room, changes: Changes, state: np.ndarray, k: int) -> float:
-    """Return the derivative of an element's mean force over a step by the number ``k`` of the laws."""
-    n, tables, e = system.omega.size, system.tables, changes.element[k]
-    way = system.step_s * room.w[e]
+def add_laws(system: System, room: Room, changes: Changes, e: int, x: float) -> None:
+    """Add the derivatives of an element's mean force over a step from ``x`` by the numbers of its laws to ``room.pull``."""
+    begin, way, reach = law_columns(system), system.step_s * room.w[e], system.tables.limits[e, 0]
     springs, dampers = changes.springs.shape[0], changes.dampers.shape[0]
-    if k < springs + dampers:
-        x = along(state[:n], system.phi[e])
+    for k in range(springs + dampers):
+        if changes.element[k] != e:
+            continue
         if k < springs:
-            return float(mean_spring(x, way, changes.springs[k], changes.limits[k])[0])
-        row = changes.dampers[k - springs]
-        return float(damping_at(x + 0.5 * way, row, tables.limits[e, 0])[0] * room.w[e])
-    total, sign, joint = 0.0, math.copysign(1.0, way), k - springs - dampers
-    for s in range(changes.first[joint], changes.last[joint]):
-        by, share = changes.sliders[joint, s], room.stuck[s]
-        if share == 1.0:
-            total += 0.5 * way * by[0]
+            room.pull[begin + k] += mean_spring(x, way, changes.springs[k], changes.limits[k])[0]
         else:
+            room.pull[begin + k] += damping_at(x + 0.5 * way, changes.dampers[k - springs], reach)[0] * room.w[e]
+    begin, sign = begin + springs + dampers, math.copysign(1.0, way)
+    for k in range(changes.sliders.shape[0]):
+        if changes.element[springs + dampers + k] != e:
+            continue
+        total = 0.0
+        for s in range(changes.first[k], changes.last[k]):
+            by, share = changes.sliders[k, s], room.stuck[s]
             total += sign * (1.0 - share) * by[1] + 0.5 * share * share * way * by[0]
-    return total
+        room.pull[begin + k] += total
 
 
 @inner_kernel
