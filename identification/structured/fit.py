@@ -23,7 +23,7 @@ from identification.structured.leading import Lead
 from identification.structured.levenberg_marquardt import minimum, triangle_of
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.modal_test import ModalTest
-from identification.structured.model import LEAD, StructuredModel, ends_of_steps
+from identification.structured.model import LEAD, StructuredModel
 from identification.structured.parameters import HIGHEST, Parameters
 from identification.structured.start import linear_start, with_element
 from vibrolock.results import Result
@@ -74,7 +74,7 @@ class StructuredFit(Result):
         float[P], the free numbers.
     covariance
         float[P, P], of the free numbers, as if the residual of each experiment were white: a misfit that repeats makes it too
-        small. What the steps of the simulation get wrong is not in it.
+        small. What the steps of the simulation get wrong is in it, as one error that all numbers share.
     training_error
         RMS of the residual over that of the outputs, every output relative to its own RMS.
     evaluations, seconds
@@ -234,7 +234,8 @@ def _fitted(
             Lead(
                 2.0 * LEAD * linear.omega * measured,
                 2.0 * ratio * linear.omega * measured,
-                ends_of_steps(np.vstack([e.inputs, measured_velocity(linear, e, int(measured.sum()))]), begun.steps),
+                np.vstack([e.inputs, measured_velocity(linear, e, int(measured.sum()))]),
+                begun.steps,
                 e.counted_from - count * e.period_samples,
                 e.period_samples,
             )
@@ -305,8 +306,9 @@ class _Problem:
     def covariance(self, vector: Float) -> Float:
         """float[P, P]: covariance of the numbers, as if the residual of each experiment were white, with a size of its own.
 
-        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment.
+        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment, and `_of_steps`.
         """
+        of_steps = self._of_steps(vector)
         jacobian = self.triangle(vector)[:, :-1]
         inverse = np.linalg.pinv(jacobian.T @ jacobian)
         freedom = max(1.0 - vector.size / self.count, 0.5)
@@ -315,12 +317,36 @@ class _Problem:
         for part, one in zip(self._parts, self.experiments, strict=True):
             variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
             middle = middle + variance * part[:, :-1].T @ part[:, :-1]
-        return np.asarray(inverse @ middle @ inverse / freedom)
+        return np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
 
-    def _of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
+    def _of_steps(self, vector: Float) -> Float:
+        """float[P]: how far the steps of the simulation move the numbers, to first order.
+
+        Errors of the outputs fall with the square of the step: two runs give what infinitely many steps would (Richardson).
+        """
+        model = self.parameters.model(vector)
+        with threads() as count, ThreadPoolExecutor(count) as pool:
+            parts = list(pool.map(partial(self._against_finer, model), self.experiments, self.leads))
+        expected = self._test.rows(vector)
+        expected[:, -1] = 0.0
+        rows = np.concatenate([*parts, self._misfit * expected])
+        return np.asarray(np.linalg.lstsq(rows[:, :-1], -rows[:, -1])[0])
+
+    def _against_finer(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
+        u, begin = experiment.inputs, experiment.counted_from
+        finer = None if lead is None else replace(lead, steps=2 * lead.steps)
+        fine = self.parameters.outputs(model.with_steps(2 * model.steps), u, begin, finer)
+        return self._of_one(
+            model, experiment, lead, (4.0 * fine - self.parameters.outputs(model, u, begin, lead)) / 3.0
+        )
+
+    def _of_one(
+        self, model: StructuredModel, experiment: Experiment, lead: Lead | None, outputs: Float | None = None
+    ) -> Float:
+        """Return the triangle of one experiment, against other outputs than its own if they are given."""
         weight = np.sqrt(experiment.weight) / self._scale
         found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, lead)
-        residual = (found - experiment.counted_outputs.T)[..., None]
+        residual = (found - (experiment.counted_outputs.T if outputs is None else outputs))[..., None]
         both = np.concatenate([derivatives, residual], axis=2) * weight[:, None]
         return triangle_of(both.reshape(-1, both.shape[2]))
 

@@ -6,11 +6,13 @@ as ``1 / rate``. A fit begins with a fast rate and ends without any.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.structured.held_support import held, periods_of
+from identification.structured.model import ends_of_steps
 from identification.structured.steps import System, led
 
 __all__ = ["Lead", "not_led"]
@@ -26,8 +28,10 @@ class Lead:
     ----------
     before, rate
         float[n_modes], rates up to sample ``until`` and from there on, rad/s; 0 for a mode that is not led.
-    ends
-        float[n steps + 1, n_inputs + n_modes], inputs and measured modal velocities at the ends of all steps.
+    signals
+        float[n_inputs + n_modes, n], inputs and measured modal velocities.
+    steps
+        Steps in a sample.
     until
         Number of samples that are led at the rate ``before``.
     period
@@ -36,9 +40,15 @@ class Lead:
 
     before: Float
     rate: Float
-    ends: Float
+    signals: Float
+    steps: int
     until: int
     period: int
+
+    @cached_property
+    def ends(self) -> Float:
+        """float[n steps + 1, n_inputs + n_modes], the signals at the ends of all steps."""
+        return ends_of_steps(self.signals, self.steps)
 
     def stretches(self, system: System, samples: int) -> list[tuple[System, int, int]]:
         """Return the system that is led, and first and last sample, of every period or part of one."""

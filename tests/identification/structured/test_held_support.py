@@ -6,7 +6,6 @@ import pytest
 from identification.pnlss.experiment import Experiment
 from identification.structured.held_support import periods_of
 from identification.structured.leading import Lead
-from identification.structured.model import ends_of_steps
 from identification.structured.parameters import Parameters
 from tests.identification.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, multisine
 
@@ -48,8 +47,8 @@ def test_derivatives_with_a_held_force_are_those_of_finite_differences():
     parameters = Parameters(start, (0,), True)
     vector, u = parameters.vector(start), np.tile(multisine(1.0, 4, 200), (1, 4))
     velocity = 1e-3 * np.random.default_rng(5).standard_normal((2, u.shape[1]))
-    ends = ends_of_steps(np.vstack([u, velocity]), start.steps)
-    lead = Lead(np.array([3.0, 9.0]), np.array([1.0, 2.0]), ends, until=400, period=200)
+    signals = np.vstack([u, velocity])
+    lead = Lead(np.array([3.0, 9.0]), np.array([1.0, 2.0]), signals, start.steps, until=400, period=200)
     _, exact = parameters.derivatives(parameters.model(vector), u, 600, lead)
     for column, name in enumerate(parameters.names):
         step = 1e-5 * max(abs(vector[column]), 1e-1)
