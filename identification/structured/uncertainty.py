@@ -1,6 +1,6 @@
 """What the covariance of a fit says of anything that its model predicts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from identification.structured.fit import StructuredFit
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
 
-__all__ = ["std_of"]
+__all__ = ["drawn", "std_of"]
 
 Float = NDArray[np.float64]
 
@@ -24,17 +24,35 @@ def std_of(fit: StructuredFit, quantity: Callable[[StructuredModel], Float]) -> 
     Linear in the errors, and as certain as `StructuredFit.covariance`. The steps follow the principal axes of the covariance,
     so that what the data do not tell apart moves together.
     """
-    drive = find_role(fit.start.outputs, "drive")
-    poles = sum(name.startswith("frequency ") for name in fit.names)
-    parameters = Parameters(fit.start, (drive,), "support" in fit.names, poles=poles)
-    size = np.sqrt(np.diag(fit.covariance))
-    unit = np.where(size > 0.0, size, 1.0)
-    values, axes = np.linalg.eigh(fit.covariance / np.outer(unit, unit))
-    parts = []
-    for value, axis in zip(values.tolist(), axes.T, strict=True):
-        if value <= 0.0:
-            continue
-        step = _SHARE * np.sqrt(value) * axis * size
+    parameters, parts = _parameters_of(fit), []
+    for axis in _axes_of(fit):
+        step = _SHARE * axis
         more, less = (quantity(parameters.model(fit.values + sign * step)) for sign in (1.0, -1.0))
         parts.append((more - less) / (2.0 * _SHARE))
     return np.asarray(np.linalg.norm(parts, axis=0))
+
+
+def drawn(fit: StructuredFit, count: int, seed: int = 0) -> Iterator[StructuredModel]:
+    """Yield ``count`` models whose free numbers are drawn about those of a fit, from a normal distribution with its covariance.
+
+    Numbers that leave the bounds of a fit are set to them.
+    """
+    parameters, axes, random = _parameters_of(fit), _axes_of(fit), np.random.default_rng(seed)
+    bounds = parameters.bounds(fit.values)
+    for _ in range(count):
+        yield parameters.model(np.clip(fit.values + random.standard_normal(len(axes)) @ axes, *bounds))
+
+
+def _parameters_of(fit: StructuredFit) -> Parameters:
+    drive = find_role(fit.start.outputs, "drive")
+    poles = sum(name.startswith("frequency ") for name in fit.names)
+    return Parameters(fit.start, (drive,), "support" in fit.names, poles=poles)
+
+
+def _axes_of(fit: StructuredFit) -> Float:
+    """float[k, P]: principal axes of the covariance, each as long as its standard error."""
+    size = np.sqrt(np.diag(fit.covariance))
+    unit = np.where(size > 0.0, size, 1.0)
+    values, axes = np.linalg.eigh(fit.covariance / np.outer(unit, unit))
+    kept = values > 0.0
+    return np.asarray((axes[:, kept] * np.sqrt(values[kept])).T * size)

@@ -65,6 +65,10 @@ def predict_vibrations(model: Path, request: PredictionRequest) -> Predictions:
         raise RecordingError(f"{model}: is a file of kind {kind}; predictions are made with a {', '.join(known)}")
     if request.trust_code and kind not in (STRUCTURED.name, PNLSS.name):
         raise ConfigurationError(f"`trust_code`: means nothing to a {kind}, which names no code; leave it out")
+    if request.bands and kind != STRUCTURED.name:
+        raise ConfigurationError(
+            f"`bands`: are asked of structured models, and {model} is a {kind}; a nonlinear mode has them anyway"
+        )
     for simulated in (PNLSS, STRUCTURED):
         if kind == simulated.name:
             measured_ones = [one for path in request.references for one in _references(path, request)]

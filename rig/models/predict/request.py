@@ -50,6 +50,8 @@ class PredictionRequest:
     back."""
     allow_extrapolation: bool = False
     """Whether to predict beyond twice the largest identified modal amplitude."""
+    bands: bool = False
+    """Whether responses of a structured model get bands from the covariance of its fit."""
     trust_code: bool = False
     """Whether to import the functions that a structured or PNLSS model names."""
 

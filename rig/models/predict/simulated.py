@@ -18,6 +18,7 @@ from identification import (
     StructuredModel,
 )
 from identification.prediction.uncertainty import band_of_responses
+from identification.structured.uncertainty import drawn
 from rig.errors import ConfigurationError
 from rig.models.files.exciter import EXCITER
 from rig.models.files.files import load_as
@@ -36,7 +37,7 @@ from rig.models.predict.simulated_sweeps import planned_simulated_sweeps, record
 __all__ = ["simulated_predictions"]
 
 _DRAWS = 40
-"""Fresh runs of a band."""
+"""Models of a band."""
 
 
 def simulated_predictions(
@@ -68,7 +69,8 @@ def simulated_predictions(
         for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
-    bands = [_band(found, one, fixed) for one, _, _ in steady]
+    others = _others(found, request.bands, path) if steady else []
+    bands = [_band(others, one, fixed) for one, _, _ in steady]
     steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
     models = SimulatedSweepModels(model, exciter, constants)
     swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
@@ -78,7 +80,12 @@ def simulated_predictions(
         more, remarks = planned_multisines(plan, model, exciter, constants)
         runs, said = (*runs, *more), (*said, *remarks)
     if any(bands):
-        said = (*said, "bands and +- of responses: of runs that nobody has measured, by the scatter of the model alone")
+        of = (
+            "the model that was fitted, by the covariance of the fit"
+            if found.scatter is None
+            else "runs that nobody has measured, by the scatter of the model alone"
+        )
+        said = (*said, f"bands and +- of responses: of {of}")
     elif found.scatter is not None:
         said = (
             *said,
@@ -101,17 +108,28 @@ def simulated_predictions(
     )
 
 
-def _band(
-    found: IdentifiedPnlss | IdentifiedStructured, predicted: SteadyPrediction, fixed: Mapping[str, Any]
-) -> ResponseBand | None:
-    """Return the band of a response over fresh runs; None for a model without scatter, or if most have no such response."""
-    if found.scatter is None:
-        return None
-    drawn: list[SteadyPrediction] = []
-    for model in found.scatter.fresh(found.model, _DRAWS):
+def _others(found: IdentifiedPnlss | IdentifiedStructured, asked: bool, path: Path) -> Sequence[DrivenModel]:
+    """Return models of fresh runs, or else, if asked for, models that the fit allows."""
+    if found.scatter is not None:
+        return list(found.scatter.fresh(found.model, _DRAWS))
+    if not asked:
+        return []
+    if not isinstance(found, IdentifiedStructured) or found.fit is None:
+        raise ConfigurationError(
+            f"`bands`: {path} has a model without its fit, whose covariance they need; leave it out"
+        )
+    return list(drawn(found.fit, _DRAWS))
+
+
+def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Mapping[str, Any]) -> ResponseBand | None:
+    """Return the band of a response over other models; None if there are none, or if most have no such response."""
+    responses: list[SteadyPrediction] = []
+    for model in others:
         with suppress(IdentificationError):
-            drawn.append(frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), **fixed))
-    return band_of_responses(drawn) if len(drawn) > _DRAWS // 2 else None
+            responses.append(
+                frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), **fixed)
+            )
+    return band_of_responses(responses) if len(responses) > _DRAWS // 2 else None
 
 
 def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:

@@ -57,6 +57,38 @@ def test_peaks_at_a_constant_force_are_those_of_the_rig(told):
     assert held["peak_frequency_hz"] == pytest.approx(exact.frequency_hz[np.argmax(exact.amplitude_m)], rel=2e-3)
 
 
+@pytest.mark.slow
+def test_bands_hold_the_peaks_of_other_models_that_the_fit_allows(told, model):
+    """Against first-order errors along the numbers of the fit, of the largest amplitude and its frequency."""
+    from identification import structured_frequency_response
+    from identification.structured.uncertainty import std_of
+    from rig.models.files.files import load
+
+    (sine,) = told("--frequency-response 0.05 --bands")["frequency_responses"]
+
+    def peak_of(one):
+        peak = structured_frequency_response(one, 0.05).peak()
+        return np.array([peak.amplitude_m, peak.frequency_hz])
+
+    fit = load(model).fit
+    expected = std_of(fit, peak_of)
+    assert sine["peak_m"] == pytest.approx(peak_of(fit.model)[0], rel=1e-6)
+    assert [sine["peak_std_m"], sine["peak_frequency_std_hz"]] == pytest.approx(expected, rel=0.4)
+    assert told("--frequency-response 0.05")["frequency_responses"][0]["peak_std_m"] is None
+
+
+def test_a_model_without_its_fit_has_no_bands(model, command, monkeypatch):
+    from dataclasses import replace
+
+    from rig.models.files.files import load, save
+
+    monkeypatch.chdir(model.parent)
+    save(replace(load(model), fit=None), model.parent / "alone.h5")
+    done = command("predict alone.h5 --frequency-response 0.05 --bands -o OUT.h5 --overwrite")
+    assert done.status == 1
+    assert done.err == "rig: --bands: alone.h5 has a model without its fit, whose covariance they need; leave it out\n"
+
+
 def test_recorded_sweeps_are_followed_from_the_force_and_from_the_voltage(told):
     for line, origin in (("", "the recorded force"), ("--exciter EX.h5", "the recorded voltage")):
         found = told(f"--sweep ahead.h5 {line}")
