@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -188,7 +188,7 @@ def fit_structured(
         names=kept.problem.parameters.names,
         values=kept.vector,
         covariance=kept.problem.covariance(kept.vector),
-        training_error=kept.problem.error,
+        training_error=kept.problem.error(kept.vector),
         evaluations=evaluations,
         seconds=time.perf_counter() - began,
         stopped=kept.problem.stopped,
@@ -247,8 +247,7 @@ def _fitted(
         problem = _Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
         vector, more = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found, evaluations = parameters.model(vector), evaluations + more
-        problem.triangle(vector)
-        misfit = min(_MISFIT, problem.error)
+        misfit = min(_MISFIT, problem.error(vector))
     return _Fitted(found, start, problem, vector, evaluations)
 
 
@@ -284,70 +283,65 @@ class _Problem:
                 raise IdentificationError(
                     f"output '{channel.name}': is zero throughout the training data; leave it out"
                 )
-        self._known: tuple[bytes, Float] | None = None
-        self._parts: list[Float] = []
-        self._tested = np.zeros((0, 0))
-        self.error = np.nan
-        """RMS of the residual of the last vector over that of the outputs."""
+        self._left: dict[bytes, float] = {}
+        """Sums of squares of the samples at all vectors that were asked for."""
+
+    def error(self, vector: Float) -> float:
+        """RMS of the residual over that of the outputs."""
+        if vector.tobytes() not in self._left:
+            self._cost(vector)
+        return float(np.sqrt(self._left[vector.tobytes()] / self.count))
 
     def triangle(self, vector: Float) -> Float:
-        """float[P + 1, P + 1]: triangle of derivatives and residuals of experiments and of what is expected; kept."""
-        if self._known is None or self._known[0] != vector.tobytes():
-            model = self.parameters.model(vector)
-            with threads() as count, ThreadPoolExecutor(count) as pool:
-                found = pool.map(partial(self._of_one, model), self.experiments, self.leads)
-                self._tested = self._test.rows(vector)  # meanwhile: compiled runs leave the interpreter free
-                parts = list(found)
-            self._parts = parts
-            self._known = vector.tobytes(), triangle_of(np.concatenate([*parts, self._misfit * self._tested]))
-            self.error = float(np.sqrt(sum(part[:, -1] @ part[:, -1] for part in parts) / self.count))
-        return self._known[1]
+        """float[P + 1, P + 1]: triangle of derivatives and residuals of experiments and of what is expected."""
+        parts, tested = self._rows(self._of_one, vector)
+        return triangle_of(np.concatenate([*parts, self._misfit * tested]))
 
     def covariance(self, vector: Float) -> Float:
         """float[P, P]: covariance of the numbers, as if the residual of each experiment were white, with a size of its own.
 
-        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment, and `_of_steps`.
+        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment; and what the steps of the
+        simulation move, to first order, as one error that all numbers share. Errors of outputs fall with the square of the
+        step, so that a run with half of it tells them (Richardson).
         """
-        of_steps = self._of_steps(vector)
-        jacobian = self.triangle(vector)[:, :-1]
-        inverse = np.linalg.pinv(jacobian.T @ jacobian)
+        parts, tested = self._rows(self._with_finer, vector)
+        tested = self._misfit * np.insert(tested, -1, 0.0, axis=1)
+        rows = np.concatenate([*parts, tested])
+        inverse = np.linalg.pinv(rows[:, :-2].T @ rows[:, :-2])
         freedom = max(1.0 - vector.size / self.count, 0.5)
-        told = self.error * self._misfit * self._tested[:, :-1]
+        told = self.error(vector) * tested[:, :-2]
         middle = told.T @ told
-        for part, one in zip(self._parts, self.experiments, strict=True):
+        for part, one in zip(parts, self.experiments, strict=True):
             variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
-            middle = middle + variance * part[:, :-1].T @ part[:, :-1]
+            middle = middle + variance * part[:, :-2].T @ part[:, :-2]
+        of_steps = inverse @ (rows[:, :-2].T @ rows[:, -2])
         return np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
 
-    def _of_steps(self, vector: Float) -> Float:
-        """float[P]: how far the steps of the simulation move the numbers, to first order.
-
-        Errors of the outputs fall with the square of the step: two runs give what infinitely many steps would (Richardson).
-        """
+    def _rows(self, of_one: Callable[..., Float], vector: Float) -> tuple[list[Float], Float]:
+        """Return what ``of_one`` gives for each experiment, and the rows of the modal test."""
         model = self.parameters.model(vector)
         with threads() as count, ThreadPoolExecutor(count) as pool:
-            parts = list(pool.map(partial(self._against_finer, model), self.experiments, self.leads))
-        expected = self._test.rows(vector)
-        expected[:, -1] = 0.0
-        rows = np.concatenate([*parts, self._misfit * expected])
-        return np.asarray(np.linalg.lstsq(rows[:, :-1], -rows[:, -1])[0])
+            parts = pool.map(partial(of_one, model), self.experiments, self.leads)
+            tested = self._test.rows(vector)  # meanwhile: compiled runs leave the interpreter free
+            return list(parts), tested
 
-    def _against_finer(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
-        u, begin = experiment.inputs, experiment.counted_from
+    def _with_finer(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
+        """float[P + 2, P + 2]: as `_of_one`, with the errors that the steps make of the outputs before the residuals."""
         finer = None if lead is None else replace(lead, steps=2 * lead.steps)
-        fine = self.parameters.outputs(model.with_steps(2 * model.steps), u, begin, finer)
-        return self._of_one(
-            model, experiment, lead, (4.0 * fine - self.parameters.outputs(model, u, begin, lead)) / 3.0
+        fine = self.parameters.outputs(
+            model.with_steps(2 * model.steps), experiment.inputs, experiment.counted_from, finer
         )
+        return self._of_one(model, experiment, lead, fine)
 
     def _of_one(
-        self, model: StructuredModel, experiment: Experiment, lead: Lead | None, outputs: Float | None = None
+        self, model: StructuredModel, experiment: Experiment, lead: Lead | None, fine: Float | None = None
     ) -> Float:
-        """Return the triangle of one experiment, against other outputs than its own if they are given."""
+        """Return the triangle of one experiment."""
         weight = np.sqrt(experiment.weight) / self._scale
         found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, lead)
-        residual = (found - (experiment.counted_outputs.T if outputs is None else outputs))[..., None]
-        both = np.concatenate([derivatives, residual], axis=2) * weight[:, None]
+        of_steps = [] if fine is None else [4.0 / 3.0 * (found - fine)[..., None]]
+        residual = (found - experiment.counted_outputs.T)[..., None]
+        both = np.concatenate([derivatives, *of_steps, residual], axis=2) * weight[:, None]
         return triangle_of(both.reshape(-1, both.shape[2]))
 
     def _cost(self, vector: Float) -> float:
@@ -355,6 +349,7 @@ class _Problem:
         model = self.parameters.model(vector)
         with threads() as count, ThreadPoolExecutor(count) as pool:
             left = sum(pool.map(partial(self._left_of_one, model), self.experiments, self.leads))
+        self._left[vector.tobytes()] = left
         return left + float(np.sum((self._misfit * self._test.left(vector)) ** 2))
 
     def _left_of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> float:

@@ -327,7 +327,12 @@ def motion_of(model: StructuredModel, u: Float, states: Float, unsolved: int, co
 def room_for(system: System, columns: int = 0) -> Room:
     """Return room for the steps of a system, and for derivatives by ``columns`` numbers."""
     n, inputs, elements = len(system.omega), system.b.shape[1], len(system.phi)
+    h, omega, phi = system.step_s, system.omega, system.phi
+    rigidity = 2.0 / h + 2.0 * system.zeta * omega + 0.5 * h * omega**2
     return Room(
+        rigidity=rigidity,
+        yields=phi / rigidity,
+        shared=phi / rigidity @ phi.T,
         mean=np.zeros(n),
         free=np.zeros(n),
         u=np.zeros(inputs),

@@ -13,7 +13,6 @@ from identification.structured.steps import (
     accelerate,
     along,
     end_step,
-    rigidity,
     solve,
     take_input,
     take_step,
@@ -192,7 +191,7 @@ def of_step(
             rhs[i, c] = 2.0 / h * sens[n + i, c] - system.omega[i] * system.omega[i] * sens[i, c]
         for k in range(n):
             matrix[i, k] = 0.0
-        matrix[i, i] = rigidity(system, i)
+        matrix[i, i] = room.rigidity[i]
     add_linear(system, room, room.mean, half, state[2 * n], sens, rhs)
     for e in range(system.phi.shape[0]):
         of_displacement(system, room, e, q, sens)

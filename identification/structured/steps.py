@@ -27,7 +27,6 @@ __all__ = [
     "along",
     "end_step",
     "led",
-    "rigidity",
     "run",
     "solve",
     "take_input",
@@ -75,6 +74,12 @@ def led(system: System, rate: np.ndarray) -> System:
 class Room(NamedTuple):
     """Room for a step, so that nothing is allocated."""
 
+    rigidity: np.ndarray
+    """float[n]: what multiplies the mean velocity of a mode in the equation of a step."""
+    yields: np.ndarray
+    """float[n_elements, n]: mean velocity of a mode by the force of an element."""
+    shared: np.ndarray
+    """float[n_elements, n_elements]: rate of an element by the force of another."""
     mean: np.ndarray
     free: np.ndarray
     u: np.ndarray
@@ -131,19 +136,12 @@ def along(vector: np.ndarray, row: np.ndarray) -> float:
 
 
 @inner_kernel
-def rigidity(system: System, i: int) -> float:
-    """Return what multiplies the mean velocity of a mode in the equation of a step."""
-    h, omega = system.step_s, system.omega[i]
-    return float(2.0 / h + 2.0 * system.zeta[i] * omega + 0.5 * h * omega * omega)
-
-
-@inner_kernel
 def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.ndarray) -> None:
     """Solve a step under the mean input ``room.u``: write the mean velocity, and what every element does at the solution."""
     h, elements = system.step_s, system.phi.shape[0]
     for i in range(q.size):
         push = 2.0 * v[i] / h - system.omega[i] * system.omega[i] * q[i] + along(room.u, system.b[i])
-        room.free[i] = push / rigidity(system, i)
+        room.free[i] = push / room.rigidity[i]
         room.mean[i] = room.free[i]
     for e in range(elements):
         room.w[e] = along(v, system.phi[e])
@@ -156,7 +154,7 @@ def take_step(system: System, room: Room, q: np.ndarray, v: np.ndarray, r: np.nd
         room.unsolved[0] += 1
     for e in range(elements):
         for i in range(q.size):
-            room.mean[i] -= system.phi[e, i] * room.forces[e, 0] / rigidity(system, i)
+            room.mean[i] -= room.yields[e, i] * room.forces[e, 0]
 
 
 @inner_kernel
@@ -181,11 +179,8 @@ def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: floa
     for e in range(elements):
         miss = along(room.free, system.phi[e]) - room.w[e]
         for f in range(elements):
-            shared = 0.0
-            for i in range(q.size):
-                shared += system.phi[e, i] * system.phi[f, i] / rigidity(system, i)
-            miss -= shared * room.forces[f, 0]
-            room.coupling[e, f] = shared * room.forces[f, 2] + (1.0 if e == f else 0.0)
+            miss -= room.shared[e, f] * room.forces[f, 0]
+            room.coupling[e, f] = room.shared[e, f] * room.forces[f, 2] + (1.0 if e == f else 0.0)
         room.change[e, 0] = miss
     solve(room.coupling, room.change, elements, 1)
     done = True
