@@ -41,7 +41,7 @@ def accelerations(u, h, every, omega, zeta, b, spring, cubic, joint, stiffness, 
     return out
 
 
-def experiment(rms_n, seed):
+def experiment(rms_n: float, seed: int) -> Experiment:
     """The last two periods under a multisine from 10 to 75 Hz, without noise."""
     spectrum = np.zeros(PERIOD * FINE // 2 + 1, complex)
     frequency_hz = np.arange(spectrum.size) * RATE_HZ / PERIOD
@@ -75,12 +75,12 @@ def experiment(rms_n, seed):
     )
 
 
-def noisy(one, seed):
+def noisy(one: Experiment, seed: int) -> Experiment:
     noise = np.random.default_rng(seed).standard_normal(one.outputs.shape)
     return replace(one, outputs=one.outputs + NOISE * np.std(one.outputs, axis=1, keepdims=True) * noise)
 
 
-def modes():
+def modes() -> LinearModes:
     """Two modes of small vibrations, with the joint stuck, and the third as a residual."""
     squared, shapes = np.linalg.eigh(np.diag(OMEGA**2) + STIFFNESS_N_M * np.outer(JOINT, JOINT))
     omega, outputs = np.sqrt(squared), OUTPUTS @ shapes
