@@ -2,9 +2,9 @@
 
 For each model file (`rig identify --model structured`, or of the folder ``models`` of `rig reproduce`) random and resonant
 forces: multisines of a random band, bursts of noise, impulses, sines and sweeps near a mode, and forces that follow the
-velocity of the run before, which do most work. Their sizes lie between one and a hundred times the training level ``RMS`` (N),
-as many in each decade; the size of a force is the largest root of its mean square that fades with the memory of the bound.
-Every response is held against the bound of its own size, at the next of forty levels. The last column is the bound of the
+velocity of the run before, which do most work. Their sizes are forty levels from one to a hundred times the training level
+``RMS`` (N), as many in each decade; the size of a force is the largest root of its mean square that fades with the memory of
+the bound. Every response is held against the bound of its own level. The last column is the bound of the
 element's displacement at a hundred times the level over the largest response found.
 """
 

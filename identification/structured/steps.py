@@ -185,13 +185,15 @@ def newton(system: System, room: Room, q: np.ndarray, r: np.ndarray, share: floa
     solve(room.coupling, room.change, elements, 1)
     done = True
     for e in range(elements):
-        room.w[e] += share * room.change[e, 0]
-        room.forces[e, 0] += share * room.change[e, 0] * room.forces[e, 2]
         size = abs(room.w[e])
         for i in range(q.size):
             size += abs(system.phi[e, i]) * (abs(room.free[i]) + SMALL * abs(q[i]) / system.step_s)
         if abs(room.change[e, 0]) > CLOSE * size + 1e-300:
             done = False
+    for e in range(elements):
+        change = room.change[e, 0] * (1.0 if done else share)  # the last one is taken whole
+        room.w[e] += change
+        room.forces[e, 0] += change * room.forces[e, 2]
     return done
 
 

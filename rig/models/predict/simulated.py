@@ -69,6 +69,8 @@ def simulated_predictions(
         for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
+    if request.bands and not steady:
+        raise ConfigurationError("`bands`: are those of responses without a reference; add `forces_n` or `voltages_v`")
     others = _others(found, request.bands, path) if steady else []
     bands = [_band(others, one, fixed) for one, _, _ in steady]
     steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
@@ -79,6 +81,8 @@ def simulated_predictions(
     for plan in request.planned_multisines:
         more, remarks = planned_multisines(plan, model, exciter, constants)
         runs, said = (*runs, *more), (*said, *remarks)
+    if request.bands and None in bands:
+        said = (*said, "a response has no band where most of the models that the fit allows have no such response")
     if any(bands):
         of = (
             "the model that was fitted, by the covariance of the fit"

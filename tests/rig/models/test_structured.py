@@ -345,6 +345,10 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
             "predict S.h5 --frequency-response 1 --allow-extrapolation",
             "--allow-extrapolation: means nothing to a structu",
         ),
+        (
+            "predict S.h5 --multisine lines.h5 --bands",
+            "--bands: are those of responses without a reference; add --freq",
+        ),
         ("predict modes.h5 --frequency-response 1 --bands", "predictions are made with a nonlinear-mode, pnlss"),
         ("predict S.h5 --frequency-response 1 --force rms", "'rms' of a model driven by a force needs an exciter"),
         (
