@@ -2,10 +2,8 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +18,11 @@ from identification.structured.element_trials import ElementTrial
 from identification.structured.further import ElementPlan, with_further_element
 from identification.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.structured.leading import Lead
-from identification.structured.levenberg_marquardt import minimum, triangle_of
 from identification.structured.modal_motion import measured_velocity, prolonged, settling_periods
 from identification.structured.modal_test import ModalTest
 from identification.structured.model import LEAD, StructuredModel
 from identification.structured.parameters import HIGHEST, Parameters
+from identification.structured.problem import Problem
 from identification.structured.start import linear_start, with_element
 from vibrolock.results import Result
 
@@ -34,7 +32,6 @@ Float = NDArray[np.float64]
 
 _ROUGH, _FINE = 3e-2, 2e-4
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
-_EVALUATIONS = 100
 _STAGES = {
     False: ((0.05, False, False), (0.01, False, False), (0.0, False, False), (0.0, False, True)),
     True: (
@@ -201,7 +198,7 @@ class _Fitted(NamedTuple):
 
     model: StructuredModel
     start: StructuredModel
-    problem: "_Problem"
+    problem: Problem
     vector: Float
     evaluations: int
 
@@ -244,7 +241,7 @@ def _fitted(
             for e, count in zip(settled, lengths, strict=True)
         ]
         parameters = Parameters(begun, tied, free, turned, poles)
-        problem = _Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
+        problem = Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
         vector, more = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found, evaluations = parameters.model(vector), evaluations + more
         misfit = min(_MISFIT, problem.error(vector))
@@ -255,110 +252,3 @@ def _rough_steps(model: StructuredModel) -> int:
     """Return steps in a sample for the fits before the last: half of them, as long as every mode may rise by a fifth."""
     needed = 1.2 * float(np.max(model.frequency_hz)) / (HIGHEST * model.sample_rate_hz)
     return max(math.ceil(0.5 * model.steps), math.ceil(needed))
-
-
-class _Problem:
-    """Least-squares problem that is kept as small as its parameters.
-
-    With the QR decomposition ``[J r] = Q T`` of derivatives J and residuals r, the columns of the triangle T have the norms and
-    scalar products of the samples, and give the same steps.
-    """
-
-    def __init__(
-        self,
-        parameters: Parameters,
-        experiments: Sequence[Experiment],
-        leads: Sequence[Lead | None],
-        test: ModalTest,
-        misfit: float,
-    ) -> None:
-        self.parameters, self.experiments, self.stopped = parameters, experiments, ""
-        self._test, self._misfit = test, misfit
-        self.leads = leads
-        outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
-        self.count = outputs.size
-        self._scale = np.sqrt(np.mean(outputs**2, axis=1))
-        for channel, size in zip(experiments[0].output_channels, self._scale, strict=True):
-            if not size > 0.0:
-                raise IdentificationError(
-                    f"output '{channel.name}': is zero throughout the training data; leave it out"
-                )
-        self._left: dict[bytes, float] = {}
-        """Sums of squares of the samples at all vectors that were asked for."""
-
-    def error(self, vector: Float) -> float:
-        """RMS of the residual over that of the outputs."""
-        if vector.tobytes() not in self._left:
-            self._cost(vector)
-        return float(np.sqrt(self._left[vector.tobytes()] / self.count))
-
-    def triangle(self, vector: Float) -> Float:
-        """float[P + 1, P + 1]: triangle of derivatives and residuals of experiments and of what is expected."""
-        parts, tested = self._rows(self._of_one, vector)
-        return triangle_of(np.concatenate([*parts, self._misfit * tested]))
-
-    def covariance(self, vector: Float) -> Float:
-        """float[P, P]: covariance of the numbers, as if the residual of each experiment were white, with a size of its own.
-
-        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment; and what the steps of the
-        simulation move, to first order, as one error that all numbers share. Errors of outputs fall with the square of the
-        step, so that a run with half of it tells them (Richardson).
-        """
-        parts, tested = self._rows(self._with_finer, vector)
-        tested = self._misfit * np.insert(tested, -1, 0.0, axis=1)
-        rows = np.concatenate([*parts, tested])
-        inverse = np.linalg.pinv(rows[:, :-2].T @ rows[:, :-2])
-        freedom = max(1.0 - vector.size / self.count, 0.5)
-        told = self.error(vector) * tested[:, :-2]
-        middle = told.T @ told
-        for part, one in zip(parts, self.experiments, strict=True):
-            variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
-            middle = middle + variance * part[:, :-2].T @ part[:, :-2]
-        of_steps = inverse @ (rows[:, :-2].T @ rows[:, -2])
-        return np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
-
-    def _rows(self, of_one: Callable[..., Float], vector: Float) -> tuple[list[Float], Float]:
-        """Return what ``of_one`` gives for each experiment, and the rows of the modal test."""
-        model = self.parameters.model(vector)
-        with threads() as count, ThreadPoolExecutor(count) as pool:
-            parts = pool.map(partial(of_one, model), self.experiments, self.leads)
-            tested = self._test.rows(vector)  # meanwhile: compiled runs leave the interpreter free
-            return list(parts), tested
-
-    def _with_finer(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
-        """float[P + 2, P + 2]: as `_of_one`, with the errors that the steps make of the outputs before the residuals."""
-        finer = None if lead is None else replace(lead, steps=2 * lead.steps)
-        fine = self.parameters.outputs(
-            model.with_steps(2 * model.steps), experiment.inputs, experiment.counted_from, finer
-        )
-        return self._of_one(model, experiment, lead, fine)
-
-    def _of_one(
-        self, model: StructuredModel, experiment: Experiment, lead: Lead | None, fine: Float | None = None
-    ) -> Float:
-        """Return the triangle of one experiment."""
-        weight = np.sqrt(experiment.weight) / self._scale
-        found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, lead)
-        of_steps = [] if fine is None else [4.0 / 3.0 * (found - fine)[..., None]]
-        residual = (found - experiment.counted_outputs.T)[..., None]
-        both = np.concatenate([derivatives, *of_steps, residual], axis=2) * weight[:, None]
-        return triangle_of(both.reshape(-1, both.shape[2]))
-
-    def _cost(self, vector: Float) -> float:
-        """Return the sum of squares."""
-        model = self.parameters.model(vector)
-        with threads() as count, ThreadPoolExecutor(count) as pool:
-            left = sum(pool.map(partial(self._left_of_one, model), self.experiments, self.leads))
-        self._left[vector.tobytes()] = left
-        return left + float(np.sum((self._misfit * self._test.left(vector)) ** 2))
-
-    def _left_of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> float:
-        weight = np.sqrt(experiment.weight) / self._scale
-        found = self.parameters.outputs(model, experiment.inputs, experiment.counted_from, lead)
-        return float(np.sum(((found - experiment.counted_outputs.T) * weight) ** 2))
-
-    def solve(self, vector: Float, tolerance: float) -> tuple[Float, int]:
-        """Return the vector of least squares, and the number of simulations with derivatives that it took."""
-        found = minimum(self.triangle, self._cost, vector, self.parameters.bounds(vector), tolerance, _EVALUATIONS)
-        self.stopped = found.stopped
-        return found.vector, found.evaluations
