@@ -141,10 +141,16 @@ class _ContentCache(FunctionCache):
         super().flush()  # type: ignore[no-untyped-call]
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """Load machine code; None where it is not there.
+
+        numba first makes its own implementations known, which takes longer than the loading. Machine code needs none of them,
+        and the compiler does the same before it compiles.
+        """
         self._open()
         found = None
         try:
-            found = super().load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+            with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]
+                found = self._load_overload(signature, target_context)  # type: ignore[no-untyped-call]
         except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
             self.flush()
         if found is None:
