@@ -23,7 +23,7 @@ from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
 from identification.signals.chunks import ArrayRecord, Phase, Record
 from identification.signals.columns import Columns, least_squares
-from identification.signals.rounding import JUDGED, part_of_each, rounding_errors
+from identification.signals.rounding import JUDGED, part_of_each, rounding_errors, turns_of
 from identification.validation import finite_array, positive
 
 __all__ = ["batches_of", "periodic_vibration", "vibration_in"]
@@ -143,7 +143,7 @@ def vibration_in(
     seen_rms = np.sqrt(np.maximum(np.minimum(rough, squares) / kept - steps**2 / 12.0, 0.0))
     known_rms = _per_channel("noise_rms", noise_rms, len(channels))
     dither_rms = np.where(known_rms > 0.0, np.minimum(known_rms, np.sqrt(squares / kept)), seen_rms)
-    rounding = rounding_errors(*_shape_of(chunks, solution, coefficients), steps, dither_rms)[:, : harmonics + 1]
+    rounding = rounding_errors(*_shape_of(chunks, solution, coefficients), steps, dither_rms, harmonics)
     return PeriodicVibration(
         channels=tuple(channels),
         frequency_hz=frequency_hz,
@@ -270,8 +270,8 @@ def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[
     residual = chunk.data[:JUDGED] - chunk.design[:JUDGED] @ solution
     per_period = 2.0 * np.pi * (theta.size - 1) / (theta[-1] - theta[0])
     first, last = coefficients.shape[1], min(_SHAPE_HARMONICS, int(_BELOW_HALF * per_period))
-    turns = np.exp(-1j * np.outer(np.arange(first, last + 1), theta))
-    return theta, np.hstack([coefficients, (turns @ residual).T * (2.0 / theta.size)])
+    turns = turns_of(theta, max(last, first - 1))[first:]
+    return theta, np.hstack([coefficients, (turns @ residual).conj().T * (2.0 / theta.size)])
 
 
 def _relative_drift(solution: Float, harmonics: int) -> Complex:

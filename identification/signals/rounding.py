@@ -18,7 +18,7 @@ with the fundamental: it is one of the amplitude, not of the phase. Both parts a
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["JUDGED", "part_of_each", "rounding_errors"]
+__all__ = ["JUDGED", "part_of_each", "rounding_errors", "turns_of"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -34,7 +34,20 @@ _SPREAD = np.sqrt(0.5)
 part in quadrature depends on the shape besides, and is not reduced."""
 
 
-def rounding_errors(theta_rad: Float, harmonics: Complex, resolution: Float, noise_rms: Float) -> Complex:
+def turns_of(theta_rad: Float, highest: int) -> Complex:
+    """complex[highest + 1, n]: ``exp(i h theta)`` of the harmonics from 0 up, each from two lower ones."""
+    turns = np.empty((highest + 1, theta_rad.size), np.complex128)
+    turns[0] = 1.0
+    if highest:
+        turns[1] = np.exp(1j * theta_rad)
+    for order in range(2, highest + 1):
+        np.multiply(turns[order // 2], turns[order - order // 2], out=turns[order])
+    return turns
+
+
+def rounding_errors(
+    theta_rad: Float, harmonics: Complex, resolution: Float, noise_rms: Float, wanted: int | None = None
+) -> Complex:
     """Standard errors of each coefficient due to rounding: in phase with the coefficient (real), in quadrature (imaginary).
 
     Parameters
@@ -47,18 +60,25 @@ def rounding_errors(theta_rad: Float, harmonics: Complex, resolution: Float, noi
         float[n_channels], step q of the converter in the unit of the channel; 0 for none.
     noise_rms
         float[n_channels], RMS of the noise ahead of the converter.
+    wanted
+        Highest harmonic W whose error is wanted; H if None.
 
     Returns
     -------
-    complex[n_channels, H + 1]
+    complex[n_channels, W + 1]
     """
-    out = np.zeros(harmonics.shape, np.complex128)
-    orders = np.arange(harmonics.shape[1])
-    turns = np.exp(1j * np.outer(orders, theta_rad if np.any(resolution > 0.0) else theta_rad[:0]))
-    for row in np.flatnonzero(resolution > 0.0):
-        sizes = _sizes(noise_rms[row] / resolution[row])
-        if sizes:
-            out[row] = resolution[row] * _of_a_channel(harmonics[row] / resolution[row], sizes, turns)
+    highest = harmonics.shape[1] - 1
+    wanted = highest if wanted is None else wanted
+    out = np.zeros((harmonics.shape[0], wanted + 1), np.complex128)
+    sizes = {row: _sizes(noise_rms[row] / resolution[row]) for row in np.flatnonzero(resolution > 0.0)}
+    rounded = [row for row, terms in sizes.items() if terms]
+    if rounded:
+        turns = turns_of(theta_rad, highest)
+        steps = harmonics[rounded] / resolution[rounded, None]
+        for row, of_channel, position in zip(rounded, steps, np.real(steps[:, 1:] @ turns[1:]), strict=True):
+            out[row] = resolution[row] * _of_a_channel(
+                of_channel[: wanted + 1], position, sizes[row], turns[: wanted + 1]
+            )
     return out
 
 
@@ -78,26 +98,24 @@ def _sizes(noise_steps: float) -> list[float]:
     return sizes
 
 
-def _of_a_channel(steps: Complex, sizes: list[float], turns: Complex) -> Complex:
-    """complex[H + 1]: standard errors in steps of a channel whose harmonics are given in steps.
+def _of_a_channel(steps: Complex, position: Float, sizes: list[float], turns: Complex) -> Complex:
+    """complex[W + 1]: standard errors in steps of a channel whose harmonics and position over time are given in steps.
 
-    ``turns``, complex[H + 1, n], are the harmonics of size 1 at every sample.
+    ``turns``, complex[W + 1, n], are the harmonics of size 1 at every sample.
     """
-    position = np.real(steps[1:] @ turns[1:])
     peak = max(float(np.max(np.abs(position))), 1e-9)
     unit = np.divide(steps, np.abs(steps), out=np.ones_like(steps), where=steps != 0.0)
-    largest = np.zeros((2, steps.size))
-    for change in _SIZES:
-        squares = np.zeros((2, steps.size))
-        first = np.exp(2j * np.pi * max(1.0 + change / peak, 0.0) * position)
-        for offset in (1.0, 1j):  # the mean on a step, and a quarter of a step above
-            turn, error = np.ones_like(first), np.zeros(position.size)
-            for size in sizes:
-                turn = turn * first * offset
-                error += size * turn.imag
-            found = (turns @ error).conj() * (2.0 / error.size)
-            found[0] *= 0.5
-            along = found * np.conj(unit)
-            squares += [along.real**2, along.imag**2]
-        largest = np.maximum(largest, squares)
-    return np.asarray(_SPREAD * np.sqrt(largest[0]) + 1j * np.sqrt(largest[1]))
+    errors = np.zeros((2 * len(_SIZES), position.size))
+    for change, (on_a_step, between) in zip(_SIZES, errors.reshape(len(_SIZES), 2, -1), strict=True):
+        turn = first = np.exp(2j * np.pi * max(1.0 + change / peak, 0.0) * position)
+        for order, size in enumerate(sizes, 1):
+            if order > 1:
+                turn = turn * first
+            on_a_step += size * turn.imag
+            # A quarter of a step above, the turn of this order is i^n times as far.
+            between += (size, size, -size, -size)[order % 4] * (turn.real if order % 2 else turn.imag)
+    found = (turns @ errors.T).conj() * (2.0 / position.size)
+    found[0] *= 0.5
+    along = (found * np.conj(unit)[:, None]).reshape(steps.size, len(_SIZES), 2)
+    in_phase, across = (np.max(np.sum(part**2, axis=2), axis=1) for part in (along.real, along.imag))
+    return np.asarray(_SPREAD * np.sqrt(in_phase) + 1j * np.sqrt(across))

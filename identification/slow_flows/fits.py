@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identification.slow_flows.signals import window_correlations
 
-__all__ = ["LocalFit", "as_settled", "local_fit", "noise_variances"]
+__all__ = ["LocalFit", "as_settled", "local_fit", "local_fits", "noise_variances"]
 
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
@@ -62,31 +62,57 @@ def local_fit(
     degree
         Degree of these polynomials.
     """
+    rows = (stiffness, rate, size, periods, place, weight)
+    return local_fits(*(np.asarray(row)[None] for row in rows), degree)[0]
+
+
+def local_fits(
+    stiffness: Complex, rate: Complex, size: Float, periods: Float, place: Float, weight: Float, degree: int = 1
+) -> list[LocalFit]:
+    """Make m fits like `local_fit` at once: complex[m, n] and float[m, n], one row a fit."""
     scale = size * np.sqrt(weight)
-    powers = place[:, None] ** np.arange(degree + 1)
-    columns = np.hstack([powers, powers * rate[:, None]]) * scale[:, None]
-    design = np.vstack([columns.real, columns.imag])
-    values = np.r_[(stiffness * scale).real, (stiffness * scale).imag]
+    powers = place[..., None] ** np.arange(degree + 1)
+    columns = np.concatenate([powers, powers * rate[..., None]], axis=2) * scale[..., None]
+    design = _real(columns)
+    values = _real((stiffness * scale)[..., None])
     inverse = np.linalg.pinv(design)
     solution = inverse @ values
     residual = values - design @ solution
-    wanted = inverse[[0, degree + 1]]
+    wanted = inverse[:, [0, degree + 1]]
+    root = np.sqrt(weight)
     correlations = [
-        np.block([[part.real, -part.imag], [part.imag, part.real]])
-        * np.sqrt(np.outer(np.tile(weight, 2), np.tile(weight, 2)))
-        for part in window_correlations(periods[:, None] - periods[None, :])
+        _real(np.concatenate([part, 1j * part], axis=2)) * np.tile(root[:, :, None] * root[:, None, :], (1, 2, 2))
+        for part in window_correlations(periods[:, :, None] - periods[:, None, :])
     ]
     left = [noise - design @ (inverse @ noise) for noise in correlations]
-    left = [part - (part @ inverse.T) @ design.T for part in left]
-    return LocalFit(
-        stiffness=float(solution[0]),
-        damping=float(solution[degree + 1]),
-        # Where the spread is nearly zero, rounding may make it negative.
-        spread=np.maximum(np.column_stack([np.sum(wanted @ noise * wanted, axis=1) for noise in correlations]), 0.0),
-        moments=np.array([residual @ residual, residual @ correlations[0] @ residual]),
-        expected=np.array([[np.trace(part) for part in left], [np.sum(correlations[0] * part) for part in left]]),
-        slopes=solution[1 : degree + 1],
-    )
+    left = [part - (part @ _transposed(inverse)) @ _transposed(design) for part in left]
+    # Where the spread is nearly zero, rounding may make it negative.
+    spread = np.maximum(np.stack([np.sum(wanted @ noise * wanted, axis=2) for noise in correlations], axis=2), 0.0)
+    smooth = _transposed(residual) @ correlations[0] @ residual
+    moments = np.stack([np.sum(residual**2, axis=(1, 2)), smooth[:, 0, 0]], axis=1)
+    traces = [np.trace(part, axis1=1, axis2=2) for part in left]
+    expected = np.stack([*traces, *(np.sum(correlations[0] * part, axis=(1, 2)) for part in left)], axis=1)
+    found = solution[..., 0]
+    return [
+        LocalFit(
+            stiffness=float(found[fit, 0]),
+            damping=float(found[fit, degree + 1]),
+            spread=spread[fit],
+            moments=moments[fit],
+            expected=expected[fit].reshape(2, 2),
+            slopes=found[fit, 1 : degree + 1],
+        )
+        for fit in range(found.shape[0])
+    ]
+
+
+def _real(values: Complex) -> Float:
+    """float[m, 2 n, k]: real parts above imaginary parts."""
+    return np.concatenate([values.real, values.imag], axis=1)
+
+
+def _transposed(values: Float) -> Float:
+    return values.swapaxes(1, 2)
 
 
 def noise_variances(fits: Sequence[LocalFit]) -> Float:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.signals.chunks import unwrapped
-from identification.slow_flows.fits import LocalFit, as_settled, local_fit, noise_variances
+from identification.slow_flows.fits import LocalFit, as_settled, local_fits, noise_variances
 from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, between_harmonics, derivatives
 from identification.validation import finite_array, positive
 
@@ -313,15 +313,17 @@ def _sliding(
 ) -> list[LocalFit]:
     """Fit around every instant; near the ends the fit takes as many instants, shifted to one side."""
     half = 0.5 * fit_periods + 1e-9
-    fits = []
-    for centre in periods:
-        middle = min(max(centre, periods[0] + half), periods[-1] - half)
-        near = np.abs(periods - middle) <= half
-        place = (periods[near] - centre) / half
-        fits.append(
-            local_fit(stiffness[near], rate[near], size[near], periods[near], place, np.ones(place.size), degree)
-        )
-    return fits
+    middle = np.clip(periods, periods[0] + half, periods[-1] - half)
+    near = np.abs(periods - middle[:, None]) <= half
+    count = near.sum(axis=1)
+    fits: dict[int, LocalFit] = {}
+    for n in np.unique(count):  # rounding may leave an instant more or less between two ends
+        centres = np.flatnonzero(count == n)
+        rows = np.nonzero(near[centres])[1].reshape(centres.size, n)
+        place = (periods[rows] - periods[centres, None]) / half
+        same = local_fits(stiffness[rows], rate[rows], size[rows], periods[rows], place, np.ones(place.shape), degree)
+        fits |= zip(centres.tolist(), same, strict=True)
+    return [fits[centre] for centre in range(periods.size)]
 
 
 def _pooled(fits: list[LocalFit], periods: Float) -> Float:
