@@ -1,9 +1,12 @@
 """Drivers by name. A driver is a class found under the entry-point group ``vibrolock.drivers``.
 
 The class is called as ``Driver(bench, seed)`` and keeps the contract of `rig.daq.DAQ`; its module is imported on use only.
+The names of this distribution's own drivers always mean these. Looking through all installed packages takes as long as building
+a virtual rig, so it is done for other names only.
 """
 
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
 from typing import Any
 
 from rig.bench import Bench
@@ -16,8 +19,16 @@ GROUP = "vibrolock.drivers"
 """Group of entry points under which drivers are installed."""
 
 
+@cache
+def _shipped() -> dict[str, EntryPoint]:
+    try:
+        return {entry.name: entry for entry in distribution("vibrolock").entry_points.select(group=GROUP)}
+    except PackageNotFoundError:
+        return {}
+
+
 def _found() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
+    return {entry.name: entry for entry in entry_points(group=GROUP)} | _shipped()
 
 
 def driver_names() -> list[str]:
@@ -32,7 +43,7 @@ def make_daq(bench: Bench, seed: int = 0) -> DAQ:
     any other exception of it.
     """
     name = bench.driver.name
-    found = _found()
+    found = _shipped() if name in _shipped() else _found()
     if name not in found:
         raise ConfigurationError(
             f"driver.name = {name!r}: there is no such driver; installed are {', '.join(sorted(found)) or 'none'}"
