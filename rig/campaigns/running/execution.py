@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from controller import LockState
 from rig.arming.run_options import Progress
@@ -38,6 +37,7 @@ from rig.system.stop_signals import asking, held
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
+from vibrolock.one_thread import one_thread
 
 __all__ = ["Execution", "Journal", "nothing_left"]
 
@@ -128,8 +128,7 @@ class Execution:
         for remark in self.loop.remarks:
             self._write("event", {"sample": 0, "what": "remark", "text": remark})
             self._attempt(self.progress.remark, remark)
-        # One thread of linear algebra: more would wait for each other over its small matrices.
-        with threadpool_limits(limits=1, user_api="blas"), held():  # signals: until the end record is in the journal
+        with one_thread(), held():  # signals: until the end record is in the journal
             with asking(self.loop.request_stop), self.live.heeding(self.loop.request_stop):
                 try:
                     for rows in self.loop.run():

@@ -19,6 +19,7 @@ from simulators.layout import Flag, RigArrays
 from simulators.sensing.parts import LOWEST_INTERNAL_RATE_HZ
 from simulators.virtual_rig import VirtualRig
 from vibrolock.compiled import bound
+from vibrolock.one_thread import one_thread
 
 __all__ = ["VirtualDAQ"]
 
@@ -58,6 +59,7 @@ class VirtualDAQ(DAQ):
 
     wall_clock: ClassVar[bool] = False
 
+    @one_thread()
     def __init__(self, bench: Bench, seed: int = 0) -> None:
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
         options = dict(bench.driver.options)
@@ -214,6 +216,7 @@ class VirtualDAQ(DAQ):
     def _open(self) -> None:
         pass
 
+    @one_thread()
     def _start(self) -> None:
         self._realised = self.rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)

@@ -1,0 +1,24 @@
+"""Linear algebra in one thread. Threads that share small matrices wait for each other, for long where other programs run."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+from threadpoolctl import ThreadpoolController
+
+__all__ = ["one_thread"]
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let numpy and scipy use one thread each for linear algebra. As a decorator: while the function runs."""
+    with _libraries().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _libraries() -> ThreadpoolController:
+    import scipy
+
+    _ = scipy.linalg.eigh  # its library can be told only once it is loaded
+    return ThreadpoolController()
