@@ -10,12 +10,28 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+from tests.running import first_those_that_wait, use_memory_for_files, workers
+from tests.sharing import shared_folder
+
+use_memory_for_files()
+shared_folder()  # before workers are started, which then share it
+
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
 # Examples are the same on every machine and in every run: what one finds is found again. HYPOTHESIS_SEARCH=1 seeks others.
 settings.register_profile(
     "repeatable", deadline=None, print_blob=True, derandomize="HYPOTHESIS_SEARCH" not in os.environ
 )
 settings.load_profile("repeatable")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    return workers()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    first_those_that_wait(items)
 
 
 @pytest.fixture(scope="session", autouse=True)

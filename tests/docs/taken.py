@@ -1,13 +1,12 @@
 """Pages that go on with files of other pages, or with programs of the firmware: which files, and of which page.
 
-The other page is followed once a session, in a folder of its own, and its files are copied.
+The other page is followed once in a run of the tests, in a folder of its own, and its files are copied.
 """
 
 import contextlib
-import functools
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from joblib.externals.loky import get_reusable_executor
@@ -15,6 +14,7 @@ from joblib.externals.loky import get_reusable_executor
 from tests.docs.pages import ROOT
 from tests.docs.reader import Reader
 from tests.firmware.building import built
+from tests.sharing import made_once, shared_folder
 
 RECORDINGS = "docs/tutorials/recordings-to-prediction.md"
 EXCITER, SWEEP, PNLSS = (
@@ -47,28 +47,25 @@ BUILT = {"docs/how-to/try-the-firmware.md": {"host": Path("firmware/build/host")
 """Targets of the firmware's Makefile that a page builds, and where it finds them."""
 
 
-def follower(new_folder: Callable[[str], Path], recording: Path, needs: dict[str, str]) -> Callable[[str], Path]:
-    """A function that follows a page, named as in TAKES, once, and returns the folder in which that was done.
+def followed(page: str, needs: dict[str, Path]) -> Path:
+    """Follow a page, named as in TAKES, once for all workers; return the folder in which that was done.
 
-    A page of ``needs`` finds the recording there, by the name that it uses.
+    A page of ``needs`` finds the file of this name and contents there.
     """
+    return made_once(shared_folder() / "pages" / page.replace("/", "-"), lambda folder: _follow(page, needs, folder))
 
-    @functools.cache
-    def followed(page: str) -> Path:
-        folder = new_folder(Path(page).stem)
-        if page in needs:
-            shutil.copy(recording, folder / needs[page])
-        for source, names in TAKES.get(page, {}).items():
-            for name in names:
-                copy(followed(source) / name, folder)
-        for target, place in BUILT.get(page, {}).items():
-            (folder / place).parent.mkdir(parents=True)
-            shutil.copy(built(target), folder / place)
-        with alone_in(folder):
-            Reader(ROOT / page).follow()
-        return folder
 
-    return followed
+def _follow(page: str, needs: dict[str, Path], folder: Path) -> None:
+    for name, file in needs.items():
+        shutil.copyfile(file, folder / name)
+    for source, names in TAKES.get(page, {}).items():
+        for name in names:
+            copy(followed(source, {}) / name, folder)
+    for target, place in BUILT.get(page, {}).items():
+        (folder / place).parent.mkdir(parents=True)
+        shutil.copy(built(target), folder / place)
+    with alone_in(folder):
+        Reader(ROOT / page).follow()
 
 
 def copy(source: Path, folder: Path) -> None:

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import rig
 from identification import (
     Backbone,
     Channel,
@@ -18,17 +17,15 @@ from identification import (
 )
 from identification.multisine.spectra import PeriodicSpectra
 from tests.docs.pages import ROOT
-from tests.docs.test_pages import QUICK
+from tests.recorded import SHORT, recorded_run
 
 PAGE = (ROOT / "docs" / "how-to" / "mend-a-model.md").read_text(encoding="utf-8")
 SHAPES = {"drive": 0.908, "acc_drive": 1.011, "acc_magnet": 1.445}
 
 
 @pytest.fixture(scope="module")
-def backbone(tmp_path_factory) -> Backbone:
-    plan = tmp_path_factory.mktemp("plans") / "quick.toml"
-    plan.write_text(QUICK)
-    with rig.run(str(plan)) as run:
+def backbone() -> Backbone:
+    with recorded_run("magnet-beam/backbone", **SHORT) as run:
         return run.backbone()
 
 

@@ -6,26 +6,13 @@ from typing import Any
 
 import pytest
 
-import rig
 from rig.campaigns.kinds import KINDS
 from rig.reference.keys import keys_of
 from tests.docs.output import assert_shows
 from tests.docs.pages import ROOT, blocks, pages
-from tests.docs.taken import follower
+from tests.docs.taken import followed
+from tests.recorded import SHORT, recorded
 
-QUICK = """
-kind = "backbone"
-bench = "magnet-beam"
-levels_v = [0.4, 0.8]
-record_periods = 8
-
-[controller]
-low_pass_rad_s = 6.283
-k1 = 2.0
-k2 = 6.283
-centre_frequency_hz = 24.0
-frequency_window_hz = [22.0, 27.0]
-"""
 NEEDS = {  # pages that speak of a recording without making one
     "docs/how-to/replay-a-recording.md": "backbone.h5",
     "docs/reference/file-format.md": "OUT.h5",
@@ -84,15 +71,6 @@ def anchors(page: Path) -> set[str]:
     return keys | {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.fixture(scope="session")
-def followed(tmp_path_factory):
-    """Follows a page once a session, with the files that it goes on with."""
-    folder = tmp_path_factory.mktemp("ready")
-    (folder / "quick.toml").write_text(QUICK)
-    rig.run(str(folder / "quick.toml"), output=str(folder / "OUT.h5")).close()
-    return follower(tmp_path_factory.mktemp, folder / "OUT.h5", NEEDS)
-
-
 SLOW = (
     "README.md",
     "docs/explanation/structured-models.md",
@@ -115,10 +93,11 @@ def marked(page: Path) -> Any:
 
 
 @pytest.mark.parametrize("page", [marked(page) for page in pages()])
-def test_a_page_does_what_it_says(page, followed):
-    for library in LIBRARIES.get(name_of(page), ()):
+def test_a_page_does_what_it_says(page):
+    name = name_of(page)
+    for library in LIBRARIES.get(name, ()):
         pytest.importorskip(library, reason=f"{library} is not installed (pip install 'vibrolock[dev]')")
-    followed(name_of(page))
+    followed(name, {NEEDS[name]: recorded("magnet-beam/backbone", **SHORT)} if name in NEEDS else {})
 
 
 PRINTED = "one 1.00\ntwo 2.00 words\nthree"

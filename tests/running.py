@@ -1,0 +1,52 @@
+"""How the tests are run: where their files lie, how many workers there are, and which tests begin."""
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import pytest
+
+__all__ = ["first_those_that_wait", "use_memory_for_files", "workers"]
+
+MEMORY = Path("/dev/shm")
+ENOUGH_BYTES = 6 * 2**30
+"""What the files of all tests take, three times over."""
+
+
+def use_memory_for_files() -> None:
+    """Keep temporary files in memory where there is enough of it: runs force each recording to the disk several times."""
+    if any(os.environ.get(name) for name in ("TMPDIR", "PYTEST_DEBUG_TEMPROOT")):
+        return
+    if not MEMORY.is_dir() or shutil.disk_usage(MEMORY).free < ENOUGH_BYTES or _available_bytes() < ENOUGH_BYTES:
+        return
+    folder = MEMORY / f"files-of-tests-{os.getuid()}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+    except OSError:
+        return
+    if folder.stat().st_uid == os.getuid():
+        os.environ["TMPDIR"] = str(folder)
+        tempfile.tempdir = None  # looked up anew
+
+
+def _available_bytes() -> int:
+    """Memory that can be used without swapping; 0 where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:")), 0)
+
+
+def workers() -> int:
+    """How many workers ``-n auto`` starts: more than cores, since tests of processes and clocks wait more than they compute."""
+    if given := os.environ.get("PYTEST_XDIST_AUTO_NUM_WORKERS"):
+        return int(given)
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores + (cores + 1) // 2
+
+
+def first_those_that_wait(items: list[pytest.Item]) -> None:
+    """Put tests of processes and clocks first, which wait beside others that compute. Else the order stays."""
+    items.sort(key=lambda item: item.get_closest_marker("waits") is None)
