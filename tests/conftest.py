@@ -10,9 +10,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
-from tests.running import first_those_that_wait, use_memory_for_files, workers
+from tests.running import first_those_that_wait, keep_bytecode, use_memory_for_files, workers
 from tests.sharing import shared_folder
 
+keep_bytecode()
 use_memory_for_files()
 shared_folder()  # before workers are started, which then share it
 

@@ -2,16 +2,26 @@
 
 import os
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
 import pytest
 
-__all__ = ["first_those_that_wait", "use_memory_for_files", "workers"]
+__all__ = ["first_those_that_wait", "keep_bytecode", "use_memory_for_files", "workers"]
 
 MEMORY = Path("/dev/shm")
 ENOUGH_BYTES = 6 * 2**30
 """What the files of all tests take, three times over."""
+
+
+def keep_bytecode() -> None:
+    """Let Python keep the bytecode of tests and product, where the machine is set up to make it anew in every process.
+
+    Else each of some hundred processes compiles a thousand modules, and each worker rewrites the assertions of all tests.
+    """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
 
 
 def use_memory_for_files() -> None:

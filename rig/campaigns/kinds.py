@@ -1,34 +1,47 @@
-"""Registry of the kinds of campaigns: one line for each kind. Each kind is declared in its own folder.
+"""Registry of the kinds of campaigns: one line for each kind. A kind is imported when a plan or a recording of it is used.
 
-The contract "Campaigns" in ``pyproject.toml`` also names the folders.
+Each kind is declared in its own folder, which the contract "Campaigns" in ``pyproject.toml`` names as well.
 """
 
-from rig.campaigns.backbone.points import BACKBONE
-from rig.campaigns.continuous_backbone.points import CONTINUOUS_BACKBONE
-from rig.campaigns.decay.points import DECAY
-from rig.campaigns.dwell.points import DWELL
-from rig.campaigns.multisine.points import MULTISINE
-from rig.campaigns.response_controlled.points import RESPONSE_CONTROLLED
-from rig.campaigns.stepped_phase.points import STEPPED_PHASE
-from rig.campaigns.stepped_sine.points import STEPPED_SINE
-from rig.campaigns.sweep.points import SWEEP
+from collections.abc import Iterator, Mapping
+from pkgutil import resolve_name
+
+from rig.campaigns.campaign import Campaign
 
 __all__ = ["KINDS", "kinds_that_yield"]
 
-KINDS = {
-    campaign.kind: campaign
-    for campaign in (
-        BACKBONE,
-        STEPPED_PHASE,
-        CONTINUOUS_BACKBONE,
-        RESPONSE_CONTROLLED,
-        STEPPED_SINE,
-        SWEEP,
-        MULTISINE,
-        DWELL,
-        DECAY,
-    )
+_DECLARED = {
+    "backbone": "backbone.points:BACKBONE",
+    "stepped-phase": "stepped_phase.points:STEPPED_PHASE",
+    "continuous-backbone": "continuous_backbone.points:CONTINUOUS_BACKBONE",
+    "response-controlled": "response_controlled.points:RESPONSE_CONTROLLED",
+    "stepped-sine": "stepped_sine.points:STEPPED_SINE",
+    "sweep": "sweep.points:SWEEP",
+    "multisine": "multisine.points:MULTISINE",
+    "dwell": "dwell.points:DWELL",
+    "decay": "decay.points:DECAY",
 }
+"""Where each kind is declared."""
+
+
+class _Kinds(Mapping[str, Campaign]):
+    """The kinds by name, each imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> Campaign:
+        kind: Campaign = resolve_name(f"rig.campaigns.{_DECLARED[name]}")
+        return kind
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_DECLARED)
+
+    def __len__(self) -> int:
+        return len(_DECLARED)
+
+    def __contains__(self, name: object) -> bool:
+        return name in _DECLARED
+
+
+KINDS: Mapping[str, Campaign] = _Kinds()
 """All kinds by name."""
 
 

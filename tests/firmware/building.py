@@ -1,14 +1,14 @@
-"""The firmware, built by its Makefile into a folder of this process."""
+"""The firmware, built by its Makefile once for all workers of a run of the tests."""
 
-import atexit
 import os
 import shutil
 import subprocess
-import tempfile
 from functools import cache
 from pathlib import Path
 
 import pytest
+
+from tests.sharing import made_once, shared_folder
 
 __all__ = ["FOLDER", "built", "need"]
 
@@ -20,15 +20,13 @@ MAKING_S = 900.0
 
 
 @cache
-def _build_folder() -> Path:
-    folder = tempfile.mkdtemp(prefix="vibrolock-firmware-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
-
-
-@cache
 def _made(target: str) -> Path:
-    folder = _build_folder()
+    folder = made_once(shared_folder() / "firmware" / target, lambda folder: _make(target, folder))
+    (program,) = (path for path in (folder / target, folder / f"{target}.elf") if path.is_file())
+    return program
+
+
+def _make(target: str, folder: Path) -> None:
     done = subprocess.run(
         ["make", "-C", str(FOLDER), f"BUILD={folder}", target],
         capture_output=True,
@@ -37,8 +35,6 @@ def _made(target: str) -> Path:
         check=False,
     )
     assert done.returncode == 0, f"make {target}:\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
-    (program,) = (path for path in (folder / target, folder / f"{target}.elf") if path.is_file())
-    return program
 
 
 @cache
@@ -65,7 +61,7 @@ def need(*programs: str) -> None:
 
 
 def built(target: str) -> Path:
-    """The program of a target (``host``, ``host-sanitized``, ``script``, ``mps2-an386``), built once a process.
+    """The program of a target (``host``, ``host-sanitized``, ``script``, ``mps2-an386``), built once.
 
     Skips or fails as `need` does where a program that builds it is missing.
     """

@@ -26,10 +26,7 @@ from rig.measurements.experiments.records import FEWEST_PERIODS, segment, sweep_
 from rig.measurements.experiments.signals import Signals
 from rig.recording.reader import Recording
 
-__all__ = ["KINDS", "default_rate_hz", "experiments", "rows_from_rest"]
-
-KINDS = tuple(name for name, campaign in CAMPAIGNS.items() if campaign.experiments)
-"""Kinds of recordings from which experiments can be built."""
+__all__ = ["default_rate_hz", "experiments", "kinds_with_experiments", "rows_from_rest"]
 
 SAMPLES_PER_PERIOD = 25
 """Samples per period of the highest excited frequency. The paper has 22.9 and 28.4."""
@@ -37,6 +34,11 @@ FEWEST_SAMPLES_PER_PERIOD = 2.5
 """Fewest samples per period of the highest excited frequency. With fewer, the anti-alias filter cuts off its lines."""
 _SAME_RATIO = 1e-12
 _ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)
+
+
+def kinds_with_experiments() -> tuple[str, ...]:
+    """Return the kinds of campaigns whose recordings hold data for nonlinear state-space models."""
+    return tuple(name for name, campaign in CAMPAIGNS.items() if campaign.experiments)
 
 
 def experiments(
@@ -82,8 +84,8 @@ def experiments(
     identification.IdentificationError
         If no data is left, a channel does not exist, or the rate does not fit.
     """
-    if recording.kind not in KINDS:
-        raise RecordingError(f"{recording.path}: holds a {recording.kind}, wanted is a {' or a '.join(KINDS)}")
+    if recording.kind not in (kinds := kinds_with_experiments()):
+        raise RecordingError(f"{recording.path}: holds a {recording.kind}, wanted is a {' or a '.join(kinds)}")
     if periods not in get_args(Periods):
         raise IdentificationError(f"periods: is '{periods}', allowed are {', '.join(get_args(Periods))}")
     if transient_periods is not None and not 0.0 <= transient_periods < math.inf:

@@ -8,7 +8,7 @@ from identification import Experiment, IdentificationError, TimeRecords, time_ex
 from identification.time_data.experiments import suitable_rate_hz
 from rig.measurements import bench_of_recording
 from rig.measurements.experiments import default_rate_hz, experiments
-from rig.measurements.experiments.build import KINDS as RECORDED
+from rig.measurements.experiments.build import kinds_with_experiments
 from rig.measurements.points_left_out import points_left_out
 from rig.models.files.files import load_as
 from rig.models.files.time_data import TIME_DATA
@@ -17,7 +17,7 @@ from rig.recording.reader import Recording
 
 __all__ = ["KINDS", "exciter_in", "experiments_in", "rates_hz_in", "specimen_in", "time_records_in"]
 
-KINDS = (*RECORDED, TIME_DATA.name)
+KINDS = (*kinds_with_experiments(), TIME_DATA.name)
 """Kinds of files from which experiments are made."""
 
 
