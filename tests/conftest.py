@@ -1,7 +1,6 @@
 """What all tests share."""
 
 import os
-import signal
 
 # One thread for linear algebra, before numpy is imported. The matrices of the tests are small: on a busy machine threads that
 # wait for each other make an identification ten times slower.
@@ -9,6 +8,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings
+
+pytest_plugins = ["tests.command"]
 
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
 # Examples are the same on every machine and in every run: what one finds is found again. HYPOTHESIS_SEARCH=1 seeks others.
@@ -29,13 +30,3 @@ def runs_of_the_tests_alone(tmp_path_factory):
     os.environ.pop("VIBROLOCK_LIVE")
     if before is not None:
         os.environ["VIBROLOCK_LIVE"] = before
-
-
-@pytest.fixture(autouse=True)
-def signals_as_they_were():
-    """A command that was run in this process ignores signals once it is done, as it does in its own."""
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)]
-    before = {number: signal.getsignal(number) for number in numbers}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
