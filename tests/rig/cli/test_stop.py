@@ -165,8 +165,8 @@ def test_watching_in_plain_lines_begins_before_the_run_and_ends_with_it(command,
     begun = re.compile(r"[\d.]+ s  (searching|settling)  point 1 of 2  level 0\.\d+ V  ")
     assert any(begun.match(line) for line in watching.stdout)
     assert command("stop run.h5")[0] == 0
-    out, err = watching.stdout.read(), watching.stderr.read()
-    assert (watching.wait(120), err) == (0, "")
+    out, err = watching.communicate(timeout=120)
+    assert (watching.returncode, err) == (0, "")
     assert any(line.endswith("guard: ramping") for line in out.splitlines())
     assert re.search(r"end: stopped by `rig stop` \(process \d+\)", out)
 
