@@ -1,7 +1,6 @@
 """What all tests share."""
 
 import os
-import signal
 
 # One thread for linear algebra, before numpy is imported. The matrices of the tests are small: on a busy machine threads that
 # wait for each other make an identification ten times slower.
@@ -16,6 +15,8 @@ from tests.sharing import shared_folder
 keep_bytecode()
 use_memory_for_files()
 shared_folder()  # before workers are started, which then share it
+
+pytest_plugins = ["tests.command"]
 
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
 # Examples are the same on every machine and in every run: what one finds is found again. HYPOTHESIS_SEARCH=1 seeks others.
@@ -46,13 +47,3 @@ def runs_of_the_tests_alone(tmp_path_factory):
     os.environ.pop("VIBROLOCK_LIVE")
     if before is not None:
         os.environ["VIBROLOCK_LIVE"] = before
-
-
-@pytest.fixture(autouse=True)
-def signals_as_they_were():
-    """A command that was run in this process ignores signals once it is done, as it does in its own."""
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)]
-    before = {number: signal.getsignal(number) for number in numbers}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)

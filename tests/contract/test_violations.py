@@ -5,10 +5,8 @@ import time
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from rig.bench import DriverChoice
-from rig.cli import app
 from rig.daq import State
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqRefused, DaqWatchdog
@@ -227,47 +225,55 @@ RULES = {
 }
 
 
-def conformance(monkeypatch, driver, *options):
-    monkeypatch.setattr("rig.conformance.run.make_daq", driver)
-    return CliRunner().invoke(app, ["conformance", "--bench", "magnet-beam", *options])
+@pytest.fixture
+def conformance(command, monkeypatch):
+    """Run the kit on a driver."""
+
+    def run(driver, *options):
+        monkeypatch.setattr("rig.conformance.run.make_daq", driver)
+        return command("conformance", "--bench", "magnet-beam", *options)
+
+    return run
 
 
 @pytest.mark.parametrize("driver", RULES, ids=lambda driver: driver.__name__)
-def test_the_kit_names_the_rule_that_is_broken(driver, monkeypatch):
-    done = conformance(monkeypatch, driver, "--json")
-    assert done.exit_code == 1
-    failed = {test["test"]: test["detail"] for test in json.loads(done.stdout)["tests"] if test["outcome"] == "failed"}
+def test_the_kit_names_the_rule_that_is_broken(driver, conformance):
+    done = conformance(driver, "--json")
+    assert done.status == 1
+    failed = {test["test"]: test["detail"] for test in json.loads(done.out)["tests"] if test["outcome"] == "failed"}
     assert RULES[driver] in failed
     assert all(failed.values()), "a failure without a word"
 
 
-def test_a_driver_that_keeps_all_rules_passes_in_words_and_the_command_succeeds(monkeypatch):
-    done = conformance(monkeypatch, VirtualDAQ)
-    assert done.exit_code == 0, done.stdout
-    *lines, summary = done.stdout.splitlines()
+def test_a_driver_that_keeps_all_rules_passes_in_words_and_the_command_succeeds(conformance):
+    done = conformance(VirtualDAQ)
+    assert done.status == 0, done.out
+    *lines, summary = done.out.splitlines()
     assert "failed" not in [line.split()[0] for line in lines]
     assert summary.startswith("driver virtual: ")
     assert " 0 failed, 2 not applicable" in summary
 
 
 @pytest.mark.parametrize("moves", [False, True])
-def test_what_a_test_leaves_latched_is_cleared_before_the_next_only_where_nothing_moves(moves, monkeypatch):
+def test_what_a_test_leaves_latched_is_cleared_before_the_next_only_where_nothing_moves(
+    moves, conformance, monkeypatch
+):
     for name, value in {"is_latched": False, "starts": 0, "moves": moves}.items():
         monkeypatch.setattr(TripsOnce, name, value)
-    done = conformance(monkeypatch, TripsOnce, "--json", *(["--arm"] if moves else []))
-    failed = [test for test in json.loads(done.stdout)["tests"] if test["outcome"] == "failed"]
+    done = conformance(TripsOnce, "--json", *(["--arm"] if moves else []))
+    failed = [test for test in json.loads(done.out)["tests"] if test["outcome"] == "failed"]
     assert (len(failed) > 1) == moves
 
 
-def test_what_is_broken_stands_in_words_too(monkeypatch):
-    done = conformance(monkeypatch, CountsDown)
-    assert done.exit_code == 1
-    assert f"failed         {RULES[CountsDown]}: " in done.stdout
+def test_what_is_broken_stands_in_words_too(conformance):
+    done = conformance(CountsDown)
+    assert done.status == 1
+    assert f"failed         {RULES[CountsDown]}: " in done.out
 
 
-def test_a_driver_that_is_too_slow_for_any_test_is_not_tested_for_hours(monkeypatch):
-    done = conformance(monkeypatch, SleepsForASecond, "--json")
-    first, *others = json.loads(done.stdout)["tests"]
+def test_a_driver_that_is_too_slow_for_any_test_is_not_tested_for_hours(conformance):
+    done = conformance(SleepsForASecond, "--json")
+    first, *others = json.loads(done.out)["tests"]
     assert first["outcome"] == "failed"
     assert "lasts 0.05 s and takes 1" in first["detail"]
     assert {(test["outcome"], test["detail"]) for test in others} == {

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from rig.cli import main
+from tests.command import run_command
 from tests.docs.output import assert_shows
 from tests.docs.pages import INTERRUPTED, Block, blocks, rig_commands, write
 from tests.waiting import LONG_S
@@ -47,7 +47,8 @@ class Reader:
             if block.note == INTERRUPTED:
                 printed += interrupted(words)
                 continue
-            status, text = run_rig(words)
+            status, out, err = run_command(*words)
+            text = err + out  # progress, then results
             expected = block.status if number == len(commands) - 1 else 0
             assert status == expected, f"{where}: rig {' '.join(words)} ended with {status}\n{text}"
             printed += text
@@ -62,18 +63,6 @@ class Reader:
             except Exception as error:
                 pytest.fail(f"{where}: {type(error).__name__}: {error}")
         return streams.getvalue()
-
-
-def run_rig(words: list[str]) -> tuple[int, str]:
-    """Exit status of a command, and what it printed: progress, then results."""
-    out, err = io.StringIO(), io.StringIO()
-    before, sys.argv = sys.argv, ["rig", *words]
-    try:
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as stop:
-            main()
-    finally:
-        sys.argv = before
-    return int(stop.value.code or 0), err.getvalue() + out.getvalue()
 
 
 def interrupted(words: list[str]) -> str:

@@ -1,10 +1,8 @@
-"""A rig of one's own from its pages alone: files taken from it, commands typed in a terminal, an independent truth."""
+"""A rig of one's own from its pages alone: files taken from it, commands as they are typed, an independent truth."""
 
 import json
 import math
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -17,6 +15,7 @@ from rig.models.files.files import load
 from rig.tick.layout import DEVICE_SHIFT
 from simulators.analysis import phase_resonance_backbone
 from simulators.layout import Flag
+from tests.command import Ended, run_command
 from tests.docs.pages import ROOT, blocks, write
 
 TUTORIAL, FORCE_LAW = ROOT / "docs/tutorials/a-rig-of-your-own.md", ROOT / "docs/how-to/write-a-force-law.md"
@@ -45,12 +44,14 @@ def folder(tmp_path_factory) -> Path:
     return path
 
 
-def typed(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """What comes of a command, typed in the folder; imports as the page says, and from where the tests are run."""
-    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-    program = [sys.executable, "-c", "from rig.cli import main; main()", *command.split()[1:]]
-    environment = os.environ | {"PYTHONPATH": path}
-    return subprocess.run(program, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+def typed(line: str, folder: Path) -> Ended:
+    """What comes of a command, typed in the folder; the force law there is forgotten afterwards."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        patch.setattr(sys, "path", [*sys.path])
+        ended = run_command(line)
+    sys.modules.pop("drag", None)
+    return ended
 
 
 def piecewise_backbone(linear_hz: float, tip: float, tops_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -77,9 +78,8 @@ def piecewise_backbone(linear_hz: float, tip: float, tops_m: np.ndarray) -> tupl
 
 @pytest.fixture(scope="module")
 def model(folder):
-    for command in ("rig run end-stop-plan.toml -o own.h5", "rig identify own.h5 -o own-model.h5"):
-        done = typed(command, folder)
-        assert done.returncode == 0, done.stderr
+    for line in ("run end-stop-plan.toml -o own.h5", "identify own.h5 -o own-model.h5"):
+        typed(line, folder).succeeded()
     return load(folder / "own-model.h5")
 
 
@@ -120,14 +120,12 @@ def test_it_agrees_with_harmonic_balance_of_the_coupled_rig(model, folder):
 
 
 def test_the_force_law_of_the_page_damps_as_the_energy_that_it_takes(folder):
-    done = typed("rig run plate-plan.toml -o plate.h5 --json", folder)
-    assert done.returncode == 0, done.stderr
-    without = typed("rig run plate-plan.toml --bench magnet-beam -o bare.h5 --json", folder)
-    assert without.returncode == 0, without.stderr
+    done = typed("run plate-plan.toml -o plate.h5 --json", folder).succeeded()
+    without = typed("run plate-plan.toml --bench magnet-beam -o bare.h5 --json", folder).succeeded()
     virtual = make_daq(load_bench("magnet-beam")).rig
     modes = virtual.linear_modes
     ratio = float(modes.at(virtual.shape("tip"))[0] / modes.drive_shape[0])
-    for drag, bare in zip(*(json.loads(one.stdout)["points"] for one in (done, without)), strict=True):
+    for drag, bare in zip(*(json.loads(one.out)["points"] for one in (done, without)), strict=True):
         # Energy of c v |v| per period, 8/3 c w^2 X^3, over 2 pi w^2 q^2 / 2 is 4 pi zeta: zeta = 4/(3 pi) c X phi^2.
         tip_m = ratio * drag["amplitude_m"]
         added = 4.0 / (3.0 * math.pi) * 0.05 * tip_m * (ratio * modes.drive_shape[0]) ** 2
@@ -166,18 +164,18 @@ def test_a_slip_of_the_pen_is_answered_by_one_line_that_names_it(folder, tmp_pat
     assert old in text
     (tmp_path / name).write_text(text.replace(old, new, 1), encoding="utf-8")
     plan = "plate-plan.toml" if name == "drag.py" else "end-stop-plan.toml"
-    done = typed(f"rig run {plan} -o no.h5", tmp_path)
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert fault in done.stderr
+    done = typed(f"run {plan} -o no.h5", tmp_path)
+    assert done.status == 1
+    assert done.err.count("\n") == 1, done.err
+    assert fault in done.err
     assert not list(tmp_path.glob("no.h5*"))
 
 
 def test_a_joint_that_is_stiffer_than_the_beam_is_refused(folder):
     (folder / "press-fit.toml").write_text(PRESS_FIT, encoding="utf-8")
-    done = typed("rig run plate-plan.toml --bench press-fit.toml -o no.h5", folder)
-    assert done.returncode == 1
-    assert "friction: stiffness 100000 in all, allowed is less than the structure has there" in done.stderr
+    done = typed("run plate-plan.toml --bench press-fit.toml -o no.h5", folder)
+    assert done.status == 1
+    assert "friction: stiffness 100000 in all, allowed is less than the structure has there" in done.err
 
 
 def test_every_flag_is_on_the_page_of_parts_with_its_bit():

@@ -1,7 +1,6 @@
 """``rig analyse``: its numbers against independent ones, its figures, and one line for every mistake."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from rig.analysis.forced import forced
 from rig.analysis.linear_responses import responses
 from rig.analysis.modes import modes
 from rig.analysis.subject import peak, subject_of
-from rig.cli import main
 from rig.errors import ConfigurationError
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
 from tests.reference.harmonic_balance import backbone as reference_backbone
@@ -28,20 +26,6 @@ WEAK_EXCITER = {
     "suspension_damping_n_s_m": 0.0,
 }
 """Nearly a source of constant force, so that sweeps jump."""
-
-
-@pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def run(line):
-        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        streams = capsys.readouterr()
-        return stop.value.code, streams.out, streams.err
-
-    return run
 
 
 @pytest.mark.parametrize("bench", BENCHES)

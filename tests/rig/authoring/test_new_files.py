@@ -14,7 +14,6 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, RecordingError
-from tests.docs.reader import run_rig
 from tests.rig.authoring.test_schemas import of, read
 
 
@@ -60,17 +59,16 @@ def test_a_new_rig_loads_its_driver_accepts_it_and_nothing_is_amiss(tmp_path):
     of("bench").validate(read(path))
 
 
-def test_a_new_bench_loads_and_a_run_says_in_one_line_what_is_to_be_filled_in(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    status, printed = run_rig(["new", "bench", "-o", "laboratory.toml"])
-    assert (status, printed) == (0, "laboratory.toml: a bench to begin with, checked by bench.schema.json\n")
+def test_a_new_bench_loads_and_a_run_says_in_one_line_what_is_to_be_filled_in(command, tmp_path):
+    done = command("new bench -o laboratory.toml")
+    assert done == (0, "laboratory.toml: a bench to begin with, checked by bench.schema.json\n", "")
     assert load_bench("laboratory.toml").name == "laboratory"
     assert cautions(load_bench("laboratory.toml")) == ()
     of("bench").validate(read(tmp_path / "laboratory.toml"))
-    status, printed = run_rig(["check", "--bench", "laboratory.toml", "-o", "check.h5"])
-    assert status == 1
-    assert printed.count("\n") == 1
-    assert "NAME-OF-THE-DEVICE" in printed
+    status, out, err = command("check --bench laboratory.toml -o check.h5")
+    assert (status, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "NAME-OF-THE-DEVICE" in err
 
 
 @pytest.mark.parametrize(("what", "kind"), [("bench", ""), ("rig", ""), *(("plan", kind) for kind in KINDS)])
@@ -142,15 +140,12 @@ def test_the_schema_stands_where_it_is_wanted_and_the_file_refers_to_it(tmp_path
     assert (tmp_path / "schemas" / "b.json").exists()
 
 
-def test_commands_refuse_another_word_and_print_a_schema(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    status, printed = run_rig(["new", "benhc", "-o", "x.toml"])
+def test_commands_refuse_another_word_and_print_a_schema(command, tmp_path):
+    status, _, err = command("new benhc -o x.toml")
     assert status == 1
-    assert "allowed is bench, plan, rig, sensors, driver or mapping" in printed
+    assert "allowed is bench, plan, rig, sensors, driver or mapping" in err
     with pytest.raises(ConfigurationError, match="kind = 'backbones'"):
         new_file("plan", tmp_path / "x.toml", kind="backbones")
-    status, printed = run_rig(["schema", "plan"])
-    assert status == 0
-    assert json.loads(printed) == schema_of("plan")
-    assert run_rig(["schema", "backbone", "-o", "backbone.schema.json"])[0] == 0
+    assert json.loads(command("schema plan").succeeded().out) == schema_of("plan")
+    command("schema backbone -o backbone.schema.json").succeeded()
     assert json.loads((tmp_path / "backbone.schema.json").read_text(encoding="utf-8")) == schema_of("backbone")

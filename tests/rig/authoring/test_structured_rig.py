@@ -17,7 +17,6 @@ from rig.errors import ConfigurationError
 from rig.models.files.files import save
 from simulators.analysis import phase_resonance_backbone
 from simulators.simulation import Simulation
-from tests.docs.reader import run_rig
 from tests.identification.structured.models import beam
 from tests.rig.authoring.test_schemas import of, read
 from tests.simulators.references import UNFILTERED
@@ -193,8 +192,7 @@ def test_a_spring_that_pushes_at_rest_is_refused():
         structured_bench(beam(elements=(element,)), load_bench("magnet-beam"))
 
 
-def test_from_the_command_line(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_from_the_command_line(command, tmp_path):
     laws = (UserSpring(f"{__name__}:pushing", (0.0,)), Jenkins(1.0, 0.5))
     element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=laws)
     save(beam(elements=(element,)), tmp_path / "own.h5")
@@ -206,17 +204,13 @@ def test_from_the_command_line(tmp_path, monkeypatch):
         ("--from model.h5 --bench magnet-beam --shaker none", "shaker = 'none': allowed is one of"),
         ("--shaker lds-v203", "--shaker: is for a rig that begins with a model, --from"),
     ):
-        status, printed = run_rig(["new", "rig", *line.split(), "-o", "mine.toml"])
-        assert (status, printed.count("\n")) == (1, 1), printed
-        assert message in printed
+        status, out, err = command(f"new rig {line} -o mine.toml")
+        assert (status, out, err.count("\n")) == (1, "", 1), err
+        assert message in err
     assert not (tmp_path / "mine.toml").exists()
-    status, printed = run_rig(["new", "plan", "--from", "model.h5", "--bench", "magnet-beam", "-o", "mine.toml"])
-    assert (status, "allowed is `rig new rig`" in printed) == (1, True)
-    status, printed = run_rig(
-        ["new", "rig", "--from", "own.h5", "--bench", "magnet-beam", "--trust-code", "-o", "mine.toml"]
-    )
-    assert (status, printed.split(";")[0]) == (
-        0, "mine.toml: structured model of a specimen behind the exciter of the bench magnet-beam",
-    )  # fmt: skip
+    status, _, err = command("new plan --from model.h5 --bench magnet-beam -o mine.toml")
+    assert (status, "allowed is `rig new rig`" in err) == (1, True)
+    made = command("new rig --from own.h5 --bench magnet-beam --trust-code -o mine.toml").succeeded()
+    assert made.out.startswith("mine.toml: structured model of a specimen behind the exciter of the bench magnet-beam;")
     kinds = [element["kind"] for element in load_bench("mine.toml").driver.options["elements"]]
     assert kinds == ["force-table", "cubic"]  # the function is numbers now: the bench names no code

@@ -10,7 +10,6 @@ import rig
 from rig.bench import load_bench
 from rig.bench.user_code import named_code
 from rig.campaigns.running.continuation import what_is_left
-from rig.cli import main
 from rig.errors import ConfigurationError
 from rig.measurements import sweeps
 from rig.recording.reader import Recording
@@ -59,18 +58,6 @@ def lab(tmp_path, monkeypatch, request):
     monkeypatch.setattr(sys, "path", [*sys.path])
     yield name
     sys.modules.pop(name, None)
-
-
-@pytest.fixture
-def command(capsys, monkeypatch):
-    def typed(line: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return int(stop.value.code or 0), captured.out, captured.err
-
-    return typed
 
 
 def forgotten(name):

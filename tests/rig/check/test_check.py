@@ -9,7 +9,6 @@ from rig.arming.run_options import RunOptions
 from rig.check.findings import Finding
 from rig.check.report import say, summary
 from rig.check.run import check
-from rig.cli import main
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 from simulators.virtual_rig import VirtualRig
@@ -162,26 +161,17 @@ def test_the_table_names_what_to_do(tmp_path, monkeypatch, capsys):
     assert "failed: " in out.splitlines()[-1]
 
 
-def test_the_command_writes_json_and_a_figure_and_ends_with_one_where_it_fails(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_writes_json_and_a_figure_and_ends_with_one_where_it_fails(command, tmp_path, monkeypatch):
     rewire(monkeypatch, noise_only("drive"))
-    monkeypatch.setattr("sys.argv", ["rig", "check", "--bench", "b.toml", "-o", "c.h5", "--figure", "c.png", "--json"])
     (tmp_path / "b.toml").write_text('base = "magnet-beam"\nblock = 50\n')
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 1
-    assert json.loads(capsys.readouterr().out)["failed"] == ["life drive"]
+    done = command("check --bench b.toml -o c.h5 --figure c.png --json")
+    assert done.status == 1
+    assert json.loads(done.out)["failed"] == ["life drive"]
     assert (tmp_path / "c.png").stat().st_size > 10_000
 
 
-def test_show_and_plot_know_a_check(sound, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["rig", "show", str(sound.recording), "--json"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
-    assert json.loads(capsys.readouterr().out)["verdict"] == "passed"
-    monkeypatch.setattr("sys.argv", ["rig", "plot", str(sound.recording), "-o", str(tmp_path / "c.pdf")])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
+def test_show_and_plot_know_a_check(command, sound, tmp_path):
+    shown = command("show", sound.recording, "--json").succeeded()
+    assert json.loads(shown.out)["verdict"] == "passed"
+    command("plot", sound.recording, "-o", "c.pdf").succeeded()
     assert (tmp_path / "c.pdf").stat().st_size > 10_000

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rig.cli import main
 from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.friction import IwanSite
 from simulators.structures.structure import BeamStructure
@@ -28,20 +27,6 @@ k2 = 6.283185307179586
 centre_frequency_hz = 24.0
 frequency_window_hz = [21.933, 26.807]
 """
-
-
-@pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def run(line):
-        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        streams = capsys.readouterr()
-        return stop.value.code, streams.out, streams.err
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -314,12 +299,11 @@ def test_facts_of_the_bench_that_are_not_those_of_its_virtual_rig_are_remarked(c
     assert "drive_mode_shape = 0.7: the virtual specimen has 0.908466" in err
 
 
-def test_debug_shows_the_traceback(command, monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["rig", "show", "missing.h5", "--debug"])
+def test_debug_shows_the_traceback(command):
     from rig.errors import RecordingError
 
     with pytest.raises(RecordingError):
-        main()
+        command("show missing.h5 --debug")
 
 
 def test_a_run_with_a_failed_point_exits_with_one(command, tmp_path):

@@ -5,8 +5,7 @@ import webbrowser
 
 import pytest
 
-from rig.cli import docs as command
-from rig.cli import main
+from rig.cli.docs import BUILD
 from rig.reference import words
 from rig.reference.entry import Entry
 
@@ -43,52 +42,44 @@ def without_site(monkeypatch):
     monkeypatch.setattr(words, "site", lambda: None)
 
 
-def run(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["rig", "docs", *arguments])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
-
-
-def test_a_word_opens_its_page_and_prints_address_and_line(folder, opened, monkeypatch, capsys):
-    status, out, _ = run(monkeypatch, capsys, "settle.phase_deg")
+def test_a_word_opens_its_page_and_prints_address_and_line(folder, opened, command):
+    status, out, _ = command("docs settle.phase_deg")
     address = f"{(folder / 'k.html').as_uri()}#a"
     assert (status, opened) == (0, [address])
     assert out.splitlines() == ["settle.phase_deg (key): Largest error.", "    default 1", f"    {address}"]
 
 
-def test_several_hits_are_listed_and_none_is_opened(folder, opened, monkeypatch, capsys):
-    status, out, _ = run(monkeypatch, capsys, "phase_deg")
+def test_several_hits_are_listed_and_none_is_opened(folder, opened, command):
+    status, out, _ = command("docs phase_deg")
     assert (status, opened) == (0, [])
     assert "settle.phase_deg (key)" in out
     assert "other.phase_deg (key)" in out
     assert out.splitlines()[-1] == "rig docs settle.phase_deg opens the first"
 
 
-def test_a_message_without_a_page_is_printed(folder, opened, monkeypatch, capsys):
-    status, out, _ = run(monkeypatch, capsys, "lost", "lock")
+def test_a_message_without_a_page_is_printed(folder, opened, command):
+    status, out, _ = command("docs lost lock")
     assert (status, out, opened) == (0, "lost-lock (message): The lock was lost.\n", [])
 
 
-def test_alone_it_opens_the_home_page(folder, opened, monkeypatch, capsys):
-    status, out, _ = run(monkeypatch, capsys)
+def test_alone_it_opens_the_home_page(folder, opened, command):
+    status, out, _ = command("docs")
     assert (status, opened) == (0, [(folder / "index.html").as_uri()])
     assert out.strip() == opened[0]
 
 
-def test_an_unknown_word_is_one_line_with_the_closest(folder, opened, monkeypatch, capsys):
-    status, _, err = run(monkeypatch, capsys, "phse_deg")
+def test_an_unknown_word_is_one_line_with_the_closest(folder, opened, command):
+    status, _, err = command("docs phse_deg")
     assert (status, opened) == (1, [])
     assert err == "rig: WORD = 'phse_deg': nothing of this name; closest: settle.phase_deg\n"
 
 
 @pytest.mark.parametrize("setting", [("SSH_CONNECTION", "10.0.0.1"), ("DISPLAY", "")])
-def test_without_a_screen_the_address_is_printed_and_nothing_opened(folder, opened, monkeypatch, capsys, setting):
+def test_without_a_screen_the_address_is_printed_and_nothing_opened(folder, opened, command, monkeypatch, setting):
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv(*setting)
-    status, out, _ = run(monkeypatch, capsys, "settle.phase_deg")
+    status, out, _ = command("docs settle.phase_deg")
     assert (status, opened) == (0, [])
     assert "k.html#a" in out
 
@@ -104,15 +95,15 @@ def test_without_a_screen_the_address_is_printed_and_nothing_opened(folder, open
     ],
 )
 @pytest.mark.usefixtures("without_site")
-def test_without_a_site_it_prints_what_the_code_says_and_how_to_build(monkeypatch, capsys, opened, word, expected):
-    status, out, err = run(monkeypatch, capsys, word)
+def test_without_a_site_it_prints_what_the_code_says_and_how_to_build(command, opened, word, expected):
+    status, out, err = command("docs", word)
     assert (status, opened) == (0, [])
     assert expected in out
-    assert err.strip() == command.BUILD
+    assert err.strip() == BUILD
 
 
 @pytest.mark.usefixtures("without_site")
-def test_without_a_site_and_a_word_it_says_how_to_build(monkeypatch, capsys):
-    status, _, err = run(monkeypatch, capsys)
+def test_without_a_site_and_a_word_it_says_how_to_build(command):
+    status, _, err = command("docs")
     assert status == 1
-    assert err == f"rig: {command.BUILD}\n"
+    assert err == f"rig: {BUILD}\n"

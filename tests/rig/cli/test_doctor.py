@@ -1,11 +1,9 @@
 """`rig doctor --daq` and `--matrix` as a person sees them; what they measure is tested beside rig.loop and rig.matrix."""
 
 import json
-import sys
 
 import pytest
 
-from rig.cli import main
 from rig.emulator.emulated import emulated
 from rig.matrix import read_rows, write_rows
 from tests.rig.matrix.test_rows import THEIRS, row
@@ -36,20 +34,6 @@ FOUND = {
         "bench_lines": ["[driver.options]", "queue_blocks = 32", "watchdog_s = 0.12"],
     },
 }
-
-
-@pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def run(line):
-        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        streams = capsys.readouterr()
-        return stop.value.code, streams.out, streams.err
-
-    return run
 
 
 def test_settings_stand_with_unit_and_reason_and_lines_for_the_bench_behind(command, monkeypatch):

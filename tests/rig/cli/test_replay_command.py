@@ -123,13 +123,12 @@ def test_in_a_pipe_it_prints_every_point_and_ends_with_the_recording(recording):
     assert any(line.startswith("end: the plan was carried out") for line in lines)
 
 
-def test_a_speed_or_file_that_cannot_be_is_one_line(recording, tmp_path):
+def test_a_speed_or_file_that_cannot_be_is_one_line(command, recording, tmp_path):
     for arguments, text in [
         ((str(recording), "--speed", "0"), "rig: --speed = 0: allowed is above 0, up to 1000\n"),
         ((str(tmp_path / "none.h5"),), "none.h5"),
     ]:
-        command = [*RIG, "replay", *arguments, "--terminal"]
-        done = subprocess.run(command, capture_output=True, text=True, env=environment(), timeout=300)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert text in done.stderr
-        assert done.stderr.count("\n") == 1
+        status, out, err = command("replay", *arguments, "--terminal")
+        assert (status, out) == (1, "")
+        assert text in err
+        assert err.count("\n") == 1

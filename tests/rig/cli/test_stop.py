@@ -51,12 +51,6 @@ def place(monkeypatch, tmp_path):
     return tmp_path
 
 
-def said(*arguments):
-    """Run a command; return status, standard output and error."""
-    done = subprocess.run([*RIG, *arguments], capture_output=True, text=True, timeout=300)
-    return done.returncode, done.stdout, done.stderr
-
-
 @pytest.fixture
 def running():
     """Start runs that take half a minute by the clock; wait until each is driven."""
@@ -84,10 +78,10 @@ def driven(name):
     return False
 
 
-def test_a_run_is_stopped_from_another_process_and_the_status_says_that_it_is_at_0_v(running):
+def test_a_run_is_stopped_from_another_process_and_the_status_says_that_it_is_at_0_v(command, running):
     child = running("run.h5")
     began = time.monotonic()
-    status, out, err = said("stop")
+    status, out, err = command("stop")
     took_s = time.monotonic() - began
     assert (status, err) == (0, "")
     assert re.fullmatch(r"\S+/run\.h5 \(process \d+\): output at 0 V\n", out)
@@ -99,15 +93,15 @@ def test_a_run_is_stopped_from_another_process_and_the_status_says_that_it_is_at
 
 
 @pytest.mark.slow
-def test_of_two_runs_the_named_one_is_stopped_and_then_all(running):
+def test_of_two_runs_the_named_one_is_stopped_and_then_all(command, running):
     one, other = running("one.h5"), running("other.h5")
-    status, out, _ = said("stop", "one.h5")
+    status, out, _ = command("stop one.h5")
     assert (status, out.count("\n")) == (0, 1)
     one.communicate(timeout=120)
     assert other.poll() is None
     assert driven("other.h5")
     another = running("another.h5")
-    status, out, _ = said("stop")
+    status, out, _ = command("stop")
     assert status == 0
     assert sorted(re.findall(r"(\w+)\.h5", out)) == ["another", "other"]
     for child in (other, another):
@@ -115,19 +109,19 @@ def test_of_two_runs_the_named_one_is_stopped_and_then_all(running):
         assert child.returncode == 1
 
 
-def test_without_a_run_one_line_says_so():
-    assert said("stop") == (1, "", "rig: no run is under way\n")
-    assert said("stop", "run.h5") == (1, "", "rig: run.h5: no run into this file is under way\n")
-    (status, out, err) = said("stop", "--timeout", "-1")
+def test_without_a_run_one_line_says_so(command):
+    assert command("stop") == (1, "", "rig: no run is under way\n")
+    assert command("stop run.h5") == (1, "", "rig: run.h5: no run into this file is under way\n")
+    (status, out, err) = command("stop --timeout -1")
     assert (status, out) == (2, "")
     assert "timeout" in err
 
 
-def test_a_run_that_does_not_answer_or_is_killed_wants_the_hardware_stop(running):
+def test_a_run_that_does_not_answer_or_is_killed_wants_the_hardware_stop(command, running):
     child = running("run.h5")
     loop = [int(pid) for pid in children_of(child.pid)]
     os.kill(child.pid, signal.SIGSTOP)
-    status, out, _ = said("stop", "--timeout", "0.5")
+    status, out, _ = command("stop --timeout 0.5")
     assert status == 1
     assert "not at 0 V within 0." in out
     assert out.endswith("USE THE HARDWARE STOP\n")
@@ -140,15 +134,15 @@ def test_a_run_that_does_not_answer_or_is_killed_wants_the_hardware_stop(running
     wait_until(lambda: not any(alive(pid) for pid in loop), "the loop's process follows the run's")
 
 
-def test_what_a_killed_run_has_left_is_named_and_wants_the_hardware_stop(running):
+def test_what_a_killed_run_has_left_is_named_and_wants_the_hardware_stop(command, running):
     child = running("run.h5")
     child.kill()
     child.communicate()
-    for arguments in (("stop",), ("stop", "run.h5")):
-        status, out, _ = said(*arguments)
+    for line in ("stop", "stop run.h5"):
+        status, out, _ = command(line)
         assert status == 1
         assert out.endswith("its process has ended without a word: USE THE HARDWARE STOP\n")
-    assert said("stop", "other.h5")[0] == 1
+    assert command("stop other.h5")[0] == 1
 
 
 def children_of(pid):
@@ -162,18 +156,18 @@ def alive(pid):
         return False
 
 
-def test_watching_in_plain_lines_begins_before_the_run_and_ends_with_it(running):
+def test_watching_in_plain_lines_begins_before_the_run_and_ends_with_it(command, running):
     watching = subprocess.Popen(
         [*RIG, "watch", "run.h5"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1
     )
     assert watching.stderr.readline() == "no run into run.h5 is under way; waiting\n"
     running("run.h5")
-    assert said("stop", "run.h5")[0] == 0
+    begun = re.compile(r"[\d.]+ s  (searching|settling)  point 1 of 2  level 0\.\d+ V  ")
+    assert any(begun.match(line) for line in watching.stdout)
+    assert command("stop run.h5")[0] == 0
     out, err = watching.communicate(timeout=120)
     assert (watching.returncode, err) == (0, "")
-    lines = out.splitlines()
-    assert any(re.match(r"[\d.]+ s  (searching|settling)  point 1 of 2  level 0\.\d+ V  ", line) for line in lines)
-    assert any(line.endswith("guard: ramping") for line in lines)
+    assert any(line.endswith("guard: ramping") for line in out.splitlines())
     assert re.search(r"end: stopped by `rig stop` \(process \d+\)", out)
 
 
@@ -214,10 +208,10 @@ def on_a_terminal(*arguments):
     return child.wait(300), shown.decode(errors="replace")
 
 
-def test_a_run_on_a_terminal_says_how_to_watch_and_stop_it():
+def test_a_run_on_a_terminal_says_how_to_watch_and_stop_it(command):
     _, shown = on_a_terminal("run", "magnet-beam/backbone-short", "-o", "run.h5")
     assert shown.startswith("in another terminal, `rig watch` shows this run and `rig stop` ramps it down\r\n")
-    assert "rig watch" not in said("run", "magnet-beam/backbone-short", "-o", "again.h5")[2]
+    assert "rig watch" not in command("run magnet-beam/backbone-short -o again.h5").err
 
 
 def test_on_a_terminal_a_run_is_drawn_and_its_end_stays_to_be_read(running):

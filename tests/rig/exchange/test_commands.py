@@ -3,8 +3,6 @@
 import errno
 import json
 import os
-import shlex
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,25 +12,10 @@ import scipy.io
 
 import rig
 from identification import FrequencyResponseMatrix, ModalAnalysis, nonlinear_mode
-from rig.cli import main
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file
 from rig.models.files.files import load, save
-
-
-@pytest.fixture
-def command(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def typed(line):
-        monkeypatch.setattr(sys, "argv", ["rig", *shlex.split(line)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return int(stop.value.code or 0), captured.out, captured.err
-
-    return typed
 
 
 def test_a_backbone_goes_to_mat_as_a_structure_with_units(command, backbone_file, backbone, tmp_path):

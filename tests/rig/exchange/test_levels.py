@@ -184,14 +184,10 @@ def test_series_that_do_not_follow_sep005_are_refused_in_one_line(change, fault,
         import_sep005(good, mapping(tmp_path, None, "output_v"))
 
 
-def test_levels_are_told_apart_on_the_command_line(multisine_file, tmp_path, monkeypatch):
-    from tests.docs.reader import run_rig
-
-    monkeypatch.chdir(tmp_path)
-    assert run_rig(["export", str(multisine_file), "-o", "levels.uff", "--encoding", "binary"])[0] == 0
-    status, printed = run_rig(["import", "levels.uff", "-o", "second.h5", "--item", "2", "--json"])
-    assert status == 0
-    assert json.loads(printed)["kind"] == "frequency-response-matrix"
+def test_levels_are_told_apart_on_the_command_line(command, multisine_file):
+    command("export", multisine_file, "-o", "levels.uff", "--encoding", "binary").succeeded()
+    imported = command("import levels.uff -o second.h5 --item 2 --json").succeeded()
+    assert json.loads(imported.out)["kind"] == "frequency-response-matrix"
 
 
 def test_a_plan_of_one_level_is_one_object_as_before(tmp_path):

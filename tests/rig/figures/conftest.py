@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from rig.drawing.page import page_for
 from rig.drawing.style import restyle
-from tests.rig.report.conftest import command, recordings  # noqa: F401 (fixtures)
+from tests.rig.report.conftest import recordings  # noqa: F401 (a fixture)
 
 Draw = Callable[[Figure], None]
 

@@ -1,14 +1,13 @@
 """Short recordings of the one-sided magnet beam, and the models that the command line makes of them."""
 
-import sys
-from dataclasses import dataclass
+import contextlib
 from pathlib import Path
 
 import pytest
 
 import rig
 from rig.campaigns.plans import load_plan, plan_from
-from rig.cli import main
+from tests.command import run_command
 
 BENCH = {"bench": "magnet-beam"}
 SWEEP = {**BENCH, "kind": "sweep", "start_hz": 18.0, "stop_hz": 34.0, "rate_hz_per_s": 2.0}
@@ -24,44 +23,17 @@ PLANS = {
 }
 
 
-@dataclass(frozen=True)
-class Typed:
-    """What a command came to."""
-
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def command(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def typed(line: str) -> Typed:
-        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        return Typed(int(stop.value.code or 0), captured.out, captured.err)
-
-    return typed
-
-
 @pytest.fixture(scope="session")
 def shelf(tmp_path_factory) -> Path:
     """A folder with the recordings, and with LIN.h5, EX.h5 and NM.h5 as ``rig identify`` makes them."""
     folder = tmp_path_factory.mktemp("models")
     for name, table in PLANS.items():
         rig.run(plan_from(table, name), output=folder / f"{name}.h5").close()
-    for line in (
-        "modal.h5 --model linear --count 2 -o LIN.h5",
-        "exciter.h5 --model exciter -o EX.h5",
-        "backbone.h5 --modes LIN.h5 -o NM.h5",
-    ):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.chdir(folder)
-            patch.setattr(sys, "argv", ["rig", "identify", *line.split()])
-            with pytest.raises(SystemExit) as stop:
-                main()
-        assert not stop.value.code
+    with contextlib.chdir(folder):
+        for line in (
+            "modal.h5 --model linear --count 2 -o LIN.h5",
+            "exciter.h5 --model exciter -o EX.h5",
+            "backbone.h5 --modes LIN.h5 -o NM.h5",
+        ):
+            run_command(f"identify {line}").succeeded()
     return folder

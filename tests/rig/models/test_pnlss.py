@@ -50,13 +50,9 @@ def recordings(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def there(command, recordings, monkeypatch):
-    """Commands typed in the folder of the recordings."""
-
-    def typed(line):
-        monkeypatch.chdir(recordings)
-        return command(line)
-
-    return typed
+    """The command in the folder of the recordings."""
+    monkeypatch.chdir(recordings)
+    return command
 
 
 @pytest.fixture

@@ -47,13 +47,9 @@ def recordings(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def there(command, recordings, monkeypatch):
-    """Commands typed in the folder of the recordings."""
-
-    def typed(line):
-        monkeypatch.chdir(recordings)
-        return command(line)
-
-    return typed
+    """The command in the folder of the recordings."""
+    monkeypatch.chdir(recordings)
+    return command
 
 
 def test_a_model_becomes_a_rig_like_the_bench_of_its_recording(there, recordings):

@@ -6,8 +6,8 @@ import os
 import pytest
 
 import rig
-from rig.cli import main
 from rig.monitor import folder as module
+from tests.command import run_command
 from tests.rig.monitor.scripted import Scripted
 from tests.rig.monitor.visitor import Visitor, served
 
@@ -36,7 +36,7 @@ def recording(tmp_path_factory):
 
 
 @pytest.fixture
-def folder(tmp_path, recording, monkeypatch):
+def folder(tmp_path, recording):
     """A folder with a recording, a model, a damaged file, a text, a link to the outside and a folder."""
     folder = tmp_path / "folder"
     folder.mkdir()
@@ -46,9 +46,7 @@ def folder(tmp_path, recording, monkeypatch):
     (folder / "inner.h5").mkdir()
     (folder / "passwd.h5").symlink_to("/etc/passwd")
     (folder / "elsewhere.h5").symlink_to(recording)
-    monkeypatch.setattr("sys.argv", ["rig", "identify", str(recording), "-o", str(folder / "model.h5"), "--overwrite"])
-    with pytest.raises(SystemExit):
-        main()
+    run_command("identify", recording, "-o", folder / "model.h5").succeeded()
     return folder
 
 

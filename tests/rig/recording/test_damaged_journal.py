@@ -7,7 +7,6 @@ import pytest
 
 import rig
 from rig.arming.run_options import Silent
-from rig.cli import main
 from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
 from rig.recording.journal_blocks import read_journal
@@ -44,7 +43,7 @@ def damage(output, kind, which):
     return blocks[which]
 
 
-def test_a_lost_block_of_rows_costs_its_rows_and_no_point(recorded, monkeypatch, capsys):
+def test_a_lost_block_of_rows_costs_its_rows_and_no_point(command, recorded):
     with Recording(recorded) as recording:
         n_rows, points = recording.n_rows, recording.points
         before = recording.parts[0].read(0, n_rows)
@@ -58,11 +57,7 @@ def test_a_lost_block_of_rows_costs_its_rows_and_no_point(recorded, monkeypatch,
     assert after[~missing].tobytes() == before[~missing].tobytes()
     told = f"rows {block.row} to {block.row + lost - 1}, which are not numbers now"
     for options in ([], ["--json"]):
-        monkeypatch.setattr("sys.argv", ["rig", "show", str(recorded), *options])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert ended.value.code == 0
-        shown = capsys.readouterr().out
+        shown = command("show", recorded, *options).succeeded().out
         assert told in shown
     assert json.loads(shown)["parts"][0]["bytes_lost"] == 36 + len(block.payload)
     with rig.resume(recorded) as run:

@@ -1,63 +1,49 @@
 """The command: what it writes, what it refuses in one line, and what it leaves alone."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 
 from rig.campaigns.plans import load_plan
-from rig.cli import main
 from rig.models.rehearse import load_rehearsal
 from tests.rig.rehearsal.plans import SHORT_TEXT
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("plan.toml").write_text(SHORT_TEXT)
+def folder(command, tmp_path):
+    """The folder of the command, with a plan."""
+    (tmp_path / "plan.toml").write_text(SHORT_TEXT)
     return tmp_path
 
 
-@pytest.fixture
-def command(monkeypatch, capsys):
-    def run(*arguments, status=0):
-        monkeypatch.setattr(sys, "argv", ["rig", *arguments])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        told = capsys.readouterr()
-        assert stop.value.code == status, told.err
-        return told
-
-    return run
-
-
 def test_a_rehearsal_its_figure_its_page_and_its_comparison(command, folder):
-    told = command("rehearse", "plan.toml", "--exact", "-n", "3", "-o", "r.h5", "--figure", "r.png", "--jobs", "1")
+    told = command("rehearse plan.toml --exact -n 3 -o r.h5 --figure r.png --jobs 1").succeeded()
     assert "ends well       100 %" in told.out
     assert "3 of 3 draws, 0 did not end well" in told.err
     assert {path.name for path in folder.iterdir()} == {"plan.toml", "r.h5", "r.png"}
-    assert "ends well       100 %" in command("show", "r.h5").out
-    verdict = json.loads(command("show", "r.h5", "--json").out)["verdict"]
+    assert "ends well       100 %" in command("show r.h5").succeeded().out
+    verdict = json.loads(command("show r.h5 --json").succeeded().out)["verdict"]
     assert verdict["ends_well"]["count"] == 3
-    command("plot", "r.h5", "-o", "again.png")
-    command("run", "plan.toml", "--rehearsal", "r.h5", "-o", "run.h5")
-    assert "rehearsed: ends well 100 %" in command("show", "run.h5").out
-    assert len(json.loads(command("rehearse", "r.h5", "--compare", "run.h5", "--json").out)["points"]) == 2
-    assert "columns: per cent" in command("rehearse", "r.h5", "--compare", "run.h5").out
+    command("plot r.h5 -o again.png").succeeded()
+    command("run plan.toml --rehearsal r.h5 -o run.h5").succeeded()
+    assert "rehearsed: ends well 100 %" in command("show run.h5").succeeded().out
+    compared = command("rehearse r.h5 --compare run.h5 --json").succeeded()
+    assert len(json.loads(compared.out)["points"]) == 2
+    assert "columns: per cent" in command("rehearse r.h5 --compare run.h5").succeeded().out
 
 
 def test_a_twin_is_written_and_an_improved_plan_too(command):
     Path("hasty.toml").write_text(
         SHORT_TEXT.replace("record_periods = 8", "record_periods = 8\nsettle.longest_periods = 40")
     )
-    command("rehearse", "hasty.toml", "--exact", "-n", "2", "-o", "r.h5", "--improve", "patient.toml", "--jobs", "1")
+    command("rehearse hasty.toml --exact -n 2 -o r.h5 --improve patient.toml --jobs 1").succeeded()
     assert load_plan("patient.toml").settle.longest_periods == 120.0
     assert "# taken: three times as long to settle, ends well 0 -> 100 %" in Path("patient.toml").read_text()
     assert len(load_rehearsal(Path("patient.h5")).draws) == 2
     assert any(one["taken"] for one in load_rehearsal(Path("r.h5")).tried)
-    assert "twin 1 written to t.toml" in command("rehearse", "plan.toml", "--exact", "--twin", "1", "-o", "t.toml").out
-    command("run", "plan.toml", "--bench", "t.toml", "-o", "run.h5")
+    assert "twin 1 written to t.toml" in command("rehearse plan.toml --exact --twin 1 -o t.toml").succeeded().out
+    command("run plan.toml --bench t.toml -o run.h5").succeeded()
 
 
 @pytest.mark.parametrize(
@@ -83,16 +69,19 @@ def test_a_twin_is_written_and_an_improved_plan_too(command):
     ],
 )
 def test_what_it_refuses_is_one_line_and_leaves_no_file(command, folder, arguments, says):
-    told = command("rehearse", *arguments, "--jobs", "1", status=1)
+    told = command("rehearse", *arguments, "--jobs", "1")
+    assert told.status == 1
     assert says in told.err
     assert told.err.count("\n") == 1
     assert {path.name for path in folder.iterdir()} == {"plan.toml"}
 
 
 def test_an_existing_file_stays_without_overwrite(command):
-    command("rehearse", "plan.toml", "--exact", "-n", "1", "-o", "r.h5", "--jobs", "1")
+    command("rehearse plan.toml --exact -n 1 -o r.h5 --jobs 1").succeeded()
     before = Path("r.h5").read_bytes()
-    assert "r.h5: exists already" in command("rehearse", "plan.toml", "--exact", "-o", "r.h5", status=1).err
+    again = command("rehearse plan.toml --exact -o r.h5")
+    assert again.status == 1
+    assert "r.h5: exists already" in again.err
     assert Path("r.h5").read_bytes() == before
-    command("rehearse", "plan.toml", "--exact", "-n", "2", "-o", "r.h5", "--overwrite", "--jobs", "1")
+    command("rehearse plan.toml --exact -n 2 -o r.h5 --overwrite --jobs 1").succeeded()
     assert len(load_rehearsal(Path("r.h5")).draws) == 2

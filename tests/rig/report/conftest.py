@@ -1,7 +1,5 @@
-"""Short recordings of every kind of campaign, models made of them, and the command as it is typed."""
+"""Short recordings of every kind of campaign."""
 
-import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -9,7 +7,6 @@ import pytest
 import rig
 from rig.bench import Bench, load_bench
 from rig.campaigns.plans import load_plan, plan_from
-from rig.cli import main
 
 LINES = {"realisations": 2, "transient_periods": 1, "periods": 2, "levels_rms_v": [0.1]}
 CHANGES = {
@@ -33,29 +30,6 @@ def short(name: str):
     """The shipped plan, shortened."""
     table = load_plan(name).model_dump(mode="json") | CHANGES[name]
     return plan_from({key: value for key, value in table.items() if value is not None}, name)
-
-
-@dataclass(frozen=True)
-class Typed:
-    """What a command came to."""
-
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def command(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-
-    def typed(*words: object) -> Typed:
-        monkeypatch.setattr(sys, "argv", ["rig", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        streams = capsys.readouterr()
-        return Typed(int(stop.value.code or 0), streams.out, streams.err)
-
-    return typed
 
 
 @pytest.fixture(scope="session")

@@ -1,17 +1,17 @@
 """A report on what is no recording: models, predictions, rehearsals, imported measurements, checks, and studies."""
 
+import contextlib
 import json
-import sys
 
 import pytest
 
-from rig.cli import main
 from rig.models.files.files import KINDS, save
 from rig.recording.arrays import kind_of
 from rig.report.paper import SAME_LEVEL, PaperError, agreement
 from rig.report.report import write_report
 from rig.show.summary import summarise
 from rig.text.console import PrintedTable, collected
+from tests.command import run_command
 from tests.rig.exchange.conftest import matrix, modes, responses  # noqa: F401 (fixtures)
 from tests.rig.exchange.structured_models import structure
 from tests.rig.report.page import read
@@ -47,13 +47,9 @@ def shelf(recordings, tmp_path_factory):
     for path in recordings.values():
         (folder / path.name).symlink_to(path)
     (folder / "plan.toml").write_text(PLAN)
-    for line in MADE:
-        with pytest.MonkeyPatch.context() as patch:
-            patch.chdir(folder)
-            patch.setattr(sys, "argv", ["rig", *line.split()])
-            with pytest.raises(SystemExit) as stop:
-                main()
-        assert not stop.value.code, line
+    with contextlib.chdir(folder):
+        for line in MADE:
+            run_command(line).succeeded()
     return folder
 
 

@@ -19,7 +19,7 @@ from rig.reproduce.steady import steady
 from rig.reproduce.sweeps import COUPLED, simulated_sweeps
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
-from tests.rig.reproduce.commands import typed
+from tests.command import run_command
 
 SMALL = "reproduce magnet-beam --models 1 --levels 1 --iterations 8 --without sweeps"
 
@@ -27,8 +27,7 @@ SMALL = "reproduce magnet-beam --models 1 --levels 1 --iterations 8 --without sw
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reproduced") / "study"
-    done = typed(f"{SMALL} -o {folder}")
-    assert done.status == 0, done.err
+    done = run_command(f"{SMALL} -o {folder}").succeeded()
     folder.joinpath("printed.txt").write_text(done.out)
     return folder
 
@@ -84,16 +83,18 @@ def test_sweeps_of_force_models_are_simulated_from_the_voltage_too(folder):
     assert coupled.rms_error < 0.5 * alone.rms_error
 
 
-def test_models_know_which_realisations_they_were_identified_with_whatever_the_file_is_called(folder, tmp_path):
+def test_models_know_which_realisations_they_were_identified_with_whatever_the_file_is_called(
+    command, folder, tmp_path
+):
     (path,) = (folder / "force" / "models").glob("*01.h5")
     other = tmp_path / "other-name.h5"
     other.write_bytes((folder / "recordings" / "multisine-1.h5").read_bytes())
-    done = typed(f"predict {path} --multisine {other} -o {tmp_path / 'P.h5'} --json")
+    done = command(f"predict {path} --multisine {other} -o {tmp_path / 'P.h5'} --json")
     uses = [run["use"] for run in json.loads(done.out)["multisines"]]
     assert uses == ["test", "validation", "training", "training", "training"]
 
 
-def test_figures_of_a_small_study_say_what_is_missing_and_why_curves_end(folder, monkeypatch):
+def test_figures_of_a_small_study_say_what_is_missing_and_why_curves_end(command, folder, monkeypatch):
     pages = {}
 
     def keep(study, name, draw, size):
@@ -101,7 +102,7 @@ def test_figures_of_a_small_study_say_what_is_missing_and_why_curves_end(folder,
         draw(pages[name], study)
 
     monkeypatch.setattr("rig.reproduce.figures._write", keep)
-    assert typed(f"{SMALL} -o {folder}").status == 0
+    assert command(f"{SMALL} -o {folder}").status == 0
     errors, steady_page = pages["errors"], pages["steady"]
     assert "tests of 1 model; 2 of 3 levels not recorded" in errors.get_suptitle().replace("\n", " ")
     (axis,) = errors.axes
@@ -133,8 +134,8 @@ def test_models_of_a_study_are_drawn_with_spectrum_and_time(folder):
     ("option", "kind"),
     [("--input voltage", "voltage"), ("--beside backbone-fine", "force-backbone-fine"), ("--states 1", "force-n1")],
 )
-def test_other_kinds_of_models_have_a_folder_beside(folder, option, kind):
-    done = typed(f"{SMALL.replace('8', '6')} --without steady {option} -o {folder} --json")
+def test_other_kinds_of_models_have_a_folder_beside(command, folder, option, kind):
+    done = command(f"{SMALL.replace('8', '6')} --without steady {option} -o {folder} --json")
     assert done.status == 0, done.err
     (path,) = (folder / kind / "models").glob("*.h5")
     model = load(path).model
@@ -168,13 +169,13 @@ def test_tables_models_and_figures_are_in_the_folder(folder, results):
     assert "0.5 N (1 model)" in text
 
 
-def test_what_is_in_the_folder_is_not_made_again(folder, tmp_path):
+def test_what_is_in_the_folder_is_not_made_again(command, folder, tmp_path):
     folder = shutil.copytree(folder, tmp_path / "study")  # the others count on what is in theirs
     kept = {
         path: path.stat().st_mtime_ns
         for path in folder.rglob("*.h5")  # recordings and models
     }
-    again = typed(f"{SMALL.replace('--models 1', '--models 2')} --without steady -o {folder} --json")
+    again = command(f"{SMALL.replace('--models 1', '--models 2')} --without steady -o {folder} --json")
     assert again.status == 0, again.err
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
     summary = json.loads(again.out)
@@ -196,10 +197,9 @@ def test_what_is_in_the_folder_is_not_made_again(folder, tmp_path):
         ("reproduce magnet-beam", 2, "-o"),
     ],
 )
-def test_mistakes_are_one_line_and_leave_no_folder(tmp_path, monkeypatch, line, status, said):
-    monkeypatch.chdir(tmp_path)
+def test_mistakes_are_one_line_and_leave_no_folder(command, tmp_path, line, status, said):
     (tmp_path / "real.toml").write_text('base = "magnet-beam"\n[driver]\nname = "serial"\noptions.port = "/dev/none"\n')
-    done = typed(line)
+    done = command(line)
     assert done.status == status
     assert said in done.err
     assert done.err.count("\n") == 1
@@ -207,16 +207,16 @@ def test_mistakes_are_one_line_and_leave_no_folder(tmp_path, monkeypatch, line, 
 
 
 @pytest.mark.slow
-def test_structured_models_stand_beside_the_others_in_the_same_folder(folder):
+def test_structured_models_stand_beside_the_others_in_the_same_folder(command, folder):
     line = "reproduce magnet-beam --models 1 --levels 1 --without sweeps --realisations 1 --model structured"
-    done = typed(f"{line} -o {folder}")
+    done = command(f"{line} -o {folder}")
     assert done.status == 0, done.err
     found = json.loads((folder / "structured-r1" / "table.json").read_text())
     (own,) = [row for row in found["errors"]["fitted"] if row["model"] is None]
     assert (own["unbounded_runs"], found["model"]) == (0, "structured")
     assert own["mean"] < 0.005
     assert "all kinds of models in this folder" in done.out
-    (again,) = [line for line in typed(f"{line} -o {folder}").err.splitlines() if "model " in line] or [""]
+    (again,) = [line for line in command(f"{line} -o {folder}").err.splitlines() if "model " in line] or [""]
     assert again == ""  # the model is not fitted twice
     specimen = replace(specimen_of("magnet-beam"), sweeps=("sweep-1",))
     options = Options(specimen=specimen, bench=load_bench("magnet-beam"), folder=folder, levels=1, model="structured")
@@ -229,9 +229,9 @@ def test_structured_models_stand_beside_the_others_in_the_same_folder(folder):
 
 
 @pytest.mark.slow
-def test_runs_that_differ_have_shifts_of_their_own(tmp_path):
+def test_runs_that_differ_have_shifts_of_their_own(command, tmp_path):
     line = "reproduce magnet-beam --models 1 --levels 1 --without sweeps --without steady --model structured"
-    done = typed(f"{line} --scatter 0.001 --shifts -o {tmp_path / 'study'}")
+    done = command(f"{line} --scatter 0.001 --shifts -o {tmp_path / 'study'}")
     assert done.status == 0, done.err
     found = json.loads((tmp_path / "study" / "structured-shifts" / "table.json").read_text())
     own, middle = (
@@ -253,6 +253,6 @@ def test_runs_that_differ_have_shifts_of_their_own(tmp_path):
         ("--model structured --input voltage", "--input voltage: is of PNLSS models; leave it out"),
     ],
 )
-def test_what_is_not_of_structured_models_is_refused(tmp_path, option, message):
-    done = typed(f"reproduce magnet-beam {option} -o {tmp_path / 'study'}")
+def test_what_is_not_of_structured_models_is_refused(command, tmp_path, option, message):
+    done = command(f"reproduce magnet-beam {option} -o {tmp_path / 'study'}")
     assert (done.status, message in done.err) == (1, True), done.err

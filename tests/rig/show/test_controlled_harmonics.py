@@ -3,7 +3,6 @@
 import pytest
 
 import rig
-from rig.cli import main
 from rig.show.summary import summarise_recording
 from tests.rig.campaigns.evaluation.test_force_harmonics import VARIED, plan_with
 
@@ -16,24 +15,16 @@ def recorded(tmp_path_factory):
         return file, summarise_recording(run.recording)
 
 
-def command(monkeypatch, capsys, *words):
-    monkeypatch.setattr("sys.argv", ["rig", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code in (0, None)
-    return capsys.readouterr().out
-
-
-def test_the_command_shows_every_point_with_the_purity_of_its_force(recorded, monkeypatch, capsys):
+def test_the_command_shows_every_point_with_the_purity_of_its_force(command, recorded):
     file, summary = recorded
     purity = [point["force_purity"] for point in summary["points"]]
     assert purity == pytest.approx([1.0, 1 / 1.25**0.5] * 2, abs=2e-3)
-    out = command(monkeypatch, capsys, "show", file)
+    out = command("show", file).succeeded().out
     assert out.count("89.4") >= 2
     assert "the plan was carried out" in out
 
 
-def test_the_command_draws_them(recorded, monkeypatch, capsys, tmp_path):
+def test_the_command_draws_them(command, recorded, tmp_path):
     file, _ = recorded
-    command(monkeypatch, capsys, "plot", file, "-o", tmp_path / "varied.png")
+    command("plot", file, "-o", "varied.png").succeeded()
     assert (tmp_path / "varied.png").stat().st_size > 10_000

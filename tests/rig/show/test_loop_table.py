@@ -5,7 +5,6 @@ import pytest
 
 import rig
 from rig.campaigns.sweep.plan import SweepPlan
-from rig.cli import main
 from rig.errors import RecordingError
 from rig.figures.files import plot
 from rig.figures.lateness import exceedance, together
@@ -43,11 +42,8 @@ def test_show_prints_what_is_recorded_of_the_clock(paced, capsys):
     )
 
 
-def test_the_lateness_is_drawn_where_a_clock_paced_the_loop_and_else_refused(paced, tmp_path, monkeypatch):
-    monkeypatch.setattr("sys.argv", ["rig", "plot", str(paced), "--lateness", "-o", str(tmp_path / "late.png")])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert not ended.value.code
+def test_the_lateness_is_drawn_where_a_clock_paced_the_loop_and_else_refused(command, paced, tmp_path):
+    command("plot", paced, "--lateness", "-o", "late.png").succeeded()
     assert (tmp_path / "late.png").stat().st_size > 10_000
     rig.run(PLAN, output=tmp_path / "quick.h5").close()
     with pytest.raises(RecordingError, match=r"quick\.h5: its loop did not run by the clock"):

@@ -15,6 +15,7 @@ from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.system.stop_signals import Interrupted, Terminated, asking, ended_in_order, held, insisting
+from tests.command import signals_as_they_were
 from tests.rig.campaigns.running.test_runs import plan_with
 
 PLAN = plan_with(levels_v=(0.4,))
@@ -23,10 +24,8 @@ BENCH = load_bench(PLAN.bench)
 
 @pytest.fixture(autouse=True)
 def handlers_as_they_were():
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    with signals_as_they_were():
+        yield
 
 
 def raising(number, real):

@@ -1,7 +1,6 @@
 """What goes to a terminal: no text of a file or a device moves its cursor, and no line is longer than a person reads."""
 
 import pickle
-import sys
 from importlib import import_module
 
 import pytest
@@ -75,17 +74,13 @@ def test_the_summary_of_a_file_shows_names_in_it_escaped(capsys):
     assert r"check of s\x07 (bench b\x1b[31m)" in out
 
 
-def test_an_error_that_is_not_ours_is_one_printable_line_too(capsys, monkeypatch):
-    cli = import_module("rig.cli.app")  # the package has an attribute of that name
-
+def test_an_error_that_is_not_ours_is_one_printable_line_too(command, monkeypatch):
     def failing(*_, **__):
         raise ValueError("bad\x1b[2J" + "x" * 100_000)
 
-    monkeypatch.setattr(cli, "app", failing)
-    monkeypatch.setattr(sys, "argv", ["rig", "list"])
-    with pytest.raises(SystemExit):
-        cli.main()
-    err = capsys.readouterr().err
+    monkeypatch.setattr(import_module("rig.cli.app"), "app", failing)  # the package has an attribute of that name
+    status, _, err = command("list")
+    assert status == 1
     assert err.startswith(r"rig: unexpected ValueError: bad\x1b[2Jxxx")
     assert err.rstrip().endswith("(run again with --debug for the details)")
     assert len(err) < 1000

@@ -1,6 +1,5 @@
 """A tuned plan is evaluated with the mode shape that was measured, whatever the bench believes."""
 
-import sys
 import tomllib
 from dataclasses import replace
 
@@ -12,7 +11,6 @@ from identification import nonlinear_mode
 from rig.bench import Bench
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.plans import plan_from
-from rig.cli import main
 from rig.models.files.files import load
 from rig.recording.reader import Recording
 from rig.show.summary import summarise_recording
@@ -31,20 +29,6 @@ def wrong_bench() -> Bench:
 @pytest.fixture(scope="module")
 def tuned(tmp_path_factory):
     return tune(wrong_bench(), tmp_path_factory.mktemp("wrong") / "test.h5")
-
-
-@pytest.fixture
-def command(monkeypatch, capsys):
-    """Run a command in this process; returns what it printed."""
-
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["rig", *map(str, words)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        assert not ended.value.code
-        return capsys.readouterr().out
-
-    return run
 
 
 def few_levels(tuned, **changes):
@@ -96,7 +80,7 @@ def test_damping_is_that_of_harmonic_balance_within_its_interval(tuned, run):
 
 
 def test_the_model_names_its_mode_shape_with_that_of_the_bench_beside_it(tuned, run, tmp_path, command):
-    said = command("identify", run, "-o", tmp_path / "mode.h5")
+    said = command("identify", run, "-o", "mode.h5").succeeded().out
     assert "[plant] of the plan; that of the bench, 1.18101, is 1.30 times as large" in said
     mode = load(tmp_path / "mode.h5")
     assert (mode.drive_mode_shape, mode.drive_mode_shape_std) == (tuned.plant.drive_shape, tuned.plant.drive_shape_std)
@@ -106,7 +90,7 @@ def test_the_model_names_its_mode_shape_with_that_of_the_bench_beside_it(tuned, 
     of_the_shape = 2.0 * mode.damping_ratio * tuned.plant.drive_shape_std / tuned.plant.drive_shape
     assert mode.systematic("damping_ratio")[1:] == pytest.approx(of_the_shape[1:], rel=0.1)
     assert mode.systematic("damping_ratio")[0] > of_the_shape[0]  # rounding of the smallest force besides
-    assert "mode shape at the drive point: 0.90" in command("show", run)
+    assert "mode shape at the drive point: 0.90" in command("show", run).succeeded().out
 
 
 def test_without_the_plant_damping_goes_with_the_bench_as_before(tuned, run, tmp_path):

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from functools import cache
 
 import numpy as np
@@ -14,7 +13,6 @@ from identification import nonlinear_mode
 from rig.arming.run_options import RunOptions, Silent
 from rig.bench import Bench
 from rig.campaigns.plans import load_plan
-from rig.cli import main
 from rig.errors import ConfigurationError
 from rig.measurements import spectra
 from rig.recording.reader import Recording
@@ -217,15 +215,9 @@ def test_a_remark_on_the_bench_is_made_once(tmp_path):
     assert "drive_mode_shape = 0.7" in said[0]
 
 
-def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    command = ["rig", "tune", "--bench", "magnet-beam", "-o", "tuned.toml", "--level", "0.02", "--figure", "tuned.png"]
-    command += ["--law", "phase", "--rehearse", "2"]
-    monkeypatch.setattr(sys, "argv", [*command, "--json"])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert stop.value.code == 0
-    told = json.loads(capsys.readouterr().out)
+def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(command, tmp_path):
+    line = "tune --bench magnet-beam -o tuned.toml --level 0.02 --figure tuned.png --law phase --rehearse 2"
+    told = json.loads(command(f"{line} --json").succeeded().out)
     assert told["plan"] == "tuned.toml"
     assert told["plant"]["drive_mode_shape"] == pytest.approx(0.908466, rel=2e-3)
     assert {path.name for path in tmp_path.iterdir()} == {"tuned.toml", "tuned.h5", "tuned.png", "tuned-rehearsal.h5"}
@@ -237,11 +229,9 @@ def test_the_command_writes_plan_recording_and_figure_and_overwrites_nothing(tmp
     assert plan.levels_v == pytest.approx(told["needed_v"], rel=1e-4)
     assert plan.controller.k1 == pytest.approx(told["closed_form"]["k1"], rel=1e-4)
     assert plan.controller.k2 == pytest.approx(told["closed_form"]["k2"], rel=1e-4)
-    monkeypatch.setattr(sys, "argv", command)
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert stop.value.code == 1
-    assert "tuned.toml: exists already" in capsys.readouterr().err
+    again = command(line)
+    assert again.status == 1
+    assert "tuned.toml: exists already" in again.err
     assert (tmp_path / "tuned.toml").read_text() == written
 
 

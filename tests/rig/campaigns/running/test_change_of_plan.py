@@ -299,16 +299,6 @@ def test_the_journal_of_schema_1_takes_no_change_of_plan(tmp_path, monkeypatch):
         assert recording.complete
 
 
-def command(monkeypatch, capsys, line):
-    from rig.cli import main
-
-    monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    streams = capsys.readouterr()
-    return stop.value.code, streams.out, streams.err
-
-
 def _toml(text: str) -> str:
     return (
         f'kind = "backbone"\nbench = "magnet-beam"\n{text}\nrecord_periods = 20\n[controller]\nlow_pass_rad_s = 6.283\n'
@@ -332,37 +322,32 @@ def _toml(text: str) -> str:
         ("--seed -1", 2, "--seed"),
     ],
 )
-def test_a_wrong_change_is_answered_in_one_line_and_leaves_the_file(
-    output, monkeypatch, capsys, tmp_path, option, status, named
-):
-    monkeypatch.chdir(tmp_path)
+def test_a_wrong_change_is_answered_in_one_line_and_leaves_the_file(command, output, option, status, named):
     Path("unknown.toml").write_text(_toml("levels_w = [0.4]"))
     Path("newtons.toml").write_text(_toml("levels_n = [0.4]"))
     before = output.read_bytes()
-    code, out, err = command(monkeypatch, capsys, f"resume run.h5 {option}")
+    code, out, err = command(f"resume run.h5 {option}")
     assert (code, out) == (status, "")
     assert len(err.strip().splitlines()) == 1
     assert named in err
     assert output.read_bytes() == before
 
 
-def test_the_command_measures_what_is_new_and_show_tells_what_was_changed(output, monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_measures_what_is_new_and_show_tells_what_was_changed(command, output):
     Path("more.toml").write_text(_toml("levels_v = [0.4, 0.5]"))
-    code, out, err = command(monkeypatch, capsys, "resume run.h5 --plan more.toml --seed 5")
+    code, out, err = command("resume run.h5 --plan more.toml --seed 5")
     assert code == 0, err
     assert "2 of 2 points accepted" in out
     lines = [line.split() for line in err.splitlines()]
     assert [words[2:4] for words in lines] == [["0.5", "V"]]
-    _, shown, _ = command(monkeypatch, capsys, "show run.h5")
+    _, shown, _ = command("show run.h5")
     assert "no longer asked for by the plan, and not used: 1" in shown
     changed = "controller.frequency_window_hz, controller.k2, controller.low_pass_rad_s, levels_v"
     assert f"changed in the plan: {changed}" in shown
 
 
-def test_an_unfinished_run_says_how_to_go_on(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def test_an_unfinished_run_says_how_to_go_on(command):
     Path("hasty.toml").write_text(_toml("levels_v = [0.4]") + "[settle]\namplitude = 1e-7\nlongest_periods = 60\n")
-    code, out, _ = command(monkeypatch, capsys, "run hasty.toml -o run.h5")
+    code, out, _ = command("run hasty.toml -o run.h5")
     assert code == 1
     assert "`rig resume run.h5` measures the rest, with --plan PLAN.toml by a changed plan" in out

@@ -1,7 +1,6 @@
 """Going on after a trip: a level that tripped is tried again on request only; plans that stay below it need none."""
 
 import shutil
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 
 import rig
 from rig.campaigns.running.tripped_level import refuse_tripped
-from rig.cli import main
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError
 from rig.loop.loop import Loop
@@ -116,24 +114,15 @@ def test_a_file_of_an_earlier_version_tripped_where_its_last_point_failed(output
         refuse_tripped(recording, plan, plan.targets()[:1])
 
 
-def test_the_closing_lines_name_the_cause_and_offer_no_bare_resume(monkeypatch, capsys, tmp_path, output):
-    monkeypatch.chdir(tmp_path)
-    code, out, _ = command(monkeypatch, capsys, "resume run.h5 --retry-tripped")
+def test_the_closing_lines_name_the_cause_and_offer_no_bare_resume(command, output):
+    code, out, _ = command("resume run.h5 --retry-tripped")
     assert code == 1
     assert "likely cause: the point before, " in out
     assert "what to do: lower levels_v below " in out
     assert "`rig resume run.h5 --plan PLAN.toml`" in out
     assert "`rig resume run.h5 --retry-tripped`" in out
     assert "`rig resume run.h5`" not in out
-    code, out, err = command(monkeypatch, capsys, "resume run.h5")
+    code, out, err = command("resume run.h5")
     assert (code, out) == (1, "")
     assert len(err.strip().splitlines()) == 1
     assert [part["tripped"] for part in summarise(output)["parts"]] == [True, True]
-
-
-def command(monkeypatch, capsys, line):
-    monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    streams = capsys.readouterr()
-    return stop.value.code, streams.out, streams.err

@@ -1,15 +1,12 @@
 """From a foreign MAT file to a validated model, as it is typed; figures, reports and exports of time data."""
 
 import json
-import shlex
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.io
 
-from rig.cli import main
 from rig.models.files.files import load, save
 from tests.identification.time_data.test_time_data import F0, ZETA, multisines
 
@@ -58,18 +55,10 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def typed(folder, capsys, monkeypatch):
+def typed(command, folder, monkeypatch):
+    """What a command prints that succeeds, typed in the folder."""
     monkeypatch.chdir(folder)
-
-    def run(line):
-        monkeypatch.setattr(sys, "argv", ["rig", *shlex.split(line)])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        captured = capsys.readouterr()
-        assert not stop.value.code, captured.err
-        return captured.out
-
-    return run
+    return lambda line: command(line).succeeded().out
 
 
 def test_a_foreign_mat_file_becomes_a_model_that_is_right_to_the_noise(typed):

@@ -1,6 +1,5 @@
 """Guesses of a proposed mapping: periods, transients, roles, channels in a matrix, the parts that are not told."""
 
-import sys
 import tomllib
 
 import h5py
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rig.cli import main
 from rig.exchange.proposal.guesses import dimensions, period_of, rate_in, role_of, transient_periods
 from rig.exchange.proposal.proposal import proposed_mapping
 from rig.exchange.reading import ImportFailed
@@ -106,20 +104,15 @@ def test_names_from_a_file_cannot_leave_their_comment(tmp_path):
         ("new mapping x.dat -o m.toml", "the ending says no format; give"),
     ],
 )
-def test_wrong_words_are_named(capsys, monkeypatch, tmp_path, line, message):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-    with pytest.raises(SystemExit) as stop:
-        main()
-    assert stop.value.code
-    err = capsys.readouterr().err
+def test_wrong_words_are_named(command, tmp_path, line, message):
+    status, _, err = command(line)
+    assert status
     assert message in err
     assert err.count("\n") == 1
     assert not (tmp_path / "m.toml").exists()
 
 
-def test_a_motion_without_a_force_is_a_decay_and_has_no_period(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_a_motion_without_a_force_is_a_decay_and_has_no_period(command, tmp_path):
     times = np.arange(12000) / 2000.0
     motion = np.exp(-2.0 * np.pi * 40.0 * 0.01 * times) * np.cos(2.0 * np.pi * 40.0 * times)
     scipy.io.savemat("decay.mat", {"x": motion, "fs": 2000.0})
@@ -128,11 +121,7 @@ def test_a_motion_without_a_force_is_a_decay_and_has_no_period(tmp_path, monkeyp
         "import decay.mat --mapping decay.toml -o decay.h5",
         "identify decay.h5 --model decay -o backbone.h5 --json",
     ):
-        capsys.readouterr()
-        monkeypatch.setattr(sys, "argv", ["rig", *line.split()])
-        with pytest.raises(SystemExit) as left:
-            main()
-        assert not left.value.code, capsys.readouterr().err
+        command(line).succeeded()
     table = tomllib.loads((tmp_path / "decay.toml").read_text(encoding="utf-8"))
     assert [channel["role"] for channel in table["channels"]] == ["drive"]
     assert "period_samples" not in table

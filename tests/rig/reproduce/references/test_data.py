@@ -9,7 +9,6 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.reproduce.references import brake_reuss
 from rig.reproduce.references.data import DataFile, DataSet, found
 from rig.reproduce.references.studies import STUDIES
-from tests.rig.reproduce.commands import typed
 
 EXAMPLE = Path(__file__).parents[4] / "docs" / "examples" / "brake-reuss-mapping.toml"
 CONTENTS = b"measured"
@@ -47,7 +46,7 @@ def test_what_is_missing_or_another_is_named_with_its_source(tmp_path):
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_the_command_says_in_one_line_what_it_needs(tmp_path, name):
+def test_the_command_says_in_one_line_what_it_needs(command, tmp_path, name):
     out = tmp_path / "out"
     for line, said in (
         (f"reproduce {name} -o {out}", f"--data: {name} needs a folder with {STUDIES[name].data.files[0].name}"),
@@ -58,7 +57,7 @@ def test_the_command_says_in_one_line_what_it_needs(tmp_path, name):
         ),
         (f"reproduce {name} -o {out} --data {tmp_path} --models paper", "--models paper: allowed is a number from 1"),
     ):
-        done = typed(line)
+        done = command(line)
         assert done.status == 1
         assert said in done.err
         assert len(done.err.splitlines()) == 1
@@ -66,8 +65,8 @@ def test_the_command_says_in_one_line_what_it_needs(tmp_path, name):
     assert not out.exists()
 
 
-def test_data_are_refused_beside_the_papers_campaign(tmp_path):
-    done = typed(f"reproduce magnet-beam -o {tmp_path / 'out'} --data {tmp_path}")
+def test_data_are_refused_beside_the_papers_campaign(command, tmp_path):
+    done = command(f"reproduce magnet-beam -o {tmp_path / 'out'} --data {tmp_path}")
     assert (done.status, "is for reference studies, silverbox, bouc-wen, brake-reuss" in done.err) == (1, True)
 
 

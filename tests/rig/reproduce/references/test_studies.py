@@ -14,7 +14,7 @@ from rig.models.files.files import load
 from rig.reproduce.references import bouc_wen, silverbox
 from rig.reproduce.references.data import found
 from rig.reproduce.references.studies import STUDIES
-from tests.rig.reproduce.commands import typed
+from tests.command import run_command
 
 
 def data_of(name: str) -> tuple[Path, ...]:
@@ -72,8 +72,7 @@ def test_four_of_five_starts_are_far_beyond_what_was_published(hysteresis):
 @pytest.mark.slow
 def test_the_model_that_validation_data_choose_predicts_the_whole_arrow_to_a_quarter_millivolt(tmp_path):
     (path,) = data_of("silverbox")
-    done = typed(f"reproduce silverbox --data {path.parent} -o {tmp_path}")
-    assert done.status == 0, done.err
+    run_command(f"reproduce silverbox --data {path.parent} -o {tmp_path}").succeeded()
     results = json.loads((tmp_path / "reference.json").read_text())
     (chosen,) = [line for line in results["ours"] if line["chosen"]]
     # the smallest model within one standard error of the best, which is not always the best itself
@@ -84,8 +83,7 @@ def test_the_model_that_validation_data_choose_predicts_the_whole_arrow_to_a_qua
 
 def test_the_measured_beam_is_predicted_as_the_table_says(tmp_path):
     (path,) = data_of("brake-reuss")
-    done = typed(f"reproduce brake-reuss --data {path.parent} -o {tmp_path}")
-    assert done.status == 0, done.err
+    done = run_command(f"reproduce brake-reuss --data {path.parent} -o {tmp_path}").succeeded()
     results = json.loads((tmp_path / "reference.json").read_text())
     assert [line["method"] for line in results["ours"]] == ["0.19 N", "0.52 N", "0.95 N", "1.43 N"]
     for line in results["ours"]:
