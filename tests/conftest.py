@@ -10,6 +10,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 from hypothesis import settings
 
+pytest_plugins = ["tests.changed.plugin"]
+
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
 # Examples are the same on every machine and in every run: what one finds is found again. HYPOTHESIS_SEARCH=1 seeks others.
 settings.register_profile(
