@@ -17,7 +17,9 @@ PACKAGES = (*PRODUCT, "benchmarks", "tests")
 _OF_RESULTS = ("rig.figures", "rig.show")
 """What `vibrolock.results` imports when a result is drawn or shown."""
 _SHOWN = (".plot(", "_repr_")
-_DOTTED = re.compile(rf"\b(?:{'|'.join(PACKAGES)})(?:\.\w+)+")
+_MODULE = rf"((?:{'|'.join(PACKAGES)})(?:\.\w+)+)"
+_NAMED = re.compile(rf"\b{_MODULE}(\.\{{)?")
+_ADDRESS = re.compile(rf"[\"']{_MODULE}(?:[\"':]|(\.\{{))")
 _STRING = r'"""(?:\\.|[^\\])*?"""|"(?:\\.|[^"\\\n])*"'
 _NO_CODE = re.compile(rf"(?<!\w)([A-Za-z]{{0,2}})({_STRING}|{_STRING.replace(chr(34), chr(39))})|#[^\n]*", re.DOTALL)
 _FROM = re.compile(r"\bfrom +(\w+) +import +(?:\(([^)]*)\)|([^\n;]*))")
@@ -50,27 +52,29 @@ def complete(graph: grimp.ImportGraph, text: Mapping[str, str], drivers: list[st
 
     - Whoever imports a module runs the packages around it, without what these import on use.
     - A name that a package imports on use leads to its module; a package that is handed on as a whole leads to all of them.
-    - A test runs the `conftest.py` of its folder and of those around it, and imports what its strings name or import:
-      scripts, commands, patches.
-    - Drivers are entry points, and the reference reads what it lists.
+    - Strings that are the address of a module, of something in it, or of any module in a package, count as imports. In a test
+      they may stand anywhere in a string: in scripts, commands and patches.
+    - A test runs the `conftest.py` of its folder and of those around it, and the installed plugin's package.
+    - Drivers are entry points, and a result that draws or shows itself needs figures and tables.
     """
     product = (module for module in text if module.startswith(PRODUCT))
     on_use = {module: names for module in product if (names := _names_on_use(module, text[module]))}
     for package, module_of in on_use.items():
         _part(graph, text, package, module_of)
     modules = graph.modules
-    hidden = [("rig.drivers", name) for name in drivers]
-    hidden += [
-        ("rig.reference.names", name) for name in (*PRODUCT, *_dotted(text.get("rig.reference.names", ""), modules))
-    ]
+    hidden = [("rig.drivers", name) for name in drivers] + [("rig.reference.names", name) for name in PRODUCT]
+    hidden.append(("tests.conftest", "rig.__init__"))
     for module, own in text.items():
         for package in packages_around(module):
             hidden.append((module, f"{package}.__init__" if package in on_use else package))
             if module.startswith("tests."):
                 hidden.append((module, f"{package}.conftest"))
-        if module.startswith(("tests.", "benchmarks.")) and not module.startswith("tests.changed."):
-            shown = _OF_RESULTS if any(word in own for word in _SHOWN) else ()
-            hidden += [(module, name) for name in (*_dotted(own, modules), *shown)]
+        if module == "vibrolock.results" or module.startswith("tests.changed."):
+            continue
+        testing = module.startswith(("tests.", "benchmarks."))
+        hidden += [(module, name) for name in _named(_NAMED if testing else _ADDRESS, own, modules, graph)]
+        if testing and any(word in own for word in _SHOWN):
+            hidden += [(module, name) for name in _OF_RESULTS]
     for importer, imported in hidden:
         if importer != imported and {importer, imported} <= modules:
             graph.add_import(importer=importer, imported=imported)
@@ -145,7 +149,9 @@ def _local_names(text: str, package: str) -> list[str]:
     return found
 
 
-def _dotted(text: str, modules: set[str]) -> Iterator[str]:
-    """Yield the modules below a package whose dotted names stand anywhere in a text."""
-    for name in {*_DOTTED.findall(text)}:
-        yield from [part for part in (name, *packages_around(name)) if part in modules and "." in part][:1]
+def _named(pattern: re.Pattern[str], text: str, modules: set[str], graph: grimp.ImportGraph) -> Iterator[str]:
+    """Yield the modules that a pattern finds in a text; a package may be run, or any of its modules be meant."""
+    for name, any_in_it in {*pattern.findall(text)}:
+        module = next((part for part in (name, *packages_around(name)) if part in modules), "")
+        if "." in module:
+            yield from (module, f"{module}.__main__", *(graph.find_children(module) if any_in_it else ()))

@@ -9,8 +9,8 @@ from tests.changed.graph import complete
 DRIVER = "rig.drivers.virtual"
 
 
-def made_up(**more: str) -> tuple[ImportGraph, dict[str, str]]:
-    """Return imports and sources of a small project; further modules are given with `__` for a dot."""
+def made_up(more: dict[str, str]) -> tuple[ImportGraph, dict[str, str]]:
+    """Return imports and sources of a small project with further modules."""
     text = {
         "vibrolock": "",
         "vibrolock.on_use": "",
@@ -31,7 +31,7 @@ def made_up(**more: str) -> tuple[ImportGraph, dict[str, str]]:
         "tests.firmware": "",
         "tests.firmware.test_arm": "",
         "tests.rig": "",
-    } | {name.replace("__", "."): own for name, own in more.items()}
+    } | more
     graph = ImportGraph()
     for module in text:
         graph.add_module(module)

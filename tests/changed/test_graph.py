@@ -9,7 +9,8 @@ TEST = "tests.rig.test_a"
 
 
 def reached(own: str, **more: str) -> set[str]:
-    graph, _ = made_up(tests__rig__test_a=own, **more)
+    """Modules that a test depends on; in names of further ones a double underscore is a dot."""
+    graph, _ = made_up({TEST: own} | {name.replace("__", "."): text for name, text in more.items()})
     return graph.find_upstream_modules(TEST)
 
 
@@ -55,12 +56,28 @@ def test_a_test_depends_on_the_fixtures_around_it_and_on_nothing_beside_it():
         ("monkeypatch.setattr('rig.text.line', None)", "rig.text"),
         ("CODE = '''\nimport controller\ncontroller.Law()\n'''", "controller.law"),
         ("result.plot()", "rig.figures"),
+        ("patch(f'rig.cli.{command}.line')", "rig.cli.show"),
         ("from rig.drivers import make_daq", "rig.drivers.virtual"),
     ],
 )
 def test_modules_that_stand_in_strings_or_are_found_by_name_count_as_imported(own, module):
-    assert module in reached(own, tests__rig__child="")
-    assert module not in reached("", tests__rig__child="")
+    more = {"tests__rig__child": "", "rig__cli__show": ""}
+    assert module in reached(own, **more)
+    assert module not in reached("", **more)
+
+
+@pytest.mark.parametrize(
+    ("own", "module"),
+    [
+        ("DRAW = 'rig.figures.curves:draw'", "rig.figures.curves"),
+        ("run([sys.executable, '-m', 'rig.figures'])", "rig.figures"),
+        ("resolve_name(f'rig.figures.{name}')", "rig.figures.curves"),
+    ],
+)
+def test_addresses_in_the_product_count_as_imported_and_its_prose_does_not(own, module):
+    more = {"rig__figures__curves": ""}
+    assert module in reached("import rig.text", rig__text=own, **more)
+    assert module not in reached("import rig.text", rig__text='"""See `rig.figures.curves`."""', **more)
 
 
 @pytest.mark.parametrize(
