@@ -16,7 +16,7 @@ keep_bytecode()
 use_memory_for_files()
 shared_folder()  # before workers are started, which then share it
 
-pytest_plugins = ["tests.command"]
+pytest_plugins = ["tests.changed.plugin", "tests.command"]
 
 # Shared machines and the first compilation of a kernel make any deadline a coin toss; speed is measured in benchmarks/.
 # Examples are the same on every machine and in every run: what one finds is found again. HYPOTHESIS_SEARCH=1 seeks others.

@@ -1,0 +1,1 @@
+"""`pytest --changed`: the tests that can depend on what changed."""
