@@ -2,8 +2,9 @@
 
 ``python -m tests.reliability.mutants [-n 200] [--seed 1] [--package controller ...] [--jobs 1] [--output FILE]``
 
-``--tests CHECKOUT`` judges the same mutants by the tests of another checkout, ``--compare ONE OTHER`` compares what two runs
-have written and ends with 1 where a mutant that was killed survives, ``--list`` only names the mutants.
+``--only TEXT`` judges one again, ``--tests CHECKOUT`` judges the same mutants by the tests of another checkout, ``--compare ONE
+OTHER`` compares what two runs have written and ends with 1 where a mutant that was killed survives, ``--list`` names the
+mutants and runs nothing.
 """
 
 import argparse
@@ -26,6 +27,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("-n", "--number", type=int, default=200, help="mutants")
     parser.add_argument("--seed", type=int, default=1, help="chooses them")
     parser.add_argument("--package", nargs="+", choices=PACKAGES, default=[*PACKAGES], help="of these packages only")
+    parser.add_argument("--only", default="", metavar="TEXT", help="of those chosen the ones whose names contain it")
     parser.add_argument("--jobs", type=int, default=1, help="mutants at a time")
     parser.add_argument("--tests", type=Path, default=ROOT, metavar="CHECKOUT", help="another one, whose tests judge")
     parser.add_argument("--output", type=Path, metavar="FILE", help="what is found, as JSON; written after each mutant")
@@ -43,7 +45,7 @@ def main() -> int:
         lines, lost = compared(*wanted.compare)
         print("\n".join(lines))
         return int(lost > 0)
-    every = chosen(ROOT, wanted.package, wanted.number, wanted.seed)
+    every = [one for one in chosen(ROOT, wanted.package, wanted.number, wanted.seed) if wanted.only in one.name]
     mutants = [one for one in every if one.name not in EQUIVALENT]
     left_out = [one for one in every if one.name in EQUIVALENT]
     if wanted.list:

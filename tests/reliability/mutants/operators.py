@@ -1,7 +1,7 @@
 """What is changed: every expression of a module that can be another one, as pieces of its source.
 
 Only the operator, name or number itself is replaced, so that all else of a file stays as it is. Left out is what is not
-computed with: annotations, decorators, texts, what is raised, type checks, ``if TYPE_CHECKING`` and ``__all__``.
+computed with: annotations, decorators, texts, what is raised, type checks, ``strict``, ``if TYPE_CHECKING``, ``__all__``.
 """
 
 import ast
@@ -212,6 +212,11 @@ class _Finder(ast.NodeVisitor):
             end = self._at(node.func)[1]
             self._note("extreme", node.func.end_lineno or node.lineno, end - len(name), end, SWAPPED[name])
         self.generic_visit(node)
+
+    def visit_keyword(self, node: ast.keyword) -> None:
+        """Not ``strict`` of ``zip``, which checks what is so anyway."""
+        if node.arg != "strict":
+            self.generic_visit(node)
 
     def visit_Break(self, node: ast.Break) -> None:
         """A loop goes on."""

@@ -66,6 +66,7 @@ def test_an_expression_becomes_another_one(source, others):
         "raise ValueError(3 + a)",
         "f'{a + 1:.3f}'",
         "isinstance(a, int | float)",
+        "zip(a, b, strict=True)",
         "Number = int | float",
         "Number: TypeAlias = Literal[3]",
         "folder / 'name' / f'{a}'",
