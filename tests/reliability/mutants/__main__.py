@@ -8,14 +8,15 @@ mutants and runs nothing.
 """
 
 import argparse
+import signal
 import sys
 from pathlib import Path
 
 import vibrolock
 from tests.reliability.mutants.choosing import PACKAGES, Mutant, chosen
 from tests.reliability.mutants.equivalent import EQUIVALENT
-from tests.reliability.mutants.running import Verdict, judged
-from tests.reliability.mutants.telling import compared, survivors, table, told, write
+from tests.reliability.mutants.running import LIMIT_S, Verdict, judged
+from tests.reliability.mutants.telling import compared, read, survivors, table, told, write
 from vibrolock.compiled import kernel_cache_folder
 
 ROOT = Path(__file__).parents[3]
@@ -29,8 +30,10 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--package", nargs="+", choices=PACKAGES, default=[*PACKAGES], help="of these packages only")
     parser.add_argument("--only", default="", metavar="TEXT", help="of those chosen the ones whose names contain it")
     parser.add_argument("--jobs", type=int, default=1, help="mutants at a time")
+    parser.add_argument("--limit", type=float, default=LIMIT_S, help="for the tests of one mutant, s")
     parser.add_argument("--tests", type=Path, default=ROOT, metavar="CHECKOUT", help="another one, whose tests judge")
     parser.add_argument("--output", type=Path, metavar="FILE", help="what is found, as JSON; written after each mutant")
+    parser.add_argument("--resume", action="store_true", help="judge only what the output has not, of the same code")
     parser.add_argument(
         "--compare", type=Path, nargs=2, metavar=("ONE", "OTHER"), help="files of two runs; runs nothing"
     )
@@ -52,7 +55,8 @@ def main() -> int:
         print("\n".join(one.name for one in mutants))
         return 0
     facts = {"seed": wanted.seed, "number": wanted.number, "packages": wanted.package, "version": vibrolock.__version__}
-    verdicts: dict[str, Verdict] = {}
+    known = read(wanted.output) if wanted.resume and wanted.output.exists() else {}
+    verdicts = {one.name: known[one.name] for one in mutants if one.name in known}
 
     def say(mutant: Mutant, verdict: Verdict) -> None:
         verdicts[mutant.name] = verdict
@@ -60,13 +64,15 @@ def main() -> int:
         if wanted.output:
             write(wanted.output, mutants, verdicts, facts)
 
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # temporary files are removed
     judged(
-        mutants,
+        [one for one in mutants if one.name not in verdicts],
         ROOT,
         wanted.tests.resolve(),
         PACKAGES,
         kernels=kernel_cache_folder(),
         jobs=wanted.jobs,
+        limit_s=wanted.limit,
         say=say,
     )
     print("\n".join(table(mutants, verdicts, left_out)))

@@ -18,11 +18,14 @@ PACKAGES = ("rig", "controller", "simulators", "identification", "vibrolock")
 LEAST = 20
 """A package has one mutant of so many at least, if it has that many."""
 ELSEWHERE = {
+    "rig/campaigns/sweep": ("rig/campaigns", "rig/campaigns/running"),
     "rig/conformance": ("contract",),
+    "rig/exchange/foreign": ("rig/exchange/time_data",),
+    "rig/exchange/proposal": ("rig/exchange/time_data",),
     "rig/hil": ("hardware",),
     "rig/wire": ("rig/wire/serial", "rig/wire/can"),
 }
-"""Folders of the product whose tests stand neither in a folder of their name nor one above it."""
+"""Folders of the product whose tests stand neither in a folder of their name nor, all of them, in the one above it."""
 
 
 class Mutant(NamedTuple):

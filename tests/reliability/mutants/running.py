@@ -24,14 +24,12 @@ from tests.reliability.mutants.operators import changed
 __all__ = ["FATES", "Verdict", "Workplace", "judged"]
 
 FATES = ("killed", "killed by time", "survived", "not covered", "not judged")
-"""What becomes of a mutant: a test fails; none ends in time; all pass; there is none; they fail without it as well."""
+"""What becomes of a mutant: a test fails; they do not end in time; all pass; there is none; they fail without it as well."""
 OPTIONS = ("-x", "-q", "-p", "no:randomly", "-p", "no:cacheprovider", "-n", "0", "-m", "not slow and not hardware")
 LEFT_OUT = shutil.ignore_patterns(".git", ".venv*", ".*cache", ".hypothesis", "__pycache__", "site", "gallery", "build")
 MARK = "VIBROLOCK_MUTANT"
-LIMIT_S, TIMES = 60.0, 4.0
-"""What the tests may take with a mutant: a minute, for kernels are compiled anew, and so many times what they took without."""
-LONGEST_S = 600.0
-"""Tests that take longer without a mutant judge none."""
+LIMIT_S = 300.0
+"""What the tests of a mutant may take, with the kernels that are compiled anew."""
 MOST_MEMORY, LARGEST_FILE = 8 << 30, 2 << 30
 """Bytes, of each process."""
 NO_TESTS = 5  # pytest: none was collected, or all are slow
@@ -72,32 +70,23 @@ class Workplace:
         self._kernels.mkdir()
         if kernels is not None:
             shutil.copytree(kernels, self._kernels / "vibrolock" / "kernels")
-        self._without: dict[frozenset[str], Ended] = {}
-        self._run((sys.executable, "-m", "compileall", "-q", *packages), LONGEST_S, self._kernels)
+        self._passing: dict[frozenset[str], bool] = {}
+        self._run((sys.executable, "-m", "compileall", "-q", *packages), LIMIT_S, self._kernels)
         self._is_used(packages)
 
     def _is_used(self, packages: Iterable[str]) -> None:
         """Make sure that it is the copy that tests import."""
         for package in packages:
             command = (sys.executable, "-P", "-c", f"import {package}; print({package}.__file__)")
-            output = self._run(command, LONGEST_S, self._kernels).output
+            output = self._run(command, LIMIT_S, self._kernels).output
             if str(self.tree) not in output:
                 raise RuntimeError(f"{package}: tests would import another one than the copy: {output}")
 
-    def judge(self, mutant: Mutant) -> Verdict:
-        """Run the tests of a mutant, once for all mutants without any."""
+    def judge(self, mutant: Mutant, limit_s: float) -> Verdict:
+        """Run the tests of a mutant; where one fails, or none ends in time, see that it is not so without the mutant."""
         tests = mirrored_tests(mutant.path, self.tree / "tests")
         if not tests:
             return Verdict("not covered", "no mirrored tests")
-        every = frozenset(tests)
-        if every not in self._without:
-            self._without[every] = self._tested(tests, LONGEST_S, self._kernels)
-        without = self._without[every]
-        if without.status == NO_TESTS:
-            return Verdict("not covered", "no quick tests")
-        if without.status != 0:
-            why = "take too long" if without.status is None else "fail"
-            return Verdict("not judged", f"the tests {why} without it: {_first_failure(without.output)}")
         try:
             other = changed((self.tree / mutant.path).read_text(encoding="utf-8"), mutant.change)
         except ValueError as error:
@@ -105,10 +94,28 @@ class Workplace:
         kernels = self._folder / "kernels of a mutant"  # it leaves no machine code for the next one
         shutil.copytree(self._kernels, kernels)
         with self._as(mutant, other):
-            ended = self._tested(tests, LIMIT_S + TIMES * without.took_s, kernels)
+            ended = self._tested(tests, limit_s, kernels)
         shutil.rmtree(kernels, ignore_errors=True)
-        fate = {None: "killed by time", 0: "survived"}.get(ended.status, "killed")
-        return Verdict(fate, "" if fate == "survived" else _first_failure(ended.output), round(ended.took_s, 1))
+        took_s = round(ended.took_s, 1)
+        if ended.status == 0:
+            return Verdict("survived", "", took_s)
+        if ended.status == NO_TESTS:
+            return Verdict("not covered", "no quick tests", took_s)
+        failed = _first_failure(ended.output)
+        if ended.status is not None and self._pass_without(_tests_named_by(failed), limit_s):
+            return Verdict("killed", failed, took_s)
+        if not self._pass_without(tests, limit_s):
+            return Verdict(
+                "not judged", f"the tests fail without it or take longer than {limit_s:g} s: {failed}", took_s
+            )
+        return Verdict("killed", failed, took_s) if ended.status is not None else Verdict("killed by time", "", took_s)
+
+    def _pass_without(self, tests: Sequence[str], limit_s: float) -> bool:
+        """Whether tests pass without any mutant; each is asked once."""
+        asked = frozenset(tests)
+        if tests and asked not in self._passing:
+            self._passing[asked] = self._tested(tests, limit_s, self._kernels).status == 0
+        return self._passing.get(asked, False)
 
     @contextlib.contextmanager
     def _as(self, mutant: Mutant, other: str) -> Iterator[None]:
@@ -183,12 +190,13 @@ def judged(
     *,
     kernels: Path | None = None,
     jobs: int = 1,
+    limit_s: float = LIMIT_S,
     say: Callable[[Mutant, Verdict], object] = lambda mutant, verdict: None,
 ) -> dict[str, Verdict]:
     """What becomes of these mutants of the product at ``root`` with the tests of the checkout at ``tests``, by name.
 
-    ``packages``: all of the product's; ``kernels``: folder with machine code to begin with; ``say``: told of each when it is
-    judged.
+    ``packages``: all of the product's; ``kernels``: folder with machine code to begin with; ``limit_s``: for the tests of one
+    mutant; ``say``: told of each when it is judged.
     """
     groups: dict[frozenset[str], list[Mutant]] = {}
     for mutant in mutants:
@@ -202,7 +210,7 @@ def judged(
         def judge(some: list[Mutant]) -> None:
             place = free.get()
             for mutant in some:
-                found[mutant.name] = place.judge(mutant)
+                found[mutant.name] = place.judge(mutant, limit_s)
                 say(mutant, found[mutant.name])
             free.put(place)
 
@@ -218,8 +226,14 @@ def judged(
 def _first_failure(output: str) -> str:
     """The line of pytest's summary on what failed first, else the last line."""
     lines = [line for line in output.splitlines() if line.strip()]
-    failed = [line for line in lines if re.match("(FAILED|ERROR) ", line)]
-    return (failed or lines[-1:] or ["no output"])[0][:200]
+    failed = [line for line in lines if re.match("(FAILED|ERROR) tests/", line)]
+    return (failed or lines[-1:] or ["no output"])[0][:400]
+
+
+def _tests_named_by(failure: str) -> list[str]:
+    """The test or file, below ``tests``, that a line of pytest's summary is about."""
+    found = re.match(r"(?:FAILED|ERROR) tests/(.*?)(?: - |$)", failure)
+    return [found[1]] if found else []
 
 
 def _limit(process: int) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from tests.reliability.mutants.choosing import Mutant
 from tests.reliability.mutants.running import FATES, Verdict
 
-__all__ = ["compared", "survivors", "table", "write"]
+__all__ = ["compared", "read", "survivors", "table", "told", "write"]
 
 KILLED = ("killed", "killed by time")
 
@@ -54,12 +54,15 @@ def write(file: Path, mutants: Sequence[Mutant], verdicts: Mapping[str, Verdict]
     file.write_text(json.dumps({**facts, "mutants": rows}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
+def read(file: Path) -> dict[str, Verdict]:
+    """The verdicts of a run, by the name of the mutant."""
+    rows = json.loads(file.read_text(encoding="utf-8"))["mutants"]
+    return {row["name"]: Verdict(row["fate"], row["by"], row["took_s"]) for row in rows}
+
+
 def compared(first: Path, second: Path) -> tuple[list[str], int]:
     """Which mutants have another fate in the second run, in lines; and how many that were killed survive now."""
-    one, other = (
-        {row["name"]: row["fate"] for row in json.loads(file.read_text(encoding="utf-8"))["mutants"]}
-        for file in (first, second)
-    )
+    one, other = ({name: verdict.fate for name, verdict in read(file).items()} for file in (first, second))
     both = [name for name in one if name in other]
     lines = [f"{name}: {one[name]}, now {other[name]}" for name in both if one[name] != other[name]]
     lost = sum(one[name] in KILLED and other[name] == "survived" for name in both)

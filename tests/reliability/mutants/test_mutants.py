@@ -1,12 +1,10 @@
 """Mutants are what they say, the same for the same seed, and judged without touching what is there."""
 
-import json
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.reliability.mutants import running
 from tests.reliability.mutants.__main__ import ROOT
 from tests.reliability.mutants.choosing import (
     ELSEWHERE,
@@ -20,7 +18,7 @@ from tests.reliability.mutants.choosing import (
 from tests.reliability.mutants.equivalent import EQUIVALENT
 from tests.reliability.mutants.operators import changed, changes
 from tests.reliability.mutants.running import Verdict, judged
-from tests.reliability.mutants.telling import compared, survivors, table, write
+from tests.reliability.mutants.telling import compared, read, survivors, table, write
 
 
 @pytest.mark.parametrize(
@@ -165,21 +163,26 @@ def test_tests_of_another_checkout_judge_the_same_mutants(project, tmp_path):
 
 
 @posix
-def test_a_mutant_that_never_ends_is_killed_by_time(project, monkeypatch):
-    monkeypatch.setattr(running, "LIMIT_S", 1.0)
-    monkeypatch.setattr(running, "TIMES", 0.0)
+@pytest.mark.slow
+def test_a_mutant_that_never_ends_is_killed_by_time(project):
     endless = [one for one in mutants_of(project, "fake/counts.py") if "+= 1" in one.name]
-    assert fates(endless, project, project, ["fake"]) == {"n -= 1 -> n += 1": "killed by time"}
+    assert fates(endless, project, project, ["fake"], limit_s=10.0) == {"n -= 1 -> n += 1": "killed by time"}
+
+
+@posix
+def test_tests_that_take_too_long_anyway_judge_none(project):
+    one = mutants_of(project, "fake/sums.py")[1:]
+    assert fates(one, project, project, ["fake"], limit_s=0.05) == {"return min(a) -> return max(a)": "not judged"}
 
 
 @posix
 def test_what_no_test_mirrors_and_what_fails_anyway_is_judged_by_none(project):
     (project / "tests" / "fake" / "test_counts.py").write_text("def test_it():\n    assert False\n")
-    one = mutants_of(project, "fake/sums.py")[:1]
-    assert fates(one, project, project, ["fake"]) == {"return a + b -> return a - b": "not judged"}
+    one = mutants_of(project, "fake/sums.py")[1:]
+    assert fates(one, project, project, ["fake"]) == {"return min(a) -> return max(a)": "not judged"}
     for test in (project / "tests" / "fake").iterdir():
         test.unlink()
-    assert fates(one, project, project, ["fake"]) == {"return a + b -> return a - b": "not covered"}
+    assert fates(one, project, project, ["fake"]) == {"return min(a) -> return max(a)": "not covered"}
 
 
 def test_a_seed_gives_the_same_mutants_and_a_short_run_is_part_of_a_long_one(project):
@@ -220,7 +223,7 @@ def test_a_run_is_told_by_package_and_compared_with_another_one(project, tmp_pat
     assert survivors(mutants, first) == ["fake/sums.py:6 least: return min(a) -> return max(a)"]
     for name, verdicts in (("first", first), ("second", second)):
         write(tmp_path / name, mutants, verdicts, {"seed": 1})
-    assert json.loads((tmp_path / "first").read_text(encoding="utf-8"))["mutants"][0]["by"] == "a test"
+    assert read(tmp_path / "first") == first
     lines, lost = compared(tmp_path / "first", tmp_path / "second")
     assert lost == 1
     assert lines[0] == f"{one.name}: killed, now survived"
