@@ -72,6 +72,7 @@ def test_a_name_that_no_file_can_have_is_refused(tmp_path):
         (b"a = " + b"[" * 50_000 + b"]" * 50_000, "is nested too deeply"),
         (b"a = " + b"{a=" * 5_000 + b"1" + b"}" * 5_000, "is nested too deeply"),
         (b"a = " + b"[" * 40 + b"]" * 40, "is nested too deeply: allowed are up to 16 levels"),
+        (b"[" + b".".join([b"a"] * 40) + b"]", "is nested too deeply: allowed are up to 16 levels"),
         (b".".join([b"a"] * 400_000) + b" = 1", "line 1: a key has more than 100 parts"),
         (b"a = " + b"9" * 5_000, "is not TOML: Exceeds the limit"),
         (b"a = 0x" + b"f" * 5_000, "a = a number of 20000 bits: allowed is up to 9223372036854775807"),

@@ -179,3 +179,16 @@ def test_an_output_beyond_the_range_is_refused_wherever_it_stands(wrong: float) 
             with pytest.raises(DaqRefused, match="was demanded"):
                 daq.exchange(voltages)
         assert daq.exchange(np.array([1.0, -10.0, 10.0])).shape[0] == 3
+
+
+@pytest.mark.parametrize("how", ["open-circuit", "stinger-dropped"])
+def test_a_rig_is_released_at_0_v_and_not_before(how: str) -> None:
+    voltages = np.concatenate([np.random.default_rng(2).uniform(0.1, 0.5, 200), np.zeros(200)])
+    readings = []
+    for at_zero_v in ("attached", how):
+        with make_daq(bench_with(at_zero_v=at_zero_v)) as daq:
+            daq.start(voltages.size)
+            readings.append(daq.exchange(voltages))
+    attached, released = readings
+    np.testing.assert_array_equal(released[:200], attached[:200])
+    assert np.any(released[200:] != attached[200:])

@@ -280,6 +280,15 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
 
 
 @pytest.mark.parametrize(
+    ("place", "between"), [("", ()), ("@drive", ("drive",)), ("@ drive : base", ("drive", "base"))]
+)
+def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
+    (plan,) = StructuredOptions(laws=(f"polynomial-spring, masing{place}",)).elements()
+    assert [type(law) for law in plan.laws] == [LAWS["polynomial-spring"], LAWS["masing"]]
+    assert plan.between == between
+
+
+@pytest.mark.parametrize(
     ("line", "said"),
     [
         (
