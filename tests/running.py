@@ -14,6 +14,23 @@ MEMORY = Path("/dev/shm")
 ENOUGH_BYTES = 6 * 2**30
 """What the files of all tests take, three times over."""
 
+WAITING = tuple(
+    f"tests/{place}"
+    for place in (
+        *("contract/", "firmware/", "hardware/", "reliability/kills/", "reliability/mutations/", "reliability/places/"),
+        *("rig/emulator/", "rig/live/", "rig/loop/worker/", "rig/matrix/", "rig/monitor/"),
+        *("rig/campaigns/running/test_runs.py", "rig/check/test_on_emulators.py", "rig/cli/test_imports.py"),
+        *("rig/cli/test_replay_command.py", "rig/cli/test_stop.py", "rig/recording/test_kill_and_full_disk.py"),
+        *(
+            "rig/show/test_loop_table.py",
+            "rig/wire/serial/",
+            "docs/test_driver_template.py",
+            "vibrolock/test_compiled.py",
+        ),
+    )
+)
+"""Tests that start processes, run by the clock or build programs: they wait for most of their time."""
+
 
 def keep_bytecode() -> None:
     """Let Python keep the bytecode of tests and product, where the machine is set up to make it anew in every process.
@@ -58,5 +75,5 @@ def workers() -> int:
 
 
 def first_those_that_wait(items: list[pytest.Item]) -> None:
-    """Put tests of processes and clocks first, which wait beside others that compute. Else the order stays."""
-    items.sort(key=lambda item: item.get_closest_marker("waits") is None)
+    """Put tests that wait first, which then do so beside others that compute. Else the order stays."""
+    items.sort(key=lambda item: not item.nodeid.startswith(WAITING))

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from tests.command import run_command
 from tests.docs.output import assert_shows
 from tests.docs.pages import INTERRUPTED, Block, blocks, rig_commands, write
+from tests.docs.shared_commands import run_shared
 from tests.waiting import LONG_S
 
 
@@ -47,7 +47,7 @@ class Reader:
             if block.note == INTERRUPTED:
                 printed += interrupted(words)
                 continue
-            status, out, err = run_command(*words)
+            status, out, err = run_shared(words)
             text = err + out  # progress, then results
             expected = block.status if number == len(commands) - 1 else 0
             assert status == expected, f"{where}: rig {' '.join(words)} ended with {status}\n{text}"
