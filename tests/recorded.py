@@ -33,11 +33,12 @@ SHORT: dict[str, Any] = {"levels_v": [0.4, 0.8], "record_periods": 8}
 """What makes a backbone short: two points that settle."""
 
 
-def recorded(plan: Plan | str, bench: Bench | str | None = None, *, seed: int = 0, **changes: Any) -> Path:
+def recorded(plan: Plan | str | Path, bench: Bench | str | None = None, *, seed: int = 0, **changes: Any) -> Path:
     """The recording of a plan, with ``changes`` to its keys, on its own bench or another. It must not be written to."""
+    source = "" if isinstance(plan, Plan) else plan
     plan = changed(plan, **changes)
     if bench is None:
-        bench = bench_of(plan, "")
+        bench = bench_of(plan, source)
     elif isinstance(bench, str):
         bench = load_bench(bench)
     asked = f"{plan.model_dump_json()}\n{bench.model_dump_json()}\n{seed}"
@@ -45,14 +46,20 @@ def recorded(plan: Plan | str, bench: Bench | str | None = None, *, seed: int = 
     return made_once(_state_folder() / name, lambda folder: _make(folder / "run.h5", plan, bench, seed)) / "run.h5"
 
 
-def recorded_run(plan: Plan | str, bench: Bench | str | None = None, *, seed: int = 0, **changes: Any) -> Run:
-    """The same as `rig.run` returns it."""
+def recorded_at(path: Path, plan: Plan | str | Path, bench: Bench | str | None = None, *, seed: int = 0) -> Path:
+    """A copy of the recording under a name of its own, with which a test may do what it likes."""
+    shutil.copyfile(recorded(plan, bench, seed=seed), path)
+    return path
+
+
+def recorded_run(plan: Plan | str | Path, bench: Bench | str | None = None, *, seed: int = 0, **changes: Any) -> Run:
+    """The recording as `rig.run` returns it."""
     return Run(Recording(recorded(plan, bench, seed=seed, **changes)))
 
 
-def changed(plan: Plan | str, **changes: Any) -> Plan:
-    """A plan, or the shipped one of this name, with other values of some keys; None takes a key out."""
-    plan = load_plan(plan) if isinstance(plan, str) else plan
+def changed(plan: Plan | str | Path, **changes: Any) -> Plan:
+    """A plan, or the one of this name or file, with other values of some keys; None takes a key out."""
+    plan = plan if isinstance(plan, Plan) else load_plan(plan)
     if not changes:
         return plan
     table = plan.model_dump(mode="json") | changes

@@ -13,7 +13,7 @@ from pathlib import Path
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["made_once", "shared_folder"]
+__all__ = ["copy_of", "made_once", "shared_folder"]
 
 
 @functools.cache
@@ -39,6 +39,11 @@ def made_once(folder: Path, make: Callable[[Path], None]) -> Path:
                 make(unfinished)
                 unfinished.rename(folder)
     return folder
+
+
+def copy_of(folder: Path, to: Path) -> Path:
+    """Copy what was made once into a folder, in which a test may do what it likes."""
+    return shutil.copytree(folder, to, dirs_exist_ok=True)
 
 
 @contextlib.contextmanager

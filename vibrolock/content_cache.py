@@ -5,7 +5,10 @@ Kernels are declared with `vibrolock.compiled`, which comes here when one is fir
 
 import os
 import platform
+import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -17,7 +20,13 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
 from vibrolock.compiling import on_compiling
 
+if sys.platform != "win32":
+    import fcntl
+
 __all__ = ["c_function", "dispatcher", "inner_dispatcher"]
+
+PATIENCE_S = 300.0
+"""How long a process waits for another that compiles the same kernel, before it does so itself. The largest take 30 s."""
 
 LEVEL_3 = ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 """What x86-64-v3 adds to a processor."""
@@ -123,6 +132,7 @@ class _ContentCache(FunctionCache):
     def __init__(self, dispatcher: Any) -> None:
         self._dispatcher: Any = dispatcher
         self._opened = False
+        self._lock: int | None = None
 
     def _open(self) -> None:
         if self._opened:
@@ -141,19 +151,59 @@ class _ContentCache(FunctionCache):
         super().flush()  # type: ignore[no-untyped-call]
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Load machine code; None where it is not there.
+        """Load machine code; None where it is not there, which is then for this process to compile.
 
-        numba first makes its own implementations known, which takes longer than the loading. Machine code needs none of them,
-        and the compiler does the same before it compiles.
+        Of several processes that miss a kernel one compiles it, and the others load what it has saved.
         """
         self._open()
-        found = None
-        try:
-            with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]
-                found = self._load_overload(signature, target_context)  # type: ignore[no-untyped-call]
-        except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
-            self.flush()
+        found = self._loaded(signature, target_context)
+        if found is None and self._wait_for_others():
+            found = self._loaded(signature, target_context)
         if found is None:
             for told in on_compiling:
                 told(self._dispatcher.py_func.__name__)
+        else:
+            self._let_others()
         return found
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Save machine code for other processes."""
+        super().save_overload(signature, compiled)  # type: ignore[no-untyped-call]
+        self._let_others()
+
+    def _loaded(self, signature: Any, target_context: Any) -> Any:
+        """Load machine code, which needs none of numba's own implementations.
+
+        numba would first make these known, which takes longer than the loading. The compiler does so before it compiles.
+        """
+        try:
+            with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]
+                return self._load_overload(signature, target_context)  # type: ignore[no-untyped-call]
+        except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
+            self.flush()
+        return None
+
+    def _wait_for_others(self) -> bool:
+        """Wait until no other process compiles this kernel; return whether one did. From now on this process does.
+
+        A kernel calls no kernel that calls it, so that processes never wait for each other in a circle.
+        """
+        if sys.platform == "win32" or self._lock is not None:
+            return False
+        waited, until_s = False, time.monotonic() + PATIENCE_S
+        with suppress(OSError):  # a folder without locks
+            self._lock = os.open(f"{self._cache_file._index_path}.lock", os.O_RDWR | os.O_CREAT, 0o600)
+            while time.monotonic() < until_s:
+                try:
+                    fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    waited = True
+                    time.sleep(0.05)
+                else:
+                    break
+        return waited
+
+    def _let_others(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None

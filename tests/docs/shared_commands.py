@@ -17,7 +17,7 @@ def run_shared(words: list[str]) -> Ended:
             name = hashlib.sha256("\n".join([plan, output, text]).encode()).hexdigest()[:24]
             try:
                 folder = made_once(shared_folder() / "commands" / name, lambda folder: _run(words, folder))
-            except _Failed as failed:
+            except _FailedError as failed:
                 return failed.ended
             shutil.copy(folder / output, output)
             return Ended(0, *((folder / stream).read_text(encoding="utf-8") for stream in ("out", "err")))
@@ -33,7 +33,7 @@ def _plan_alone(plan: str) -> str | None:
     return None if ".toml" in text or ":" in text else text
 
 
-class _Failed(Exception):
+class _FailedError(Exception):
     """A command has ended with another status than 0."""
 
     def __init__(self, ended: Ended) -> None:
@@ -44,7 +44,7 @@ class _Failed(Exception):
 def _run(words: list[str], folder: Path) -> None:
     ended = run_command(*words)
     if ended.status:
-        raise _Failed(ended)
+        raise _FailedError(ended)
     shutil.copy(words[-1], folder)
     for stream in ("out", "err"):
         (folder / stream).write_text(getattr(ended, stream), encoding="utf-8")

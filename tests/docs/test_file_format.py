@@ -5,7 +5,6 @@ from dataclasses import fields
 
 import pytest
 
-import rig
 from identification import FrequencyResponseMatrix, LinearModes, NonlinearMode
 from identification.nonlinear.nonlinear_modes import STANDARD_ERRORS
 from rig.campaigns.kinds import KINDS
@@ -13,6 +12,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
 from rig.models.files import files
 from tests.docs.pages import ROOT
+from tests.recorded import recorded_run
 
 SMALL = {"bench": "magnet-beam", "levels_v": [0.4]}
 PLANS = {
@@ -56,7 +56,7 @@ def test_every_kind_of_point_is_looked_at():
 def test_every_key_of_a_point_is_on_the_page(kind):
     named = set(re.findall(r"`(\w+)`", section("Points")))
     plan: Plan = plan_from(PLANS[kind], kind)
-    with rig.run(plan) as run:
+    with recorded_run(plan) as run:
         point, part = run.recording.points[0], run.recording.parts[0]
         assert part.information["device_flags"][0] == "law_range"
     assert point["accepted"], point["reason"]

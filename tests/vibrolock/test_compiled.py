@@ -1,6 +1,7 @@
 """Machine code is found by what goes into it: callees and constants of other files too, comments not."""
 
 import os
+import select
 import subprocess
 import sys
 
@@ -222,3 +223,34 @@ def test_what_is_compiled_for_kernels_after_a_call_from_python_is_not_taken_for_
         "0.5",
     ]  # half: integers for Python, floats for quarter
     assert run("print(half(2.0))", **cold) == ["1.0"]
+
+
+SLOW = """
+import sys
+from vibrolock.compiling import on_compiling
+
+def told(name):
+    print("compiles", name, flush=True)
+    sys.stdin.readline()  # as long as the test wants
+
+on_compiling.append(told)
+print("calls", flush=True)
+print(half(3.0), flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks on Windows")
+def test_of_two_processes_that_miss_a_kernel_one_compiles_it_and_the_other_loads_it(tmp_path):
+    def started():
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+        command = [sys.executable, "-c", CODE + SLOW]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, text=True)
+
+    with started() as first:
+        assert [first.stdout.readline() for _ in range(2)] == ["calls\n", "compiles half\n"]
+        with started() as second:
+            assert second.stdout.readline() == "calls\n"
+            compiles, _, _ = select.select([second.stdout], [], [], 1.0)  # it would within milliseconds
+            assert not compiles
+            assert first.communicate("\n")[0] == "1.5\n"
+            assert second.communicate("\n")[0] == "1.5\n"

@@ -13,6 +13,7 @@ from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.friction import IwanSite
 from simulators.structures.structure import BeamStructure
 from simulators.virtual_rig import VirtualRig
+from tests.recorded import recorded_at
 
 PLAN = """
 kind = "backbone"
@@ -31,12 +32,10 @@ frequency_window_hz = [21.933, 26.807]
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    import rig
 
     folder = tmp_path_factory.mktemp("recording")
     (folder / "plan.toml").write_text(PLAN)
-    rig.run(folder / "plan.toml", output=folder / "run.h5").close()
-    return folder / "run.h5"
+    return recorded_at(folder / "run.h5", folder / "plan.toml")
 
 
 def test_a_plan_runs_from_a_file_and_prints_a_line_for_each_point(command, tmp_path):

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-import rig
+from tests.recorded import recorded_at
 
 PLAN = """
 kind = "backbone"
@@ -91,6 +91,7 @@ PARTS = (
 
 LOADED = f"""
 import atexit, json, sys
+from tests.recorded import recorded_at
 PARTS = {PARTS}
 
 def loaded():
@@ -110,7 +111,7 @@ def folder(tmp_path_factory):
     """A folder with a plan, a recording and a model."""
     folder = tmp_path_factory.mktemp("imports")
     (folder / "plan.toml").write_text(PLAN)
-    rig.run(folder / "plan.toml", output=folder / "run.h5").close()
+    recorded_at(folder / "run.h5", folder / "plan.toml")
     _loaded(folder, "import sys; from rig.cli import main; main()", *["identify", "run.h5", "-o", "mode.h5"])
     return folder
 

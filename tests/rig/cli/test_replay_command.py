@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-import rig
 from tests.docs.pages import ROOT
+from tests.recorded import recorded_at
 from tests.rig.campaigns.running.test_runs import plan_with
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
@@ -26,7 +26,7 @@ RIG = [
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("replayed") / "run.h5"
-    rig.run(plan_with(levels_v=(0.4, 0.8)), output=path).close()
+    recorded_at(path, plan_with(levels_v=(0.4, 0.8)))
     return path
 
 

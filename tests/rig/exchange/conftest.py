@@ -6,6 +6,7 @@ import pytest
 import rig
 from identification import Channel, FrequencyResponse, FrequencyResponseMatrix, LinearModes, nonlinear_mode
 from rig.campaigns.plans import load_plan, plan_from
+from tests.recorded import recorded_at
 
 CHANNELS = (
     Channel("acc_drive", "drive", "m/s2"),
@@ -18,7 +19,7 @@ CHANNELS = (
 def backbone_file(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("exchange") / "backbone.h5"
     table = load_plan("magnet-beam/backbone").model_dump(mode="json") | {"levels_v": [0.4, 0.8], "record_periods": 8}
-    rig.run(plan_from(table, "test"), output=path).close()
+    recorded_at(path, plan_from(table, "test"))
     return path
 
 
@@ -29,7 +30,7 @@ def multisine_file(tmp_path_factory) -> Path:
         **{"kind": "multisine", "bench": "magnet-beam", "levels_rms_v": [0.05, 0.1], "realisations": 2, "periods": 2},
         **{"lowest_hz": 22.0, "highest_hz": 28.0, "resolution_hz": 0.5, "transient_periods": 2},
     }
-    rig.run(plan_from(table, "test"), output=path).close()
+    recorded_at(path, plan_from(table, "test"))
     return path
 
 

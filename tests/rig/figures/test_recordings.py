@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import rig
 from rig.campaigns.plans import load_plan
 from rig.drawing.style import restyle
 from rig.figures.files import drawing
 from rig.recording.reader import Recording
+from tests.recorded import recorded_at
 from tests.rig.figures.conftest import texts
 
 NARROW = [24.0, 24.38]
@@ -22,8 +22,7 @@ def run(path, name, **changes):
     plan = load_plan(name)
     table = plan.model_dump(exclude_none=True)
     table["controller"] |= changes.pop("controller", {})
-    rig.run(type(plan).model_validate(table | changes), output=path).close()
-    return path
+    return recorded_at(path, type(plan).model_validate(table | changes))
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from rig.errors import RecordingError
 from rig.measurements import point_rows, spectra
 from rig.measurements.experiments import default_rate_hz, experiments
 from rig.measurements.experiments.signals import Signals
+from tests.recorded import recorded_run
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.lossy import lose
 from tests.rig.rigs import bench_with
@@ -40,13 +41,13 @@ SWEEP = {
 
 @pytest.fixture(scope="module")
 def multisine():
-    with rig.run(plan_from(LINES, "lines"), seed=1) as run:
+    with recorded_run(plan_from(LINES, "lines"), seed=1) as run:
         yield run
 
 
 @pytest.fixture(scope="module")
 def backbone():
-    with rig.run(plan_with(levels_v=(0.6, 1.0), record_periods=40), seed=1) as run:
+    with recorded_run(plan_with(levels_v=(0.6, 1.0), record_periods=40), seed=1) as run:
         yield run
 
 
@@ -103,7 +104,7 @@ def test_a_settled_point_vibrates_as_its_harmonics_say(backbone):
 
 
 def test_a_sweep_begins_at_rest_and_counts_from_its_own_beginning():
-    with rig.run(plan_from(SWEEP, "sweep"), seed=1) as run:
+    with recorded_run(plan_from(SWEEP, "sweep"), seed=1) as run:
         first, second = run.experiments(rate_hz=1000.0)
         rows = point_rows(run.recording, 0)
     assert (first.initial_state, second.initial_state) == ("zero", "zero")

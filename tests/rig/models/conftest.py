@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-import rig
 from rig.campaigns.plans import load_plan, plan_from
 from tests.command import run_command
+from tests.recorded import recorded_at
+from tests.sharing import copy_of, made_once, shared_folder
 
 BENCH = {"bench": "magnet-beam"}
 SWEEP = {**BENCH, "kind": "sweep", "start_hz": 18.0, "stop_hz": 34.0, "rate_hz_per_s": 2.0}
@@ -26,9 +27,12 @@ PLANS = {
 @pytest.fixture(scope="session")
 def shelf(tmp_path_factory) -> Path:
     """A folder with the recordings, and with LIN.h5, EX.h5 and NM.h5 as ``rig identify`` makes them."""
-    folder = tmp_path_factory.mktemp("models")
+    return copy_of(made_once(shared_folder() / "models", _fill), tmp_path_factory.mktemp("models"))
+
+
+def _fill(folder: Path) -> None:
     for name, table in PLANS.items():
-        rig.run(plan_from(table, name), output=folder / f"{name}.h5").close()
+        recorded_at(folder / f"{name}.h5", plan_from(table, name))
     with contextlib.chdir(folder):
         for line in (
             "modal.h5 --model linear --count 2 -o LIN.h5",
@@ -36,4 +40,3 @@ def shelf(tmp_path_factory) -> Path:
             "backbone.h5 --modes LIN.h5 -o NM.h5",
         ):
             run_command(f"identify {line}").succeeded()
-    return folder

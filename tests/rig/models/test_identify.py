@@ -12,6 +12,7 @@ from rig.models.files.files import load
 from rig.recording.reader import Recording
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
+from tests.recorded import recorded_at
 
 
 def test_an_exciter_is_that_of_the_rig_within_its_errors(command, shelf):
@@ -122,7 +123,7 @@ def test_every_mistake_is_named_in_one_line_and_leaves_no_file(command, shelf, m
 def test_five_lags_of_the_friction_beam_give_its_mode_as_harmonic_balance_has_it(command, tmp_path):
     shipped = load_plan("friction-beam/response-controlled").model_dump(exclude_none=True)
     plan = plan_from(shipped | {"levels_m": [5.5e-5, 6.56e-5, 7.83e-5]}, "three levels")
-    rig.run(plan, output=tmp_path / "held.h5", seed=1).close()
+    recorded_at(tmp_path / "held.h5", plan, seed=1)
     done = command("identify held.h5 -o mode.h5 --json")
     assert done.status == 0, done.err
     mode = load(tmp_path / "mode.h5")

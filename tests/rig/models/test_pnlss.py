@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-import rig
 from identification import Features, FitProgress
 from rig.campaigns.plans import plan_from
 from rig.models.files.files import load, save
@@ -17,6 +16,7 @@ from rig.models.identify.pnlss_request import PnlssOptions
 from rig.show.progress import FitLines
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
+from tests.recorded import recorded_at
 
 BENCH = {"bench": "magnet-beam"}
 PLANS = {
@@ -44,7 +44,7 @@ def recordings(tmp_path_factory) -> Path:
     )
     for name, table in PLANS.items():
         plan = plan_with(**table) if name == "backbone" else plan_from(table, name)
-        rig.run(plan, output=folder / f"{name}.h5", seed=1).close()
+        recorded_at(folder / f"{name}.h5", plan, seed=1)
     return folder
 
 

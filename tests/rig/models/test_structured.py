@@ -19,7 +19,9 @@ from rig.models.files.files import load, save
 from rig.models.files.structured import IdentifiedStructured
 from rig.models.files.structured_figure import draw_structured
 from rig.models.identify.structured_request import StructuredOptions
+from tests.recorded import recorded_at
 from tests.rig.exchange.structured_models import structure
+from tests.sharing import copy_of, made_once, shared_folder
 
 LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
 LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2}
@@ -28,12 +30,15 @@ LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2}
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory) -> Path:
     """A folder with recordings at two levels, the modes of the lower one, and a model of the higher one."""
+    return copy_of(made_once(shared_folder() / "structured", _fill), tmp_path_factory.mktemp("structured"))
+
+
+def _fill(folder: Path) -> None:
     from rig.models.identify.data_request import DataOptions
     from rig.models.identify.identify import Request, identify_model
 
-    folder = tmp_path_factory.mktemp("structured")
     for name, level in (("low", 0.02), ("lines", 0.4)):
-        rig.run(plan_from(LINES | {"levels_rms_v": [level]}, name), output=folder / f"{name}.h5", seed=1).close()
+        recorded_at(folder / f"{name}.h5", plan_from(LINES | {"levels_rms_v": [level]}, name), seed=1)
     save(identify_model([folder / "low.h5"], Request(kind="linear", count=1)), folder / "modes.h5")
     request = Request(
         kind="structured",
@@ -42,7 +47,6 @@ def recordings(tmp_path_factory) -> Path:
         data=DataOptions(rate_hz=200.0, outputs="drive"),
     )
     save(identify_model([folder / "lines.h5"], request), folder / "S.h5")
-    return folder
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-import rig
 from rig.campaigns.plans import plan_from
 from simulators.analysis import constant_force_response, phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
+from tests.recorded import recorded_at
 
 LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
 LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2, "levels_rms_v": [0.6]}
@@ -22,12 +22,12 @@ def model(shelf):
     from rig.models.identify.data_request import DataOptions
     from rig.models.identify.identify import Request, identify_model
 
-    rig.run(plan_from(LINES, "lines"), output=shelf / "lines.h5", seed=1).close()
+    recorded_at(shelf / "lines.h5", plan_from(LINES, "lines"), seed=1)
     request = Request(kind="structured", modes=shelf / "LIN.h5", data=DataOptions(rate_hz=400.0, outputs="drive"))
     save(identify_model([shelf / "lines.h5"], request), shelf / "ST.h5")
     plan = SWEEP | {"levels_v": [0.3]}
     (shelf / "ahead.toml").write_text("\n".join(f"{name} = {json.dumps(value)}" for name, value in plan.items()))
-    rig.run(plan_from(plan, "ahead"), output=shelf / "ahead.h5", seed=2).close()
+    recorded_at(shelf / "ahead.h5", plan_from(plan, "ahead"), seed=2)
     return shelf / "ST.h5"
 
 

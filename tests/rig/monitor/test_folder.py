@@ -5,9 +5,9 @@ import os
 
 import pytest
 
-import rig
 from rig.monitor import folder as module
 from tests.command import run_command
+from tests.recorded import recorded_at
 from tests.rig.monitor.scripted import Scripted
 from tests.rig.monitor.visitor import Visitor, served
 
@@ -31,7 +31,7 @@ def recording(tmp_path_factory):
     """A recording, and its bytes."""
     path = tmp_path_factory.mktemp("recorded") / "run.h5"
     path.with_name("plan.toml").write_text(PLAN)
-    rig.run(path.with_name("plan.toml"), output=path).close()
+    recorded_at(path, path.with_name("plan.toml"))
     return path
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-import rig
 from rig.errors import RecordingError
 from rig.live.publisher import Publisher
 from rig.monitor.sources import chosen, of_an_earlier_run
+from tests.recorded import recorded_at
 from tests.rig.monitor.scripted import facts, point
 from tests.rig.monitor.test_process import PLAN
 from tests.rig.monitor.visitor import Visitor, heard, served
@@ -15,7 +15,7 @@ from tests.rig.monitor.visitor import Visitor, heard, served
 def recording(tmp_path_factory):
     path = tmp_path_factory.mktemp("recorded") / "run.h5"
     path.with_name("plan.toml").write_text(PLAN.replace("[0.4]", "[0.4, 0.8]"))
-    rig.run(path.with_name("plan.toml"), output=path).close()
+    recorded_at(path, path.with_name("plan.toml"))
     return path
 
 

@@ -23,6 +23,7 @@ from rig.recording.header import Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import GuardMode
+from tests.recorded import recorded_at
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.rigs import bench_with
 
@@ -222,7 +223,7 @@ KINDS = ["backbone-short", "continuous-backbone", "multisine-1", "sweep-1", "ste
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_is_replayed_with_its_segments_and_points(name, tmp_path):
     plan = load_plan(f"magnet-beam/{name}")
-    rig.run(plan, output=tmp_path / "run.h5").close()
+    recorded_at(tmp_path / "run.h5", plan)
     with Replay(tmp_path / "run.h5", at_end=True) as replay:
         points = [line for line in replay.lines(0) if line["is"] == "point"]
         assert len(points) == len(plan.targets())
@@ -266,7 +267,7 @@ def test_a_resumed_recording_with_another_plan_goes_on_in_its_parts(tmp_path):
 
 def test_where_one_row_of_several_was_stored_the_time_is_still_that_of_the_samples(tmp_path):
     path, plan = tmp_path / "run.h5", plan_with(levels_v=(0.4, 0.8), rows="records")
-    rig.run(plan, output=path).close()
+    recorded_at(path, plan)
     with Recording(path) as recording, Replay(path, at_end=True) as replay:
         part = recording.parts[0]
         ends = [event["sample"] for event in part.events if event.get("state") == "off"]

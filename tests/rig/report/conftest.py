@@ -7,6 +7,7 @@ import pytest
 import rig
 from rig.bench import Bench, load_bench
 from rig.campaigns.plans import load_plan, plan_from
+from tests.recorded import recorded_at
 
 LINES = {"realisations": 2, "transient_periods": 1, "periods": 2, "levels_rms_v": [0.1]}
 CHANGES = {
@@ -40,7 +41,7 @@ def recordings(tmp_path_factory) -> dict[str, Path]:
     for name in CHANGES:
         plan = short(name)
         found[plan.kind] = folder / f"{plan.kind}.h5"
-        rig.run(plan, output=found[plan.kind], seed=1).close()
+        recorded_at(found[plan.kind], plan, seed=1)
     return found
 
 

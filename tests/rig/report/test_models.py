@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import shutil
 
 import pytest
 
@@ -15,6 +16,7 @@ from tests.command import run_command
 from tests.rig.exchange.conftest import matrix, modes, responses  # noqa: F401 (fixtures)
 from tests.rig.exchange.structured_models import structure
 from tests.rig.report.page import read
+from tests.sharing import copy_of, made_once, shared_folder
 
 PLAN = """
 kind = "backbone"
@@ -43,14 +45,17 @@ MADE = (
 @pytest.fixture(scope="module")
 def shelf(recordings, tmp_path_factory):
     """A folder of recordings and of what the commands make of them."""
-    folder = tmp_path_factory.mktemp("shelf")
-    for path in recordings.values():
-        (folder / path.name).symlink_to(path)
+    made = made_once(shared_folder() / "reported", lambda folder: _fill(folder, recordings.values()))
+    return copy_of(made, tmp_path_factory.mktemp("shelf"))
+
+
+def _fill(folder, recordings):
+    for path in recordings:
+        shutil.copy(path, folder)
     (folder / "plan.toml").write_text(PLAN)
     with contextlib.chdir(folder):
         for line in MADE:
             run_command(line).succeeded()
-    return folder
 
 
 def check_against_show(path, report):

@@ -2,17 +2,18 @@
 
 import pytest
 
-import rig
+from rig.recording.reader import Recording
 from rig.show.summary import summarise_recording
+from tests.recorded import recorded_at
 from tests.rig.campaigns.evaluation.test_force_harmonics import VARIED, plan_with
 
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     file = tmp_path_factory.mktemp("varied") / "varied.h5"
-    with rig.run(plan_with(**VARIED), output=file, seed=1) as run:
-        assert run.complete
-        return file, summarise_recording(run.recording)
+    with Recording(recorded_at(file, plan_with(**VARIED), seed=1)) as recording:
+        assert recording.complete
+        return file, summarise_recording(recording)
 
 
 def test_the_command_shows_every_point_with_the_purity_of_its_force(command, recorded):

@@ -13,6 +13,7 @@ from rig.recording.reader import Recording
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
 from rig.tick.sequencer.layout import SegmentKind
+from tests.recorded import recorded_at
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.campaigns.stepped_phase.test_plan import plan as stepped
 from tests.rig.check.rewired import rewire, scaled
@@ -24,7 +25,7 @@ LEVELS = {"levels_v": (0.4, 0.8)}
 def begun(tmp_path_factory):
     """A complete recording of two levels, without repetition."""
     path = tmp_path_factory.mktemp("drift") / "run.h5"
-    rig.run(plan_with(**LEVELS), output=path, seed=1).close()
+    recorded_at(path, plan_with(**LEVELS), seed=1)
     return path
 
 

@@ -25,6 +25,7 @@ from rig.recording.journal_blocks import read_journal
 from rig.recording.reader import Recording
 from rig.show.summary import summarise
 from rig.tick.sequencer.segments import SettleRule
+from tests.recorded import recorded_at
 from tests.rig.campaigns.running.test_runs import plan_with, running
 
 ROOT = Path(__file__).parents[4]
@@ -36,7 +37,7 @@ SECOND = plan_with(levels_v=(0.3, 0.4, 0.6), controller=preset("magnet-beam").mo
 def begun(tmp_path_factory):
     """A complete recording by the first plan."""
     output = tmp_path_factory.mktemp("begun") / "run.h5"
-    rig.run(FIRST, output=output, seed=3).close()
+    recorded_at(output, FIRST, seed=3)
     return output
 
 
