@@ -19,7 +19,7 @@ class Ignoring:
     def __init__(self, files: Iterable[str], told: str = "") -> None:
         self.files, self.told = sorted(files), told
         ignored = {ROOT / file for file in self.files}
-        kept = {folder for file in test_files() if file not in ignored for folder in file.parents}
+        kept = {folder for file in all_test_files() if file not in ignored for folder in file.parents}
         self.paths = ignored | {folder for file in ignored for folder in file.parents} - kept - {*ROOT.parents, ROOT}
 
     def pytest_ignore_collect(self, collection_path: Path) -> bool | None:
@@ -36,12 +36,9 @@ class Ignoring:
         node.workerinput[WORKERS] = self.files
 
 
-def test_files() -> list[Path]:
+def all_test_files() -> list[Path]:
     """Return all files of tests."""
     return sorted((ROOT / "tests").rglob("test_*.py"))
-
-
-test_files.__test__ = False  # type: ignore[attr-defined]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -70,9 +67,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _ignoring(files: list[str], told: str) -> Ignoring:
-    from tests.changed.selection import select  # grimp, which no other run needs
+    """Ignore what is not selected; say how much is, or why all is."""
+    from tests.changed.selection import select  # imports grimp, which no other run needs
 
-    selection, every = select(files, ROOT), test_files()
+    selection, every = select(files, ROOT), all_test_files()
     if selection.all_for:
         return Ignoring((), f"{told}; all {len(every)} test files, for {selection.all_for}")
     ignored = {file for file in every if ".".join(file.relative_to(ROOT).with_suffix("").parts) in selection.left}
