@@ -24,6 +24,7 @@ ELSEWHERE = {
     "rig/exchange/proposal": ("rig/exchange/time_data",),
     "rig/hil": ("hardware",),
     "rig/wire": ("rig/wire/serial", "rig/wire/can"),
+    "simulators/plant": ("simulators", "simulators/sites"),
 }
 """Folders of the product whose tests stand neither in a folder of their name nor, all of them, in the one above it."""
 

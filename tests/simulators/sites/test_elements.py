@@ -210,6 +210,19 @@ ELEMENTS: list[Element] = [
 ]
 
 
+@pytest.mark.parametrize("element", ELEMENTS[:2], ids=lambda element: element.kind)
+def test_beyond_its_limit_the_force_of_a_magnet_goes_on_along_its_tangent(element: Magnet) -> None:
+    strength, gap, limit = element.strength_n_m4, element.gap_m, element.limit_m
+    sites, force = local_sites([element], VirtualRig.shipped("magnet-beam").exciter), np.zeros(1)
+    for z in np.array([-1.5, -1.0, -0.5, 0.5, 1.0, 1.5]) * limit:
+        held = np.clip(z, -limit, limit)
+        far = gap if element.one_sided else gap + held
+        law = strength * (far**-4.0 - (gap - held) ** -4.0)
+        tangent = -4.0 * strength * ((gap - held) ** -5.0 + (0.0 if element.one_sided else far**-5.0))
+        local_forces(sites, np.array([z]), 0, force)
+        assert force[0] - element.stiffness_n_m * z == pytest.approx(law + tangent * (z - held), rel=1e-9)
+
+
 @pytest.mark.parametrize("element", ELEMENTS, ids=lambda element: element.kind)
 def test_site_force_has_no_slope_at_rest_but_what_was_declared(element: Element) -> None:
     exciter = VirtualRig.shipped("magnet-beam").exciter
