@@ -22,6 +22,7 @@ _NAMED = re.compile(rf"\b{_MODULE}(\.\{{)?")
 _ADDRESS = re.compile(rf"[\"']{_MODULE}(?:[\"':]|(\.\{{))")
 _STRING = r'"""(?:\\.|[^\\])*?"""|"(?:\\.|[^"\\\n])*"'
 _NO_CODE = re.compile(rf"(?<!\w)([A-Za-z]{{0,2}})({_STRING}|{_STRING.replace(chr(34), chr(39))})|#[^\n]*", re.DOTALL)
+_FIXTURE = re.compile(r"^@pytest\.fixture[^\n]*\ndef (\w+)", re.MULTILINE)
 _FROM = re.compile(r"\bfrom +(\w+) +import +(?:\(([^)]*)\)|([^\n;]*))")
 _IMPORT = re.compile(r"\bimport +((?:[\w.]+(?: +as +\w+)?, *)*[\w.]+(?: +as +\w+)?)")
 
@@ -55,6 +56,7 @@ def complete(graph: grimp.ImportGraph, text: Mapping[str, str], drivers: list[st
     - Strings that are the address of a module, of something in it, or of any module in a package, count as imports. In a test
       they may stand anywhere in a string: in scripts, commands and patches.
     - A test runs the `conftest.py` of its folder and of those around it, and the installed plugin's package.
+    - Whoever names a fixture of a plugin that `tests/conftest.py` lists imports that plugin; `tests/conftest.py` does not.
     - Drivers are entry points, and a result that draws or shows itself needs figures and tables.
     """
     product = (module for module in text if module.startswith(PRODUCT))
@@ -75,9 +77,27 @@ def complete(graph: grimp.ImportGraph, text: Mapping[str, str], drivers: list[st
         hidden += [(module, name) for name in _named(_NAMED if testing else _ADDRESS, own, modules, graph)]
         if testing and any(word in own for word in _SHOWN):
             hidden += [(module, name) for name in _OF_RESULTS]
+    plugins = {name: text[name] for name in _listed_plugins(text.get("tests.conftest", "")) if name in text}
+    hidden = [
+        (importer, imported)
+        for importer, imported in hidden
+        if (importer, imported) != ("tests.conftest", imported) or imported not in plugins
+    ]
+    for plugin, own in plugins.items():
+        if fixtures := _FIXTURE.findall(own):
+            named = re.compile(rf"\bdef \w+\([^)]*\b(?:{'|'.join(fixtures)})\b")
+            hidden += [
+                (module, plugin) for module in text if module.startswith("tests.") and named.search(text[module])
+            ]
     for importer, imported in hidden:
         if importer != imported and {importer, imported} <= modules:
             graph.add_import(importer=importer, imported=imported)
+
+
+def _listed_plugins(text: str) -> list[str]:
+    """Return the modules in ``pytest_plugins``."""
+    found = re.search(r"^pytest_plugins = (\[.*?\])", text, re.MULTILINE | re.DOTALL)
+    return list(ast.literal_eval(found[1])) if found else []
 
 
 def packages_around(module: str) -> Iterator[str]:
