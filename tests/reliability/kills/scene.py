@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 import rig
+import rig.campaigns.backbone.points as backbone
 import rig.campaigns.running.runner as runner
 import rig.recording.conversion as store
 from rig.bench import Bench
-from rig.campaigns.kinds import KINDS
 from rig.campaigns.running.output_file import forget_before
 from rig.loop.worker.session import WorkerSession
 from rig.recording.journal import JournalWriter
@@ -85,8 +85,8 @@ def set_up(killer: Killer) -> None:
     JournalWriter.rows = killer.noting(JournalWriter.rows)  # type: ignore[method-assign]
     runner._facts = killer.before(runner._facts, "opening")
     runner.JournalWriter.create = killer.after(JournalWriter.create, "overwrite before the start")  # type: ignore[method-assign]
-    kind = KINDS["backbone"]
-    KINDS["backbone"] = replace(kind, measure=killer.before(kind.measure, "evaluation"))
+    kind = backbone.BACKBONE
+    backbone.BACKBONE = replace(kind, measure=killer.before(kind.measure, "evaluation"))
     real = store.write_recording
 
     def write_recording(file: Any, header: Any, parts: Any, check: Callable[[], None], *rest: Any) -> None:

@@ -91,7 +91,6 @@ PARTS = (
 
 LOADED = f"""
 import atexit, json, sys
-from tests.recorded import recorded_at
 PARTS = {PARTS}
 
 def loaded():

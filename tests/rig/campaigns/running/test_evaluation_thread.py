@@ -52,7 +52,7 @@ def test_rows_are_taken_while_a_point_is_evaluated_however_long_that_takes(monke
         return real.measure(*arguments)
 
     monkeypatch.setattr("rig.loop.loop.Loop.waits", False)  # as by the wall clock
-    monkeypatch.setitem(KINDS, "backbone", replace(real, measure=slow))
+    monkeypatch.setattr("rig.campaigns.backbone.points.BACKBONE", replace(real, measure=slow))
     with rig.run(plan_with(levels_v=(0.4, 0.8)), progress=Counting()) as run:
         assert run.complete
         assert [point["number"] for point in run.recording.points] == [0, 1]
