@@ -174,4 +174,4 @@ def _named(pattern: re.Pattern[str], text: str, modules: set[str], graph: grimp.
     for name, any_in_it in {*pattern.findall(text)}:
         module = next((part for part in (name, *packages_around(name)) if part in modules), "")
         if "." in module:
-            yield from (module, f"{module}.__main__", *(graph.find_children(module) if any_in_it else ()))
+            yield from (module, f"{module}.__main__", *(graph.find_descendants(module) if any_in_it else ()))
