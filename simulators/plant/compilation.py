@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,8 +57,18 @@ def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrice
     augmented[:n, :n] = step_s * dynamics
     augmented[:n, n : n + k] = step_s * columns
     augmented[n : n + k, n + k :] = np.eye(k)
-    exponential = scipy.linalg.expm(augmented)
+    exponential = _exponential(augmented.tobytes()).reshape(augmented.shape)
     return PhiMatrices(exponential[:n, :n], exponential[:n, n : n + k], exponential[:n, n + k :])
+
+
+@lru_cache(maxsize=64)
+def _exponential(matrix: bytes) -> Matrix:
+    """Exponential of a square matrix of doubles, flat; a rig is discretised several times for one run."""
+    values = np.frombuffer(matrix)
+    size = math.isqrt(values.size)
+    found: Matrix = scipy.linalg.expm(values.reshape(size, size)).ravel()
+    found.setflags(write=False)
+    return found
 
 
 class StepColumns(NamedTuple):

@@ -1,6 +1,6 @@
 """The vibrating structure: a beam or a jointed beam from its geometry, or a structure given by its modes."""
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -17,6 +17,10 @@ __all__ = ["BeamStructure", "LapJointedBeam", "ModalStructure", "Structure"]
 Matrix = NDArray[np.float64]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
+# A bench, its twins and its variants have the same beam: finite elements are solved once for all of them.
+_beam_modes = lru_cache(maxsize=16)(beam_modes)
+_lap_joint_modes = lru_cache(maxsize=16)(lap_joint_modes)
+
 
 class BeamStructure(MeshedBeam):
     """A uniform Euler-Bernoulli beam with lumped masses and supports; its modes come from finite elements."""
@@ -32,15 +36,15 @@ class BeamStructure(MeshedBeam):
     def modes(self) -> BeamModes:
         """Mass-normalised modes of the beam with its lumped masses and supports."""
         area_m2 = self.width_m * self.thickness_m
-        return beam_modes(
+        return _beam_modes(
             length_m=self.length_m,
             bending_stiffness_n_m2=self.youngs_modulus_pa * area_m2 * self.thickness_m**2 / 12.0,
             mass_per_length_kg_m=self.density_kg_m3 * area_m2,
             n_element=self.n_element,
             n_mode=len(self.damping_ratio),
             boundary=self.boundary,
-            lumps=self.lumps,
-            springs=self.springs,
+            lumps=tuple(self.lumps),
+            springs=tuple(self.springs),
         )
 
     def _most_modes(self) -> int:
@@ -94,7 +98,7 @@ class LapJointedBeam(MeshedBeam):
     @cached_property
     def modes(self) -> LapJointModes:
         """Mass-normalised modes of the beam with its joint stuck."""
-        return lap_joint_modes(
+        return _lap_joint_modes(
             LapMesh(self.length_m, self.lap_length_m, self.thickness_m, self.n_arm_element, self.n_lap_element),
             Section(self.youngs_modulus_pa, self.density_kg_m3, self.width_m, self.thickness_m),
             Interface(
@@ -105,8 +109,8 @@ class LapJointedBeam(MeshedBeam):
                 self.stiffness_floor,
             ),
             n_mode=len(self.damping_ratio),
-            lumps=self.lumps,
-            springs=self.springs,
+            lumps=tuple(self.lumps),
+            springs=tuple(self.springs),
         )
 
     @property

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification import Channel, IdentificationError, periodic_vibration
-from identification.signals.rounding import part_of_each, rounding_errors
+from identification.signals.rounding import part_of_each, rounding_errors, turns_of
 
 CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"))
 HARMONICS = np.array([0.0, 1.0, 0.2, 0.05j])
@@ -116,3 +116,9 @@ def test_steps_and_noise_that_do_not_fit_are_named(name: str, values: list[float
     rounded = record(9.6, 0.05, 0.2, np.random.default_rng(5))
     with pytest.raises(IdentificationError, match=rf"{name}: is .* needs 2 numbers of 0 or above"):
         periodic_vibration(THETA, [rounded, rounded], CHANNELS, sample_rate_hz=5000.0, **{name: values})
+
+
+def test_turns_are_powers_of_the_first_and_lower_harmonics_alone_have_the_same_errors() -> None:
+    np.testing.assert_allclose(turns_of(THETA, 30), np.exp(1j * np.outer(np.arange(31), THETA)), atol=1e-11)
+    given = THETA, 9.6 * HARMONICS[None], np.ones(1), np.array([0.05])
+    np.testing.assert_allclose(rounding_errors(*given, 2), rounding_errors(*given)[:, :3], rtol=1e-12)
