@@ -13,8 +13,7 @@ import sys
 from pathlib import Path
 
 import vibrolock
-from tests.reliability.mutants.choosing import PACKAGES, Mutant, chosen
-from tests.reliability.mutants.equivalent import EQUIVALENT
+from tests.reliability.mutants.choosing import EQUIVALENT, PACKAGES, Mutant, chosen
 from tests.reliability.mutants.running import LIMIT_S, Verdict, judged
 from tests.reliability.mutants.telling import compared, read, survivors, table, told, write
 from vibrolock.compiled import kernel_cache_folder

@@ -5,6 +5,7 @@ among those of a long one, and an edit of the product changes no others than its
 """
 
 import hashlib
+import tomllib
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
@@ -12,9 +13,11 @@ from typing import NamedTuple
 
 from tests.reliability.mutants.operators import Change, changes
 
-__all__ = ["PACKAGES", "Mutant", "chosen", "mirrored_tests", "mutants_of", "shares"]
+__all__ = ["EQUIVALENT", "PACKAGES", "Mutant", "chosen", "mirrored_tests", "mutants_of", "shares"]
 
 PACKAGES = ("rig", "controller", "simulators", "identification", "vibrolock")
+EQUIVALENT: dict[str, str] = tomllib.loads(Path(__file__).with_name("equivalent.toml").read_text(encoding="utf-8"))
+"""Names of mutants that mean the same as the product, and the reason."""
 LEAST = 20
 """A package has one mutant of so many at least, if it has that many."""
 ELSEWHERE = {

@@ -8,6 +8,7 @@ import pytest
 from tests.reliability.mutants.__main__ import ROOT
 from tests.reliability.mutants.choosing import (
     ELSEWHERE,
+    EQUIVALENT,
     PACKAGES,
     Mutant,
     chosen,
@@ -15,7 +16,6 @@ from tests.reliability.mutants.choosing import (
     mutants_of,
     shares,
 )
-from tests.reliability.mutants.equivalent import EQUIVALENT
 from tests.reliability.mutants.operators import changed, changes
 from tests.reliability.mutants.running import Verdict, judged
 from tests.reliability.mutants.telling import compared, read, survivors, table, write

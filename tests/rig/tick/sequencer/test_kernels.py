@@ -12,7 +12,7 @@ from controller.lock import LOCK
 from controller.period import PERIOD
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
-from rig.tick.sequencer.judgement import SETTLING, judge_period
+from rig.tick.sequencer.judgement import SETTLING, forget_periods, judge_period
 from rig.tick.sequencer.kernels import advance
 from rig.tick.sequencer.layout import PROGRESS, OnFailure, Outcome, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule, segment_table
@@ -70,6 +70,14 @@ def test_harmonics_beyond_their_tolerance_keep_a_steady_vibration_from_settling(
 def test_a_force_level_must_be_reached():
     assert _judge([(0.0, 1.0, 0.98)] * 60, wanted_force=1.0)["good_periods"] == 0
     assert _judge([(0.0, 1.0, 0.995)] * 60, wanted_force=1.0)["good_periods"] > 8
+
+
+def test_periods_before_the_level_was_reached_do_not_count():
+    settling = np.ones(1, SETTLING)
+    forget_periods(settling[0])
+    for name in ("count", "steady", "good_periods", "bad_periods", "saturated_periods", "clamped_periods"):
+        assert settling[name] == 0
+    assert np.isnan([settling["mean_error_rad"], settling["drift"]]).all()
 
 
 def test_a_level_that_saturates_and_is_not_reached_is_counted():
