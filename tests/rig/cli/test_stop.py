@@ -60,7 +60,8 @@ def running():
         command = [*RIG, "run", "plan.toml", "--realtime", "-o", name]
         child = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         children.append(child)
-        wait_until(lambda: driven(name), f"{name} is driven")
+        wait_until(lambda: driven(name) or child.poll() is not None, f"{name} is driven")
+        assert child.poll() is None, child.communicate()
         return child
 
     yield start
