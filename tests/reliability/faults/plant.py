@@ -12,6 +12,7 @@ from simulators.scatter import Deviation
 from simulators.virtual_rig import VirtualRig
 from tests.reliability.faults.spoiling import AMPLIFIER, SENSOR
 from tests.reliability.faults.table import Fault
+from vibrolock.compiled import bound
 
 __all__ = ["BrokenRig"]
 
@@ -54,6 +55,7 @@ class BrokenRig:
         )
         self._last_v = self._last_out_v = 0.0
         self.first = 0
+        self._truth, self._run = np.empty((0, 0)), None
         self.sent: list[np.ndarray] = []
         self.true: list[np.ndarray] = []
         self.motion: list[np.ndarray] = []
@@ -61,10 +63,13 @@ class BrokenRig:
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """One sample a voltage [n]; returns readings [n, n_channels] (V) and flags uint16[n]."""
         n = voltages.size
-        readings = np.empty((n, len(self._bench.channels)))
-        truth, flags = aligned((n, self._observe.shape[1])), np.empty(n, np.int64)
+        readings, flags = np.empty((n, len(self._bench.channels))), np.empty(n, np.int64)
         self._weaken()
-        run_observed(self.arrays, self.state, self._observe, self._amplified(voltages), readings, truth, flags)
+        given = self.arrays, self.state, self._observe, self._amplified(voltages), readings, self._truth_of(n), flags
+        if self._run is None:
+            self._run = bound(run_observed, *given)
+        self._run(*given)
+        truth = self._truth
         self.sent.append(voltages.copy())
         self.true.append(readings.copy())
         self.motion.append(truth[:, :2].copy())
@@ -72,12 +77,22 @@ class BrokenRig:
         self.first += n
         return readings, flags.astype(np.uint16)
 
+    def _truth_of(self, n: int) -> np.ndarray:
+        if self._truth.shape[0] != n:
+            self._truth = aligned((n, self._observe.shape[1]))
+        return self._truth
+
+    def _acts(self, part: str, n: int) -> bool:
+        """Whether a fault of this part acts within the next n samples."""
+        return self._fault is not None and self._fault.part == part and self.first + n > self._onset
+
     def _since(self, n: int) -> np.ndarray:
         return np.arange(self.first, self.first + n) - self._onset
 
     def _amplified(self, voltages: np.ndarray) -> np.ndarray:
-        out, at = voltages.copy(), self._since(voltages.size)
-        if self._fault is not None and self._fault.part == "amplifier" and at[-1] >= 0:
+        out = voltages.copy()
+        if self._fault is not None and self._acts("amplifier", voltages.size):
+            at = self._since(voltages.size)
             broken = at >= 0
             before = voltages[~broken]
             self._last_out_v = float(before[-1]) if before.size else self._last_out_v
@@ -94,7 +109,11 @@ class BrokenRig:
     def _spoil(self, readings: np.ndarray) -> None:
         if self._index is None or self._fault is None:
             return
-        at, volts = self._since(readings.shape[0]), readings[:, self._index]
+        n, volts = readings.shape[0], readings[:, self._index]
+        if not self._acts(self._fault.part, n):
+            self._last_v = float(volts[-1])
+            return
+        at = self._since(n)
         broken = at >= 0
         before = volts[~broken]
         self._last_v = float(before[-1]) if before.size else self._last_v
