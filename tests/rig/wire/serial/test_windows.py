@@ -7,7 +7,7 @@ import pytest
 
 WITHOUT = """
 import signal, sys
-import can, serial, serial.tools.list_ports  # which have code of their own for such a system
+import can, serial, serial.tools.list_ports, threadpoolctl  # which have code of their own for such a system
 import rig.bench, rig.drivers, rig.loop.doctor
 from tests.rig.rigs import bench_with
 for name in ("SIGHUP", "SIGUSR1", "SIGQUIT"):
