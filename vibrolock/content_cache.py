@@ -177,7 +177,7 @@ class _ContentCache(FunctionCache):
         numba would first make these known, which takes longer than the loading. The compiler does so before it compiles.
         """
         try:
-            with self._guard_against_spurious_io_errors():  # type: ignore[no-untyped-call]
+            with self._guard_against_spurious_io_errors():
                 return self._load_overload(signature, target_context)  # type: ignore[no-untyped-call]
         except (ImportError, AttributeError):  # the index names a type of argument by a module that it has left since
             self.flush()

@@ -12,6 +12,7 @@ these moments to their expectations.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,8 +63,7 @@ def local_fit(
     degree
         Degree of these polynomials.
     """
-    rows = (stiffness, rate, size, periods, place, weight)
-    return local_fits(*(np.asarray(row)[None] for row in rows), degree)[0]
+    return local_fits(stiffness[None], rate[None], size[None], periods[None], place[None], weight[None], degree)[0]
 
 
 def local_fits(
@@ -106,13 +106,13 @@ def local_fits(
     ]
 
 
-def _real(values: Complex) -> Float:
+def _real(values: NDArray[Any]) -> Float:
     """float[m, 2 n, k]: real parts above imaginary parts."""
     return np.concatenate([values.real, values.imag], axis=1)
 
 
-def _transposed(values: Float) -> Float:
-    return values.swapaxes(1, 2)
+def _transposed(values: NDArray[Any]) -> Float:
+    return np.asarray(values.swapaxes(1, 2))
 
 
 def noise_variances(fits: Sequence[LocalFit]) -> Float:
