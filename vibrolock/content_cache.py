@@ -205,5 +205,8 @@ class _ContentCache(FunctionCache):
 
     def _let_others(self) -> None:
         if self._lock is not None:
+            if sys.platform != "win32":
+                with suppress(OSError):
+                    fcntl.flock(self._lock, fcntl.LOCK_UN)  # closing does not, where a forked child has the file too
             os.close(self._lock)
             self._lock = None
