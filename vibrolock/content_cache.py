@@ -157,7 +157,8 @@ class _ContentCache(FunctionCache):
         """
         self._open()
         found = self._loaded(signature, target_context)
-        if found is None and self._wait_for_others():
+        if found is None:
+            self._wait_for_others()
             found = self._loaded(signature, target_context)
         if found is None:
             for told in on_compiling:
@@ -183,25 +184,23 @@ class _ContentCache(FunctionCache):
             self.flush()
         return None
 
-    def _wait_for_others(self) -> bool:
-        """Wait until no other process compiles this kernel; return whether one did. From now on this process does.
+    def _wait_for_others(self) -> None:
+        """Wait until no other process compiles this kernel. From now on the others wait for this one.
 
         A kernel calls no kernel that calls it, so that processes never wait for each other in a circle.
         """
         if sys.platform == "win32" or self._lock is not None:
-            return False
-        waited, until_s = False, time.monotonic() + PATIENCE_S
+            return
+        until_s = time.monotonic() + PATIENCE_S
         with suppress(OSError):  # a folder without locks
             self._lock = os.open(f"{self._cache_file._index_path}.lock", os.O_RDWR | os.O_CREAT, 0o600)
             while time.monotonic() < until_s:
                 try:
                     fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    waited = True
                     time.sleep(0.05)
                 else:
                     break
-        return waited
 
     def _let_others(self) -> None:
         if self._lock is not None:
