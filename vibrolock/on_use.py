@@ -1,11 +1,34 @@
-"""Names of a package that are imported on first use, so that importing the package itself costs nothing."""
+"""Names of a package, and entries of a registry, that are imported on first use: importing the package itself costs nothing."""
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from typing import Any
+from pkgutil import resolve_name
+from typing import Any, TypeVar
 
-__all__ = ["on_use"]
+__all__ = ["Registry", "on_use"]
+
+T = TypeVar("T")
+
+
+class Registry(Mapping[str, T]):
+    """Objects by name, each imported from its address ``module:object`` when it is asked for."""
+
+    def __init__(self, addresses: Mapping[str, str]) -> None:
+        self._addresses = addresses
+
+    def __getitem__(self, name: str) -> T:
+        found: T = resolve_name(self._addresses[name])
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._addresses)
+
+    def __len__(self) -> int:
+        return len(self._addresses)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._addresses
 
 
 def on_use(package: str, module_of: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:

@@ -3,45 +3,26 @@
 Each kind is declared in its own folder, which the contract "Campaigns" in ``pyproject.toml`` names as well.
 """
 
-from collections.abc import Iterator, Mapping
-from pkgutil import resolve_name
+from collections.abc import Mapping
 
 from rig.campaigns.campaign import Campaign
+from vibrolock.on_use import Registry
 
 __all__ = ["KINDS", "kinds_that_yield"]
 
-_DECLARED = {
-    "backbone": "backbone.points:BACKBONE",
-    "stepped-phase": "stepped_phase.points:STEPPED_PHASE",
-    "continuous-backbone": "continuous_backbone.points:CONTINUOUS_BACKBONE",
-    "response-controlled": "response_controlled.points:RESPONSE_CONTROLLED",
-    "stepped-sine": "stepped_sine.points:STEPPED_SINE",
-    "sweep": "sweep.points:SWEEP",
-    "multisine": "multisine.points:MULTISINE",
-    "dwell": "dwell.points:DWELL",
-    "decay": "decay.points:DECAY",
-}
-"""Where each kind is declared."""
-
-
-class _Kinds(Mapping[str, Campaign]):
-    """The kinds by name, each imported when it is asked for."""
-
-    def __getitem__(self, name: str) -> Campaign:
-        kind: Campaign = resolve_name(f"rig.campaigns.{_DECLARED[name]}")
-        return kind
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_DECLARED)
-
-    def __len__(self) -> int:
-        return len(_DECLARED)
-
-    def __contains__(self, name: object) -> bool:
-        return name in _DECLARED
-
-
-KINDS: Mapping[str, Campaign] = _Kinds()
+KINDS: Mapping[str, Campaign] = Registry(
+    {
+        "backbone": "rig.campaigns.backbone.points:BACKBONE",
+        "stepped-phase": "rig.campaigns.stepped_phase.points:STEPPED_PHASE",
+        "continuous-backbone": "rig.campaigns.continuous_backbone.points:CONTINUOUS_BACKBONE",
+        "response-controlled": "rig.campaigns.response_controlled.points:RESPONSE_CONTROLLED",
+        "stepped-sine": "rig.campaigns.stepped_sine.points:STEPPED_SINE",
+        "sweep": "rig.campaigns.sweep.points:SWEEP",
+        "multisine": "rig.campaigns.multisine.points:MULTISINE",
+        "dwell": "rig.campaigns.dwell.points:DWELL",
+        "decay": "rig.campaigns.decay.points:DECAY",
+    }
+)
 """All kinds by name."""
 
 

@@ -1,10 +1,10 @@
 """Registry of the kinds of files: one line for each kind. A kind is imported when a file of it is read or written."""
 
-from collections.abc import Iterator, Mapping
-from pkgutil import resolve_name
+from collections.abc import Mapping
 from typing import Any
 
 from rig.models.files.kind import FileKind
+from vibrolock.on_use import Registry
 
 __all__ = ["KINDS", "as_kept", "kind_of_file_for"]
 
@@ -27,24 +27,9 @@ _DECLARED = {
 """By the name in the file: where the kind is declared, and the names of the types that it holds."""
 
 
-class _Kinds(Mapping[str, FileKind]):
-    """The kinds by name, each imported when it is asked for."""
-
-    def __getitem__(self, name: str) -> FileKind:
-        kind: FileKind = resolve_name(f"rig.models.files.{_DECLARED[name][0]}")
-        return kind
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(_DECLARED)
-
-    def __len__(self) -> int:
-        return len(_DECLARED)
-
-    def __contains__(self, name: object) -> bool:
-        return name in _DECLARED
-
-
-KINDS: Mapping[str, FileKind] = _Kinds()
+KINDS: Mapping[str, FileKind] = Registry(
+    {name: f"rig.models.files.{declared}" for name, (declared, _) in _DECLARED.items()}
+)
 """Every kind of file other than recordings, by its name in the file."""
 
 
