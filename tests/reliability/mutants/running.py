@@ -242,7 +242,9 @@ def _limit(process: int) -> None:
         import resource
 
         resource.prlimit(process, resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-        resource.prlimit(process, resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
+        # Its hard limit stays: tests of full disks set limits of their own and lift them.
+        _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.prlimit(process, resource.RLIMIT_FSIZE, (LARGEST_FILE, hard))
 
 
 def _end_those_left(folder: str) -> None:
