@@ -52,7 +52,7 @@ def use_memory_for_files() -> None:
         folder.mkdir(mode=0o700, exist_ok=True)
     except OSError:
         return
-    if folder.stat().st_uid == os.getuid():
+    if folder.lstat().st_uid == os.getuid() and not folder.is_symlink():  # nobody else has put it there
         os.environ["TMPDIR"] = str(folder)
         tempfile.tempdir = None  # looked up anew
 
