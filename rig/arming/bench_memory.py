@@ -14,6 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 from rig.errors import RecordingError
 from rig.system.text_files import read_text
@@ -45,6 +46,8 @@ class RememberedCheck:
     """Path of the recording of the check."""
     fingerprint: str
     """`fingerprint` of the bench at the time of the check."""
+    scale: CheckedScale | None = None
+    """The scale of force and motion; None if the check did not tell it, or was made by a version that kept none."""
 
 
 @dataclass(frozen=True)
@@ -104,12 +107,24 @@ def memory_of(bench: Bench) -> BenchMemory:
             if found is not None:
                 _check_time(found["at"])
         return BenchMemory(
-            None if check is None else RememberedCheck(**{**check, "failed": tuple(check["failed"])}),
+            None if check is None else _check_from(check),
             None if trip is None else RememberedTrip(**trip),
         )
     except (OSError, ValueError, KeyError, TypeError, RecordingError, RecursionError) as error:
         text = f"{path} cannot be read, it may have held a trip ({type(error).__name__}: {error})"
         return BenchMemory(trip=RememberedTrip(now(), text, ""))
+
+
+def _check_from(table: dict[str, Any]) -> RememberedCheck:
+    """Return the check of a stored table; raise `ValueError`, `KeyError` or `TypeError` if it is none."""
+    scale = table.get("scale")
+    return RememberedCheck(
+        **{
+            **table,
+            "failed": tuple(table["failed"]),
+            "scale": None if scale is None else CheckedScale(**scale),
+        }
+    )
 
 
 def _check_time(at: str) -> None:

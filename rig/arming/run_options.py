@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 from rig.arming.arming import Arm
+from rig.arming.checked_scale import CheckedScale
 from rig.arming.rehearsed import Rehearsed
 from rig.arming.run_facts import About
 from rig.errors import ConfigurationError
@@ -85,6 +86,8 @@ class RunOptions:
     """Permission to move something physical: True, a callable that asks a person, or None (`rig.arming.arming`)."""
     about: About = field(default_factory=About)
     """Operator, specimen and notes, recorded with the part."""
+    checked: CheckedScale | None = None
+    """Scale of force and motion from a check of the bench, in place of the last one that is remembered."""
     rehearsal: Rehearsed | None = None
     """A rehearsal of the plan on this bench, recorded with the part; some benches need one (`rig.arming.rehearsed`)."""
     override_rehearsal: str = ""

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from identification import IdentificationError
+from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 from rig.bench.cross_checks import objections
 from rig.campaigns.evaluation.recorded import points_of
@@ -19,6 +20,7 @@ from rig.check.judging import driven_findings, latency_findings
 from rig.check.recorded import about, is_check
 from rig.check.reference import reference_findings
 from rig.check.responses import Mode, Responses, responses_of
+from rig.check.scale import scale_of
 from rig.check.silence import silent_findings
 from rig.errors import RecordingError
 from rig.measurements import bench_of_recording
@@ -40,6 +42,8 @@ class Assessment(Result):
     """The bench as it was recorded."""
     recording: Path
     """Path of the recording."""
+    at: str
+    """Begin of the check, ISO 8601."""
     level_rms_v: float | None
     """Level of the multisine that was evaluated, V RMS."""
     findings: tuple[Finding, ...]
@@ -50,6 +54,11 @@ class Assessment(Result):
     """The mode under test."""
     reference: Responses | None
     """Responses of the reference check; None if there is no reference."""
+
+    @property
+    def scale(self) -> CheckedScale | None:
+        """Motion per newton and per volt at resonance, with which runs compare theirs; None if the check does not tell them."""
+        return None if self.responses is None else scale_of(self.bench, self.responses, self.mode, self.at)
 
     @property
     def verdict(self) -> Literal["passed", "failed"]:
@@ -88,7 +97,7 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
         findings.append(Finding("reference", "", "not tested", text=text))
     level = plan.levels_rms_v[-1] if found is not None else None
     findings += _clipping(recording, bench, level)
-    return Assessment(bench, recording.path, level, tuple(findings), found, mode, old)
+    return Assessment(bench, recording.path, recording.started, level, tuple(findings), found, mode, old)
 
 
 def _limits(bench: Bench) -> list[Finding]:

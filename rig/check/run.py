@@ -73,7 +73,9 @@ def _assessed(bench: Bench, path: Path, reference: str | Path | None) -> Assessm
         facts = recorded.parts[0].information["about"]
         virtual, identity = facts["armed"]["how"] == "virtual", facts["device"]
     if not virtual:
-        remembered = RememberedCheck(now(), found.failed, str(path.absolute()), fingerprint(bench, identity))
+        remembered = RememberedCheck(
+            now(), found.failed, str(path.absolute()), fingerprint(bench, identity), found.scale
+        )
         remember(bench, check=remembered)
     return found
 

@@ -4,9 +4,19 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-__all__ = ["Misfit", "Seen", "misfit_sentence"]
+__all__ = ["Bounds", "Misfit", "Seen", "misfit_sentence"]
 
 ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channels share one cause
+ALIKE_DEG = 15.0  # the same for turns: within this of their mean
+
+
+class Bounds(NamedTuple):
+    """From where on a misfit is warned of and refused, as a factor of sizes and as a turn in degrees."""
+
+    warned: float
+    refused: float
+    warned_deg: float
+    refused_deg: float
 
 
 class Seen(Enum):
@@ -33,6 +43,8 @@ class Misfit(NamedTuple):
     """Source of the expected ratio."""
     at: str = ""
     """Level of the single point used for the comparison; empty if several points were used."""
+    turn_deg: float | None = None
+    """Phase of the seen over the expected ratio, deg, if the misfit is one of phase; ``factor`` is then its equivalent."""
 
     @property
     def times(self) -> float:
@@ -40,23 +52,50 @@ class Misfit(NamedTuple):
         return self.seen / self.expected
 
 
-def misfit_sentence(misfits: Sequence[Misfit], drive: str, warned: float, refused: float) -> str:
-    """Describe the worst misfit in one sentence. If all channels are off by the same factor, name channel ``drive`` instead."""
+def misfit_sentence(misfits: Sequence[Misfit], drive: str, bounds: Bounds) -> str:
+    """Describe the worst misfit in one sentence. If all channels are off alike, name channel ``drive`` instead."""
     worst = max(misfits, key=lambda misfit: misfit.factor)
-    bound = f"refused from a factor {refused:g}" if worst.factor >= refused else f"trusted up to a factor {warned:g}"
-    off = [misfit for misfit in misfits if misfit.by is worst.by and misfit.factor >= warned]
-    if len({misfit.channel for misfit in off}) > 1 and len(off) == sum(m.by is worst.by for m in misfits):
-        times = [misfit.times for misfit in off]
-        if min(times) > 0.0 and max(times) < ALIKE**2 * min(times):
-            names = ", ".join(misfit.channel for misfit in off)
+    bound = _bound_of(worst, bounds)
+    alike = [one for one in misfits if one.by is worst.by and (one.turn_deg is None) is (worst.turn_deg is None)]
+    off = [misfit for misfit in alike if misfit.factor >= bounds.warned]
+    if len({misfit.channel for misfit in off}) > 1 and len(off) == len(alike) and _share_one_cause(off):
+        names = ", ".join(misfit.channel for misfit in off)
+        if worst.turn_deg is not None:
             return (
-                f"channel {drive}: all others ({names}) are {worst.times:.3g} times as large against it as expected "
-                f"{worst.by.value}, {bound}: look at its sensor, cable and sensitivity_v_per_unit"
+                f"channel {drive}: all others ({names}) stand {_turn(worst.turn_deg)} it, expected 0 {worst.by.value}, "
+                f"{bound}: look at what delays or advances its sensor (conditioner, filter, skew_samples)"
             )
+        return (
+            f"channel {drive}: all others ({names}) are {worst.times:.3g} times as large against it as expected "
+            f"{worst.by.value}, {bound}: look at its sensor, cable and sensitivity_v_per_unit"
+        )
     return f"{_what_was_seen(worst)} {worst.by.value}, {bound}: {_where_to_look(worst)}"
 
 
+def _bound_of(worst: Misfit, bounds: Bounds) -> str:
+    """Return the bound that the misfit is beyond, in words."""
+    refused = worst.factor >= bounds.refused
+    if worst.turn_deg is not None:
+        return f"refused from {bounds.refused_deg:g} deg" if refused else f"trusted up to {bounds.warned_deg:g} deg"
+    return f"refused from a factor {bounds.refused:g}" if refused else f"trusted up to a factor {bounds.warned:g}"
+
+
+def _share_one_cause(off: Sequence[Misfit]) -> bool:
+    """Whether the channels are off by the same factor, or turned by the same angle."""
+    turns = [misfit.turn_deg for misfit in off if misfit.turn_deg is not None]
+    if turns:
+        return max(turns) - min(turns) < 2.0 * ALIKE_DEG
+    times = [misfit.times for misfit in off]
+    return min(times) > 0.0 and max(times) < ALIKE**2 * min(times)
+
+
+def _turn(turn_deg: float) -> str:
+    return f"{abs(turn_deg):.3g} deg {'ahead of' if turn_deg > 0.0 else 'behind'}"
+
+
 def _what_was_seen(misfit: Misfit) -> str:
+    if misfit.turn_deg is not None:
+        return f"channel {misfit.channel} stands {_turn(misfit.turn_deg)} the drive channel, expected 0"
     if misfit.by is Seen.NOT_TRUSTED:
         return f"channel {misfit.channel}: force over velocity at the drive point is like that at {misfit.at},"
     if misfit.at:
@@ -72,6 +111,8 @@ def _what_was_seen(misfit: Misfit) -> str:
 
 
 def _where_to_look(misfit: Misfit) -> str:
+    if misfit.turn_deg is not None:
+        return "look at what delays or advances one of the two sensors (conditioner, filter, skew_samples)"
     polarity = ", polarity" if misfit.seen < 0.0 else ""
     other = " and of the drive channel" if misfit.at else ""
     return f"look at sensor, cable{polarity} and sensitivity_v_per_unit of {misfit.channel}{other}"

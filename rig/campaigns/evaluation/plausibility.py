@@ -8,8 +8,14 @@ modes change it by some per cent. The deviation is expressed as a factor
 
 with an allowance ``a``, so that a channel near a node is not judged by the ratio of two small numbers. The allowance grows away
 from resonance, with 1 over the cosine of the phase or with the detuning, whichever grows less.
+
+The phase of ``q`` shows what the size does not: a drive sensor whose conditioner delays it turns all responses against it, and
+the loop then holds another phase than that of resonance. It is compared with that of the shape (0 or 180 degrees) or of earlier
+points. The turn beyond three standard errors, over the same growth away from resonance, is warned of from `WARNED_DEG` and
+refused from `REFUSED_DEG` on. A delay common to all motions cannot be seen in this way.
 """
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluation.channel_misfit import Misfit, Seen, misfit_sentence
+from rig.campaigns.evaluation.channel_misfit import Bounds, Misfit, Seen, misfit_sentence
 from rig.campaigns.evaluation.channel_ratios import (
     motions_of,
     ratios_of,
@@ -33,10 +39,14 @@ from rig.campaigns.evaluation.point import Point, Quality, vibration_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 
-__all__ = ["REFUSED", "WARNED", "with_plausibility", "with_plausible_ways"]
+__all__ = ["REFUSED", "WARNED", "start_refusal", "with_plausibility", "with_plausible_ways"]
 
 WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the square root of the level
 REFUSED = 4.0
+WARNED_DEG = 5.0  # shipped rigs stay below 0.4 degrees, with friction as well
+REFUSED_DEG = 45.0
+REVERSED_DEG = 135.0
+BOUNDS = Bounds(WARNED, REFUSED, WARNED_DEG, REFUSED_DEG)
 ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres out of place
 SURE = 3.0  # standard errors
 FASTEST = 2.0  # largest change of a damping that is attributed to the level
@@ -69,6 +79,14 @@ def with_plausible_ways(bench: Bench, point: Point[Any], pieces: Sequence[np.nda
     return _judged(bench, point, misfits)
 
 
+def start_refusal(bench: Bench, plan: Plan, point: Point[Any]) -> str:
+    """Return why the vibration at the start voltage does not fit the mode shapes; an empty string unless it is refused."""
+    misfits = _of_a_tone(bench, plan, point, ())
+    if not any(misfit.factor >= REFUSED for misfit in misfits):
+        return ""
+    return misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name, BOUNDS)
+
+
 def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point[Any]:
     if not misfits:
         return point
@@ -78,7 +96,7 @@ def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point
         return point
     names = {misfit.channel for misfit in misfits if misfit.factor >= WARNED}
     point = replace(point, misfit_channels=tuple(sorted(names)))
-    text = misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name, WARNED, REFUSED)
+    text = misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name, BOUNDS)
     if worst < REFUSED or not point.accepted:
         return point.warned(text)
     return point.refused(text, Quality.IMPLAUSIBLE)
@@ -118,7 +136,9 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
             if expected is not None and np.isfinite(expected[index]):
                 largest = float(np.nanmax(np.abs([expected[i] for i in motions_of(bench)])))
                 allowed = ALLOWANCE * times * largest + SURE * spread[index]
-                out.append(_misfit(channel.name, complex(ratios[index]), complex(expected[index]), allowed, by))
+                seen, wanted = complex(ratios[index]), complex(expected[index])
+                found = _misfit(channel.name, seen, wanted, allowed, by)
+                out += [found, *_turned(channel.name, seen, wanted, allowed, by, float(spread[index]), times)]
     return out
 
 
@@ -187,6 +207,24 @@ def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: See
     if turned and min(size, wanted) > 2.0 * allowed:
         return Misfit(name, -size, wanted, float(max(factor, REFUSED)), by)
     return Misfit(name, size, wanted, float(factor), by)
+
+
+def _turned(
+    name: str, seen: complex, wanted: complex, allowed: float, by: Seen, spread: float, times: float
+) -> list[Misfit]:
+    """Return the misfit in phase between a ratio and its expectation; an empty list if either of them is too small to tell.
+
+    The turn is expressed as a factor, so that both kinds of misfit are compared: `WARNED_DEG` is `WARNED`, `REFUSED_DEG` is
+    `REFUSED`.
+    """
+    if min(abs(seen), abs(wanted)) <= 2.0 * allowed:
+        return []
+    turn_deg = math.degrees(cmath.phase(seen / wanted))
+    if abs(turn_deg) > REVERSED_DEG:  # a matter of sign, which `_misfit` judges
+        return []
+    beyond = max(0.0, abs(turn_deg) - math.degrees(SURE * spread / abs(seen))) / times
+    factor = WARNED * (beyond / WARNED_DEG) ** (math.log(REFUSED / WARNED) / math.log(REFUSED_DEG / WARNED_DEG))
+    return [Misfit(name, abs(seen), abs(wanted), max(1.0, factor), by, turn_deg=turn_deg)]
 
 
 def _near_the_mode(bench: Bench, point: Point[Any]) -> bool:

@@ -1,5 +1,6 @@
 """Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from controller import LockState
+from rig.arming.checked_scale import CheckedScale
 from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
@@ -26,6 +28,8 @@ from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.campaigns.running.evaluation_thread import EvaluationThread
 from rig.campaigns.running.measured_before import MeasuredBefore, before_another
 from rig.campaigns.running.row_buffer import RowBuffer
+from rig.campaigns.running.start_judgement import PERIODS as START_PERIODS
+from rig.campaigns.running.start_judgement import StartJudgement
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
@@ -90,6 +94,7 @@ class Execution:
         before: MeasuredBefore | None = None,
         folder: Path | None = None,
         live: Live | None = None,
+        checked: CheckedScale | None = None,
     ) -> None:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
@@ -115,6 +120,9 @@ class Execution:
         self.kept = RowBuffer(loop.tick.row_dtype, folder)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, self._evaluated(), bench.sample_rate_hz)
         self.evaluations = EvaluationThread()
+        self.start = StartJudgement(bench, plan, checked)
+        kinds = loop.tick.arrays.segments["kind"]
+        self.start_segment = int(np.argmax(kinds == SegmentKind.START)) if (kinds == SegmentKind.START).any() else None
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -206,6 +214,7 @@ class Execution:
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the current point, and request the evaluation of points that are over."""
         self.kept.add(self.tick.sample - rows.size, rows)
+        self._judge_start()
         self._note_refused()
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
@@ -233,6 +242,29 @@ class Execution:
         while self.evaluations if self.loop.waits else self.evaluations.ready():
             for point in self.evaluations.take():
                 self._report(point)
+
+    def _judge_start(self) -> None:
+        """Request the judgement of the vibration at the start voltage once the loop has been locked there, or at its end."""
+        if self.start_segment is None:
+            return
+        entry = self.tick.outcomes[self.start_segment]
+        outcome = Outcome(int(entry["outcome"]))
+        if outcome not in (Outcome.RUNNING, Outcome.DONE):
+            return
+        end = int(entry["end_sample"]) if outcome is Outcome.DONE else self.tick.sample
+        first = end - self._start_samples()
+        if outcome is Outcome.DONE or (self.last["lock"] == LockState.LOCKED and first >= int(entry["first_sample"])):
+            self.start_segment = None
+            self.evaluations.ask(self._start_judged, self.kept.take(max(first, int(entry["first_sample"])), end))
+
+    def _start_samples(self) -> int:
+        return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
+
+    def _start_judged(self, rows: Rows) -> list[Point[Any]]:
+        """Ask for the ramp to 0 V if the vibration at the start voltage is refused; no point comes of it."""
+        if refusal := self.start.refusal_of_rows(rows):
+            self.loop.request_stop(f"before the first level: {refusal}")
+        return []
 
     def _note_refused(self) -> None:
         """Keep what the sequencer has refused and measures again."""
@@ -304,6 +336,8 @@ class Execution:
         index = self.next_segment
         if index >= outcomes.size:
             return self.tick.sample
+        if self.start_segment is not None:
+            return self.tick.sample - self._start_samples()
         running = int(outcomes[index]["outcome"]) == Outcome.RUNNING
         of_a_point = int(segments[index]["point"]) >= 0
         if self.in_one_go and of_a_point:
@@ -332,6 +366,9 @@ class Execution:
     def _report(self, point: Point[Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan does not alter."""
         point = with_plausibility(self.bench, self.plan, point, self.known)
+        point, refusal = self.start.applied(point)
+        if refusal:
+            self.loop.request_stop(refusal)
         if self.watch is not None:
             point, stop = self.watch(self.plan, self.known, point)
             if stop:

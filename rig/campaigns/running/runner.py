@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,8 @@ from typing import Any
 import vibrolock
 from rig.arming.arming import armed
 from rig.arming.bench_memory import RememberedTrip, now, remember
+from rig.arming.checked_scale import CheckedScale
+from rig.arming.known_scale import known_scale, unproven_phase
 from rig.arming.rehearsed import Rehearsed, rehearsal_facts
 from rig.arming.run_facts import calibration_remarks
 from rig.arming.run_options import Progress, RunOptions
@@ -19,6 +21,7 @@ from rig.bench.user_code import imported_code, refuse_code
 from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
+from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
 from rig.campaigns.running.execution import Execution, nothing_left
@@ -80,7 +83,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
                 _started(session, settings, output) as loop,
             ):
                 folder = output.absolute().parent
-                execution = Execution(plan, bench, loop, journal, options.progress, folder=folder, live=live)
+                execution = Execution(plan, bench, loop, journal, options.progress, None, folder, live, _checked(facts))
                 execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
         return _with_further_attempts(_whole(output, options.progress), execution, options, facts, live)
 
@@ -136,7 +139,7 @@ def take_up(
                 facts = _facts(plan, bench, session, options)
                 settings = tick_settings(plan, bench, segments)
                 _refuse_stopped(live)
-                begin = partial(_execution, plan, bench, progress, live, before)
+                begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
                 execution = _further_part(output, session, settings, begin, {**information, "about": facts})
             return _with_further_attempts(_whole(output, progress), execution, options, facts, live)
     if not finished:
@@ -204,7 +207,7 @@ def _with_further_attempts(
             about = {**facts, "device": session.identity}
             information = {"first_sample": first_sample, "seed": seed, "about": about}
             settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, before.done | before.given_up))
-            begin = partial(_execution, plan, bench, progress, live, before)
+            begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
             execution = _further_part(output, session, settings, begin, information)
         recording = _whole(output, progress)
     return recording
@@ -216,10 +219,11 @@ def _execution(
     progress: Progress,
     live: Live,
     before: MeasuredBefore,
+    scale: CheckedScale | None,
     loop: RunningLoop,
     journal: JournalWriter,
 ) -> Execution:
-    return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent, live)
+    return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent, live, scale)
 
 
 def _published(plan: Plan, bench: Bench, output: Path, options: RunOptions) -> AbstractContextManager[Live]:
@@ -257,17 +261,26 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
     """Arm the bench and collect the facts recorded for a part: who armed it, operator, specimen, device, code."""
     purpose = options.about.purpose
     rehearsed = {} if purpose else rehearsal_facts(plan, bench, options.rehearsal, options.override_rehearsal)
+    virtual = session.capabilities.virtual
+    scale, unproven = known_scale(bench, session.identity, options.checked, virtual=virtual)
+    missing = [unproven, unproven_phase(bench, virtual=virtual)] if isinstance(plan, LockedPlan) else []
     facts = {
         **options.about.facts(),
+        **({} if scale is None else {"checked": asdict(scale)}),
         **({"rehearsal": rehearsed} if rehearsed else {}),
         "armed": armed(bench, session, purpose or plan.kind, options.arm),
         "device": session.identity,
-        "remarks": calibration_remarks(bench, datetime.now(UTC).date()),
+        "remarks": [*calibration_remarks(bench, datetime.now(UTC).date()), *filter(None, missing)],
         "code": imported_code(bench),
     }
     for remark in facts["remarks"]:
         options.progress.remark(remark)
     return facts
+
+
+def _checked(facts: Mapping[str, Any]) -> CheckedScale | None:
+    """Return the scale with which a part compares its own, of what is recorded of the part."""
+    return CheckedScale(**facts["checked"]) if "checked" in facts else None
 
 
 def _lead(loop: RunningLoop) -> float:

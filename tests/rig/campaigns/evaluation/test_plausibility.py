@@ -115,3 +115,50 @@ def test_in_open_loop_less_is_said_of_a_dead_channel_the_further_from_the_mode(h
     found = judged(point(1.010938, 0.0, lag_deg=1.0 if hz < 24.3 else 179.0, hz=hz), plan=STEPPED)
     assert (found.misfit or 1.0) >= misfit
     assert hz < 30.0 or found.misfit is None
+
+
+def late(*turns_deg, level=1.0, std=0.0):
+    """A point whose responses stand this much ahead of the drive channel."""
+    shapes = (1.010938, 1.444326)
+    turned = [shape * np.exp(1j * math.radians(turn)) for shape, turn in zip(shapes, turns_deg, strict=True)]
+    return point(*turned, level=level, std=std)
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "accepted", "warned"),
+    [(0.0, True, False), (4.9, True, False), (7.0, True, True), (-7.0, True, True), (44.0, True, True)],
+)
+def test_a_drive_sensor_that_is_late_is_warned_of_from_5_deg(turn_deg, accepted, warned):
+    found = judged(late(turn_deg, turn_deg))
+    assert found.accepted is accepted
+    assert bool(found.warnings) is warned
+    assert all(": all others (" in line and "deg" in line for line in found.warnings)
+
+
+@pytest.mark.parametrize("turn_deg", [46.0, -46.0, 88.0, 134.0])
+def test_a_drive_sensor_that_is_late_is_refused_from_45_deg(turn_deg):
+    found = judged(late(turn_deg, turn_deg))
+    assert not found.accepted
+    assert f"{abs(turn_deg):.3g} deg {'ahead of' if turn_deg > 0 else 'behind'} it" in found.reason
+    assert "refused from 45 deg" in found.reason
+
+
+def test_a_single_response_that_is_late_is_named():
+    found = judged(late(0.0, 60.0))
+    assert not found.accepted
+    assert found.reason == (
+        "channel acc_magnet stands 60 deg ahead of the drive channel, expected 0 by the mode shapes, refused from 45 deg: "
+        "look at what delays or advances one of the two sensors (conditioner, filter, skew_samples)"
+    )
+
+
+def test_a_phase_that_changes_during_the_run_is_seen_without_mode_shapes():
+    before = [late(0.0, 0.0, level=level) for level in (0.5, 0.7)]
+    assert judged(late(10.0, 10.0), *before, known=(None, None)).warnings
+    assert not judged(late(60.0, 60.0), *before, known=(None, None)).accepted
+
+
+def test_three_standard_errors_of_the_phase_are_allowed():
+    std = math.radians(2.0) * 1.11  # of the smaller ratio
+    assert not judged(late(10.0, 0.0, std=std)).warnings
+    assert judged(late(12.0, 0.0, std=std)).warnings

@@ -1,0 +1,83 @@
+"""Judge the vibration at the start voltage, before a loop raises the output to the first level."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from identification import IdentificationError
+from rig.arming.checked_scale import CheckedScale
+from rig.bench import Bench
+from rig.campaigns.evaluation.plausibility import start_refusal
+from rig.campaigns.evaluation.point import Point, Quality, planned_point
+from rig.campaigns.evaluation.rows import Rows
+from rig.campaigns.evaluation.scale import scale_misfit
+from rig.campaigns.evaluation.vibration_quality import vibration_part
+from rig.campaigns.evaluation.vibrations import recorded_vibration
+from rig.campaigns.planning.locked import LockedPlan
+from rig.campaigns.planning.plan import Plan, Target
+
+__all__ = ["PERIODS", "StartJudgement"]
+
+PERIODS = 10
+"""Periods at the start voltage that are judged."""
+HARMONICS = 3
+
+
+class StartJudgement:
+    """Compares channels with each other by the mode shapes, and the scale of force and motion with the last check.
+
+    This is done once, under a lock: at the start voltage, or with the first point where the plan has none. What is refused ends
+    the run before the level rises; a scale that is merely warned of is a warning of every point. ``checked`` is None if no
+    check is known.
+    """
+
+    def __init__(self, bench: Bench, plan: Plan, checked: CheckedScale | None) -> None:
+        self._bench, self._plan, self._checked = bench, plan, checked
+        self._warning = ""
+        self._locked = isinstance(plan, LockedPlan)
+        self.pending = self._locked
+        """Whether nothing was judged yet."""
+
+    def refusal_of_rows(self, rows: Rows) -> str:
+        """Judge rows recorded at the start voltage under a lock; return why the run must end, or an empty string."""
+        try:
+            vibration = recorded_vibration(self._bench, rows, HARMONICS)
+            growth_1_s = self._growth_1_s(rows)
+        except (IdentificationError, ArithmeticError):
+            return ""  # a record that cannot be evaluated proves nothing; other checks end a run without a vibration
+        target = Target(number=0, level=1.0)
+        point = replace(planned_point(self._plan, target), vibration=vibration_part(vibration, rows))
+        self.pending = False
+        return start_refusal(self._bench, self._plan, point) or self._judged(point, growth_1_s, at_start=True)
+
+    def applied(self, point: Point[Any]) -> tuple[Point[Any], str]:
+        """Judge a point unless the start was judged, and add the warning; also return why the run must end."""
+        refusal = ""
+        if self.pending and point.accepted and point.spectrum is not None:
+            self.pending = False
+            refusal = self._judged(point)
+        if refusal:
+            return point.refused(refusal, Quality.IMPLAUSIBLE), refusal
+        return (point.warned(self._warning) if self._warning and point.accepted else point), ""
+
+    def _judged(self, point: Point[Any], growth_1_s: float = 0.0, *, at_start: bool = False) -> str:
+        """Compare with the check, if there is one; keep what is warned of, and return what is refused."""
+        if self._checked is None:
+            return ""
+        misfit = scale_misfit(self._bench, point, self._checked, growth_1_s, at_start=at_start)
+        if misfit is None or not misfit.warned:
+            return ""
+        self._warning = "" if misfit.refused else misfit.text
+        return misfit.text if misfit.refused else ""
+
+    def _growth_1_s(self, rows: Rows) -> float:
+        """Relative rate of growth of the drive point's fundamental from the first to the second half of the rows, 1/s."""
+        half = rows.size // 2
+        drive = self._bench.index_of("drive")
+        first, second = (
+            abs(recorded_vibration(self._bench, part, 1).harmonics[drive, 1]) for part in (rows[:half], rows[half:])
+        )
+        ratio = float(second / first)
+        return math.log(ratio) * self._bench.sample_rate_hz / half if np.isfinite(ratio) and ratio > 0.0 else 0.0
