@@ -80,6 +80,9 @@ class RunningLoop(Protocol):
         Returns at once; may be called at any time and from a signal handler.
         """
 
+    def release_start(self) -> None:
+        """Let the start segment of a tick with ``start_judged`` end at its time. Returns at once; any thread may call it."""
+
     def bring_down(self) -> None:
         """Ramp to 0 V if the loop still runs, and wait for its end; for a caller that takes no more rows."""
 
@@ -158,6 +161,10 @@ class Loop(DrivenLoop):
         """Request the ramp to 0 V; it begins with the next chunk."""
         self.cause = self.cause or cause
         self.tick.request_stop()
+
+    def release_start(self) -> None:
+        """Let the start segment end at its time."""
+        self.tick.release_start()
 
     @property
     def lateness_us(self) -> tuple[float, float, float, float]:

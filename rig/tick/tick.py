@@ -32,7 +32,7 @@ class Tick:
     latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
     the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. A record
     that is refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the output at
-    0 V.
+    0 V. With ``start_judged`` a start segment lasts until `release_start`, so that a caller can judge the vibration there.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """
@@ -50,6 +50,7 @@ class Tick:
         exciter: PlantModel | None = None,
         retries: int = 0,
         armed: bool = True,
+        start_judged: bool = False,
     ) -> None:
         shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
         try:
@@ -94,6 +95,7 @@ class Tick:
         progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
         progress["segments"] = len(segments)
         progress["retries"], progress["point"] = retries, -1
+        progress["held_back"] = int(start_judged)
         expected, following = expected_record(bench, smallest[force], smallest[drive], exciter), np.zeros(1, FOLLOWING)
         following["reference_v"] = expected["floor_v"]
         see_frequency(expected[0], following[0], omega)
@@ -151,6 +153,10 @@ class Tick:
         """Request a ramp to 0 V at frozen frequency, which ends the plan."""
         self.arrays.guard["stop_requested"] = 1
 
+    def release_start(self) -> None:
+        """Let the start segment end at its time."""
+        self.arrays.progress["held_back"] = 0
+
     def buffers(self, n: int) -> tuple[np.ndarray, np.ndarray]:
         """Return empty telemetry for n samples: readings float32[n, n_channels] and rows [n] of `ROW`."""
         return np.zeros((n, len(self.bench.channels)), np.float32), np.zeros(n, ROW)
@@ -177,6 +183,7 @@ class TickSettings:
     exciter: PlantModel | None = None
     retries: int = 0
     armed: bool = True
+    start_judged: bool = False
 
     def build(self, latency_samples: float) -> Tick:
         """Build the tick for a device of this latency; its outputs show one block later in addition."""
@@ -191,6 +198,7 @@ class TickSettings:
             exciter=self.exciter,
             retries=self.retries,
             armed=self.armed,
+            start_judged=self.start_judged,
         )
 
 

@@ -2,8 +2,8 @@
 
 Two ratios are compared: motion per newton and motion per volt, both at the drive point. At phase resonance of one mode the
 first is ``phi_d^2 / (2 zeta)``, the second ``1/(beta + alpha/Y)`` with the exciter ``u = alpha F + beta A``. If one part is at
-fault, the two together tell which: a force sensor changes the first, the amplifier the second, a drive sensor both. Damping that
-differs from that of the check looks like a force sensor that is off, so a factor of 1.5 is warned of in any case.
+fault, the two together tell which: a force sensor changes the first, the amplifier the second, a drive sensor both. Damping
+that differs from that of the check looks like a force sensor that is off, so a factor of 1.5 is warned of in any case.
 
 While the vibration still builds up at a rate sigma, the motion per newton is that of a damping ratio larger by
 ``sigma/omega``, and the motion per volt lies between that and the steady value. A factor that the check had, too, cannot be

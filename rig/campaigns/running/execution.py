@@ -244,26 +244,32 @@ class Execution:
                 self._report(point)
 
     def _judge_start(self) -> None:
-        """Request the judgement of the vibration at the start voltage once the loop has been locked there, or at its end."""
+        """Request the judgement of the vibration at the start voltage, once the loop has been locked there or its time is over.
+
+        The start lasts until it is judged.
+        """
         if self.start_segment is None:
             return
-        entry = self.tick.outcomes[self.start_segment]
-        outcome = Outcome(int(entry["outcome"]))
-        if outcome not in (Outcome.RUNNING, Outcome.DONE):
+        entry, progress = self.tick.outcomes[self.start_segment], self.tick.arrays.progress[0]
+        if Outcome(int(entry["outcome"])) is not Outcome.RUNNING:
             return
-        end = int(entry["end_sample"]) if outcome is Outcome.DONE else self.tick.sample
+        end, begin = self.tick.sample, int(entry["first_sample"])
         first = end - self._start_samples()
-        if outcome is Outcome.DONE or (self.last["lock"] == LockState.LOCKED and first >= int(entry["first_sample"])):
+        elapsed = float(progress["cycle"] - progress["start_cycle"])
+        over = elapsed >= float(self.tick.arrays.segments[self.start_segment]["periods"])
+        if over or (self.last["lock"] == LockState.LOCKED and first >= begin):
             self.start_segment = None
-            self.evaluations.ask(self._start_judged, self.kept.take(max(first, int(entry["first_sample"])), end))
+            self.evaluations.ask(self._start_judged, self.kept.take(max(first, begin), end))
 
     def _start_samples(self) -> int:
         return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
 
     def _start_judged(self, rows: Rows) -> list[Point[Any]]:
-        """Ask for the ramp to 0 V if the vibration at the start voltage is refused; no point comes of it."""
+        """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused; no point results."""
         if refusal := self.start.refusal_of_rows(rows):
             self.loop.request_stop(f"before the first level: {refusal}")
+        else:
+            self.loop.release_start()
         return []
 
     def _note_refused(self) -> None:

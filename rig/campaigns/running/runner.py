@@ -345,4 +345,5 @@ def tick_settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> Ti
         plan.waveforms(bench.sample_rate_hz),
         plan.known_plant,
         plan.retries,
+        start_judged=True,
     )

@@ -11,7 +11,7 @@ import numpy as np
 from rig.daq import DAQ
 from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
-from rig.loop.worker.memory import STOP, SharedMemory, Slot
+from rig.loop.worker.memory import RELEASE_START, STOP, SharedMemory, Slot
 from rig.loop.worker.pace import pace_of
 from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
@@ -105,6 +105,8 @@ class WallClockLoop(DrivenLoop):
         for first in range(0, self._memory.layout.chunk, block):
             if words[STOP]:
                 tick.request_stop()
+            if words[RELEASE_START]:
+                tick.release_start()
             if first in chores:
                 chores[first]()
                 if self.failure is not None:  # the ring may be full

@@ -22,7 +22,7 @@ __all__ = ["TIMES", "Layout", "SharedMemory", "Slot", "anonymous_file", "packed"
 
 CHUNK_S = 0.02
 ALIGNMENT = 64
-STOP, TAKEN, PUBLISHED = range(3)
+STOP, TAKEN, PUBLISHED, RELEASE_START = range(4)
 CONTROL_WORDS = 8
 TIMES = ("wake_up", "execution", "response")
 """Times counted for every block: delay of the block's start, duration, and the sum of both."""
@@ -178,3 +178,7 @@ class SharedMemory:
     def request_stop(self) -> None:
         """Request the ramp; the loop checks the request at every block."""
         self.words[STOP] = 1
+
+    def release_start(self) -> None:
+        """Let the start segment end; the loop looks for it at every block."""
+        self.words[RELEASE_START] = 1

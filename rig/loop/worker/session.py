@@ -78,6 +78,10 @@ class WorkerLoop:
         self.cause = self.cause or cause
         self._memory.request_stop()
 
+    def release_start(self) -> None:
+        """Let the start segment end at its time; the loop looks for it at every block."""
+        self._memory.release_start()
+
     def bring_down(self) -> None:
         """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
         self.request_stop()

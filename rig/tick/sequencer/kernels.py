@@ -312,6 +312,8 @@ def advance(
         verdict = start_verdict(settling, lock, elapsed)
         if verdict == DONE and lock.state == LOCKED and wants_harmonics(segment, settling, elapsed):
             return
+        if verdict == DONE and progress.held_back == 1:
+            return
         if verdict == DONE:
             close_segment(progress, outcomes, settling, DONE)
         elif verdict != RUNNING:

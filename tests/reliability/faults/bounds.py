@@ -39,18 +39,6 @@ BLIND = ("open", "reversed", "repeats", "dead", "held")
 RAISES_OUTPUT = ("x0.1", "clipped")
 """After which a loop has to ask for more, or for a part of the amplifier's range that is not there."""
 
-LEFT_TO_CHECK = {
-    **{
-        f"{role}-{kind}-start": "`rig check`, or a known plant"
-        for role in ("force", "drive")
-        for kind in ("x0.1", "x10")
-    },
-    **{f"response-{kind}-start": "`rig check`" for kind in ("x0.1", "x10", "reversed", "open")},
-    "amplifier-x10-start": "a known plant",
-    "amplifier-clipped-start": "a known plant",
-}
-"""Faults that are there before the first sample, and look like another rig: what tells them from it."""
-
 
 class Bound(NamedTuple):
     """What is asked of one case. ``trip_s``: time in which the run is to end, None where it may go on."""
@@ -70,8 +58,6 @@ def bound_for(case: Case, bench: Bench, healthy_output_v: float) -> Bound:
     """The bounds of a case."""
     fault, held = case.fault, held_role(case.levels)
     output_v = OUTPUT_RATIO * healthy_output_v + OUTPUT_EXTRA_V
-    if fault.name in LEFT_TO_CHECK:
-        return Bound(bench.limits.voltage_v if held else output_v, None, (), True)
     within_s = trip_s(fault, held, 1.0 / bench.specimen.linear_frequency_hz)
     if fault.onset == "start" and within_s is not None and not held:
         output_v = FIRST_LEVEL * plan_for(case.levels).levels[0]
@@ -138,7 +124,11 @@ def objections(case: Case, seen: Observation, bench: Bench) -> list[str]:
     if not seen.closed:
         out.append("the recording has no end")
     if seen.spoilt and not bound.may_spoil:
-        out.append(f"{seen.spoilt} spoilt points accepted, a fundamental {100.0 * seen.worst:.3g} % off")
+        worst = ", ".join(
+            f"{name} {100.0 * error:.3g} %"
+            for name, error in zip(("fundamental", "frequency", "damping"), seen.worst, strict=True)
+        )
+        out.append(f"{seen.spoilt} spoilt points accepted, off by: {worst}")
     return out
 
 

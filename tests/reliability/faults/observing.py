@@ -1,35 +1,52 @@
 """What a fault does to a test: the test is carried out with it, and what is told is compared with what was true."""
 
+import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
 
+from rig.arming.checked_scale import CheckedScale
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.campaigns.running.runner import carry_out
+from rig.check.run import check
 from rig.recording.conversion import finalise
 from rig.recording.journal import journal_path
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 from tests.reliability.faults.devices import EmulatedRig, HostKilledError, VirtualRigInProcess
-from tests.reliability.faults.plans import bench_for, plan_for
+from tests.reliability.faults.plans import BLOCK, LEVELS, bench_for, plan_for
 from tests.reliability.faults.plant import BrokenRig
 from tests.reliability.faults.table import Fault
+from tests.rig.rigs import bench_with
 
 __all__ = ["DEVICES", "Healthy", "Observation", "healthy", "observe"]
 
 DEVICES = {"virtual": VirtualRigInProcess, "emulated": EmulatedRig}
-SPOILT = 0.05  # of a channel's true fundamental
+SPOILT = (0.05, 0.001, 0.03)  # of a channel's true fundamental, of the modal frequency, of the damping
 SEED = 3
 NO_WORD = ("quantisation is not in the error bounds", "harmonics of the force bias", "the lag scatters")
 """Warnings that a sound test may have: they tell of little signal or of the structure, not of a fault."""
+
+
+class Errors(NamedTuple):
+    """Largest relative errors of a point: of a fundamental, of the modal frequency and of the damping."""
+
+    fundamental: float
+    frequency: float
+    damping: float
+
+    @property
+    def spoil(self) -> bool:
+        """Whether the point is spoilt."""
+        return any(error > bound for error, bound in zip(self, SPOILT, strict=True))
 
 
 @dataclass(frozen=True)
@@ -51,8 +68,7 @@ class Observation:
     """What one fault did to one test. Samples count from the fault, or from the first one where it was there before.
 
     ``samples_to_trip``: until the guard no longer lets the law's output through; ``samples_to_zero``: until the plant's last
-    voltage. None: not at all. ``spoilt``: accepted points without a word that no other run has, in which a channel's
-    fundamental is more than 5 % off its true one.
+    voltage. None: not at all. ``spoilt``: accepted points without a word that no other run has, with errors beyond `SPOILT`.
     """
 
     output_v: float
@@ -72,8 +88,8 @@ class Observation:
     accepted: int
     """Points accepted whose record ends after the fault began."""
     spoilt: int
-    worst: float
-    """Largest relative error of a fundamental in those accepted."""
+    worst: tuple[float, ...]
+    """Largest relative errors of fundamental, frequency and damping in those accepted."""
     raised: str
     """Exception that the user sees, if there is one."""
     closed: bool
@@ -96,10 +112,11 @@ def driver(make: Any, *given: Any) -> Iterator[list[Any]]:
 
 def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str, bool]:
     """The device, the part of the recording, what was raised, and whether the recording has an end."""
+    options = RunOptions(seed=SEED, checked=checked(LEVELS[levels]["bench"]))
     with tempfile.TemporaryDirectory() as folder, driver(DEVICES[device], *given) as made:
         output, raised = Path(folder) / "run.h5", ""
         try:
-            carry_out(plan_for(levels), bench_for(levels), output, RunOptions(seed=SEED)).close()
+            carry_out(plan_for(levels), bench_for(levels), output, options).close()
         except (Exception, HostKilledError) as error:
             raised = f"{type(error).__name__}: {error}"
         if device == "emulated":
@@ -110,6 +127,13 @@ def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str
         with Recording(output) as recording:
             kept = Kept(recording.parts[-1])
         return made[0], kept, raised, closed and kept.end is not None
+
+
+@cache
+def checked(bench: str) -> CheckedScale | None:
+    """The scale that a check of this bench has measured before the fault."""
+    with tempfile.TemporaryDirectory() as folder:
+        return check(bench_with({"block": BLOCK}, bench), Path(folder) / "check.h5").scale
 
 
 class Kept:
@@ -151,7 +175,7 @@ def observe(fault: Fault, levels: str, device: str) -> Observation:
     trip = left[0] - onset if left else (handed.size - onset if failed else None)
     driven = np.flatnonzero(sent[onset:])
     after = [point for point in kept.points if point["accepted"] and point["end_sample"] > onset]
-    errors = [error_of(point, kept, broken, bench_for(levels)) for point in after]
+    errors = [errors_of(point, kept, broken, bench_for(levels)) for point in after]
     news = [warnings_new(point, whole) for point in kept.points]
     silent = [error for point, error in zip(after, errors, strict=True) if not warnings_new(point, whole)]
     reasons = [point["reason"] for point in kept.points if not point["accepted"]]
@@ -181,8 +205,8 @@ def observe(fault: Fault, levels: str, device: str) -> Observation:
             )
         ),
         accepted=len(after),
-        spoilt=sum(error > SPOILT for error in silent),
-        worst=max(errors, default=0.0),
+        spoilt=sum(error.spoil for error in silent),
+        worst=tuple(max(values) for values in zip(*errors, strict=True)) if errors else (0.0, 0.0, 0.0),
         raised=raised,
         closed=closed,
         samples=sent.size,
@@ -196,8 +220,12 @@ def warnings_new(point: dict[str, Any], whole: Healthy) -> Sequence[str]:
     return [line for line in lines if tuple(line.split()[:4]) not in usual]
 
 
-def error_of(point: dict[str, Any], kept: Kept, broken: BrokenRig, bench: Bench) -> float:
-    """Largest relative error of a channel's fundamental in a point's record, all turned alike left out of account."""
+def errors_of(point: dict[str, Any], kept: Kept, broken: BrokenRig, bench: Bench) -> Errors:
+    """Errors of a point's record by its readings; the fundamentals all turned alike are left out of account.
+
+    One mode obeys ``omega_0^2 + 2 i zeta omega_0 omega = omega^2 + phi^2 F/x`` for the displacement x of the drive point, so
+    that the errors of frequency and damping follow from those of ``phi^2 F/x``.
+    """
     rows = slice(point["first_sample"], point["end_sample"])
     turn = np.exp(-1j * kept.theta[rows])
     told = kept.inputs[rows].astype(float)
@@ -205,4 +233,13 @@ def error_of(point: dict[str, Any], kept: Kept, broken: BrokenRig, bench: Bench)
     seen = np.isfinite(told).all(axis=1)
     first, wanted = (turn[seen] @ (signal[seen] - signal[seen].mean(axis=0)) for signal in (told, true))
     together = np.vdot(first / np.abs(wanted), wanted / np.abs(wanted))
-    return float((np.abs(first * together / abs(together) - wanted) / np.abs(wanted)).max())
+    fundamental = float((np.abs(first * together / abs(together) - wanted) / np.abs(wanted)).max())
+    omega = float(np.polyfit(np.arange(seen.size), kept.theta[rows], 1)[0]) * bench.sample_rate_hz
+    force, drive = bench.index_of("force"), bench.index_of("drive")
+    shape = bench.specimen.drive_mode_shape or math.nan
+    by_sensors, by_truth = (-(shape**2) * omega**2 * pair[force] / pair[drive] for pair in (first, wanted))
+    return Errors(
+        fundamental,
+        abs(float((by_sensors - by_truth).real)) / (2.0 * omega**2),
+        abs(float(by_sensors.imag / by_truth.imag - 1.0)),
+    )

@@ -19,6 +19,7 @@ __all__ = ["BrokenRig"]
 SOFTER = 0.8  # of the stiffness
 SOFTENING_PERIODS, SOFTENING_STEPS = 50.0, 20
 CLIPPED = 0.25  # of the largest voltage of the run without a fault
+LATE_S = {"2-ms-late": 2e-3, "5-ms-late": 5e-3, "10-ms-late": 10e-3}
 NEVER = 2**62
 
 
@@ -54,6 +55,7 @@ class BrokenRig:
             (i for i, c in enumerate(bench.channels) if fault is not None and c.role == fault.part), None
         )
         self._last_v = self._last_out_v = 0.0
+        self._past = np.empty(0)
         self.first = 0
         self._truth, self._run = np.empty((0, 0)), None
         self.sent: list[np.ndarray] = []
@@ -110,6 +112,8 @@ class BrokenRig:
         if self._index is None or self._fault is None:
             return
         n, volts = readings.shape[0], readings[:, self._index]
+        if self._fault.kind in LATE_S:
+            self._past = np.concatenate([self._past, volts])
         if not self._acts(self._fault.part, n):
             self._last_v = float(volts[-1])
             return
@@ -117,6 +121,15 @@ class BrokenRig:
         broken = at >= 0
         before = volts[~broken]
         self._last_v = float(before[-1]) if before.size else self._last_v
+        if self._fault.kind in LATE_S:
+            late = np.arange(n) + self._past.size - n - round(LATE_S[self._fault.kind] * self._bench.sample_rate_hz)
+            delayed = np.where(late >= 0, self._past[np.maximum(late, 0)], 0.0)
+            readings[broken, self._index] = delayed[broken]
+            return
+        if self._fault.kind == "swapped":
+            other = next(i for i, channel in enumerate(self._bench.channels) if channel.role == "response")
+            readings[np.ix_(broken, [self._index, other])] = readings[np.ix_(broken, [other, self._index])]
+            return
         if broken.any():
             spoil = SENSOR[self._fault.kind]
             readings[broken, self._index] = spoil(

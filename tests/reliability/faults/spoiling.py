@@ -12,6 +12,8 @@ RANGE_V = 5.0
 SPIKE_V, SPIKE_EVERY = 2.5, 971
 HUM_V, HUM_HZ = 0.05, 50.0
 DRIFT_V_S = 0.1
+FADING = 0.8  # of the sensitivity, a second
+DROPOUT_S, DROPOUT_EVERY_S = 2e-3, 0.4
 NUMBERS = np.random.default_rng(1).standard_normal(2**17)
 
 Spoil = Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]
@@ -31,6 +33,10 @@ def humming(volts: np.ndarray, at: np.ndarray, last: float, rate_hz: float) -> n
     return volts + HUM_V * np.sin(2.0 * math.pi * HUM_HZ * at / rate_hz)
 
 
+def dropping_out(volts: np.ndarray, at: np.ndarray, last: float, rate_hz: float) -> np.ndarray:
+    return np.where(at % round(DROPOUT_EVERY_S * rate_hz) < DROPOUT_S * rate_hz, 0.0, volts)
+
+
 def drifting(volts: np.ndarray, at: np.ndarray, last: float, rate_hz: float) -> np.ndarray:
     return np.minimum(volts + DRIFT_V_S * at / rate_hz, RANGE_V)
 
@@ -47,6 +53,10 @@ SENSOR: dict[str, Spoil] = {
     "x0.1": lambda volts, at, last, rate_hz: 0.1 * volts,
     "x10": lambda volts, at, last, rate_hz: np.clip(10.0 * volts, -RANGE_V, RANGE_V),
     "reversed": lambda volts, at, last, rate_hz: -volts,
+    "x0.5": lambda volts, at, last, rate_hz: 0.5 * volts,
+    "x2": lambda volts, at, last, rate_hz: np.clip(2.0 * volts, -RANGE_V, RANGE_V),
+    "fading": lambda volts, at, last, rate_hz: FADING ** (at / rate_hz) * volts,
+    "dropouts": dropping_out,
 }
 
 AMPLIFIER: dict[str, Spoil] = {

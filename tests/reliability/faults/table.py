@@ -42,6 +42,18 @@ SENSORS = {
     "x10": "ten times its sensitivity",
     "reversed": "polarity reversed",
 }
+IN_THE_LOOP = {
+    "x0.5": "half of its sensitivity",
+    "x2": "twice its sensitivity",
+    "fading": "its sensitivity fades by 20 % a second",
+    "dropouts": "nothing for 2 ms, every 0.4 s: a loose contact",
+}
+OF_THE_DRIVE = {
+    "2-ms-late": "2 ms late",
+    "5-ms-late": "5 ms late",
+    "10-ms-late": "10 ms late, as behind an integrating conditioner",
+    "swapped": "its cable and that of a response are swapped",
+}
 NOT_IN_COUNTS = {"nan": "reads NaN", "1e30": "reads 1e30 V"}
 AMPLIFIER = {
     "dead": "puts out nothing",
@@ -82,6 +94,8 @@ FAULTS: tuple[Fault, ...] = (
         Fault(role, kind, at, NOT_IN_COUNTS[kind], VIRTUAL)
         for role, kind, at in product(("force", "drive", "response"), NOT_IN_COUNTS, ("middle",))
     ),
+    *(Fault(role, kind, at, IN_THE_LOOP[kind]) for role, kind, at in product(("force", "drive"), IN_THE_LOOP, BOTH)),
+    *(Fault("drive", kind, at, OF_THE_DRIVE[kind]) for kind, at in product(OF_THE_DRIVE, BOTH)),
     *(Fault("amplifier", kind, at, AMPLIFIER[kind]) for kind, at in product(("dead", "x10", "clipped"), BOTH)),
     Fault("amplifier", "held", "middle", AMPLIFIER["held"]),
     *(Fault("structure", kind, at, STRUCTURE[kind]) for kind, at in (("softer", "start"), ("softer", "middle"))),
