@@ -4,19 +4,15 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-__all__ = ["Bounds", "Misfit", "Seen", "misfit_sentence"]
+__all__ = ["CHANGED", "REFUSED", "REFUSED_DEG", "WARNED", "WARNED_DEG", "Misfit", "Seen", "misfit_sentence"]
 
+WARNED = 2.0  # a nonlinear mode's shape changes by some per cent
+CHANGED = 1.5  # the same against what was measured before in the same run
+REFUSED = 4.0
+WARNED_DEG = 5.0  # shipped rigs stay below 0.4 degrees, with friction as well
+REFUSED_DEG = 45.0
 ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channels share one cause
 ALIKE_DEG = 15.0  # the same for turns: within this of their mean
-
-
-class Bounds(NamedTuple):
-    """From where on a misfit is warned of and refused, as a factor of sizes and as a turn in degrees."""
-
-    warned: float
-    refused: float
-    warned_deg: float
-    refused_deg: float
 
 
 class Seen(Enum):
@@ -45,6 +41,23 @@ class Misfit(NamedTuple):
     """Level of the single point used for the comparison; empty if several points were used."""
     turn_deg: float | None = None
     """Phase of the seen over the expected ratio, deg, if the misfit is one of phase; ``factor`` is then its equivalent."""
+    swapped_with: str = ""
+    """Name of the channel with which this one seems to be swapped."""
+
+    @property
+    def trusted(self) -> float:
+        """Factor from which the point is warned of."""
+        return WARNED if self.by is Seen.SHAPES or self.turn_deg is not None else CHANGED
+
+    @property
+    def warned(self) -> bool:
+        """Whether the point is warned of, or refused."""
+        return self.factor >= self.trusted
+
+    @property
+    def refused(self) -> bool:
+        """Whether the point is refused."""
+        return self.factor >= REFUSED
 
     @property
     def times(self) -> float:
@@ -52,12 +65,18 @@ class Misfit(NamedTuple):
         return self.seen / self.expected
 
 
-def misfit_sentence(misfits: Sequence[Misfit], drive: str, bounds: Bounds) -> str:
+def misfit_sentence(misfits: Sequence[Misfit], drive: str) -> str:
     """Describe the worst misfit in one sentence. If all channels are off alike, name channel ``drive`` instead."""
-    worst = max(misfits, key=lambda misfit: misfit.factor)
-    bound = _bound_of(worst, bounds)
+    worst = max(misfits, key=lambda misfit: (misfit.warned, misfit.factor, bool(misfit.swapped_with)))
+    if worst.swapped_with:
+        return (
+            f"channel {worst.channel} and channel {worst.swapped_with} seem swapped, for the sizes fit the mode shapes with "
+            "these two exchanged: look at both cables"
+        )
+    bound = _bound_of(worst)
     alike = [one for one in misfits if one.by is worst.by and (one.turn_deg is None) is (worst.turn_deg is None)]
-    off = [misfit for misfit in alike if misfit.factor >= bounds.warned]
+    alike = [one for one in alike if not one.swapped_with]
+    off = [misfit for misfit in alike if misfit.warned]
     if len({misfit.channel for misfit in off}) > 1 and len(off) == len(alike) and _share_one_cause(off):
         names = ", ".join(misfit.channel for misfit in off)
         if worst.turn_deg is not None:
@@ -72,12 +91,11 @@ def misfit_sentence(misfits: Sequence[Misfit], drive: str, bounds: Bounds) -> st
     return f"{_what_was_seen(worst)} {worst.by.value}, {bound}: {_where_to_look(worst)}"
 
 
-def _bound_of(worst: Misfit, bounds: Bounds) -> str:
+def _bound_of(worst: Misfit) -> str:
     """Return the bound that the misfit is beyond, in words."""
-    refused = worst.factor >= bounds.refused
     if worst.turn_deg is not None:
-        return f"refused from {bounds.refused_deg:g} deg" if refused else f"trusted up to {bounds.warned_deg:g} deg"
-    return f"refused from a factor {bounds.refused:g}" if refused else f"trusted up to a factor {bounds.warned:g}"
+        return f"refused from {REFUSED_DEG:g} deg" if worst.refused else f"trusted up to {WARNED_DEG:g} deg"
+    return f"refused from a factor {REFUSED:g}" if worst.refused else f"trusted up to a factor {worst.trusted:g}"
 
 
 def _share_one_cause(off: Sequence[Misfit]) -> bool:

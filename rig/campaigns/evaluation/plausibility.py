@@ -19,12 +19,22 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from rig.bench import Bench
-from rig.campaigns.evaluation.channel_misfit import Bounds, Misfit, Seen, misfit_sentence
+from rig.campaigns.evaluation.channel_misfit import (
+    CHANGED,
+    REFUSED,
+    REFUSED_DEG,
+    WARNED,
+    WARNED_DEG,
+    Misfit,
+    Seen,
+    misfit_sentence,
+)
 from rig.campaigns.evaluation.channel_ratios import (
     motions_of,
     ratios_of,
@@ -41,12 +51,9 @@ from rig.campaigns.planning.plan import Plan
 
 __all__ = ["REFUSED", "WARNED", "start_refusal", "with_plausibility", "with_plausible_ways"]
 
-WARNED = 2.0  # a nonlinear mode's shape changes by some per cent, its damping with the square root of the level
-REFUSED = 4.0
-WARNED_DEG = 5.0  # shipped rigs stay below 0.4 degrees, with friction as well
-REFUSED_DEG = 45.0
 REVERSED_DEG = 135.0
-BOUNDS = Bounds(WARNED, REFUSED, WARNED_DEG, REFUSED_DEG)
+SWAPPED = 0.1  # deviation of sizes, as a logarithm, from which it is asked whether two channels are swapped
+SWAPPED_FITS = 0.3  # of that deviation; two channels are called swapped if exchanging them leaves less
 ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres out of place
 SURE = 3.0  # standard errors
 FASTEST = 2.0  # largest change of a damping that is attributed to the level
@@ -82,9 +89,9 @@ def with_plausible_ways(bench: Bench, point: Point[Any], pieces: Sequence[np.nda
 def start_refusal(bench: Bench, plan: Plan, point: Point[Any]) -> str:
     """Return why the vibration at the start voltage does not fit the mode shapes; an empty string unless it is refused."""
     misfits = _of_a_tone(bench, plan, point, ())
-    if not any(misfit.factor >= REFUSED for misfit in misfits):
+    if not any(misfit.refused for misfit in misfits):
         return ""
-    return misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name, BOUNDS)
+    return misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name)
 
 
 def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point[Any]:
@@ -92,12 +99,12 @@ def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point
         return point
     worst = max(misfit.factor for misfit in misfits)
     point = replace(point, misfit=max(worst, _misfit_of(point)))
-    if worst < WARNED:
+    if not any(misfit.warned for misfit in misfits):
         return point
-    names = {misfit.channel for misfit in misfits if misfit.factor >= WARNED}
+    names = {misfit.channel for misfit in misfits if misfit.warned}
     point = replace(point, misfit_channels=tuple(sorted(names)))
-    text = misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name, BOUNDS)
-    if worst < REFUSED or not point.accepted:
+    text = misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name)
+    if not any(misfit.refused for misfit in misfits) or not point.accepted:
         return point.warned(text)
     return point.refused(text, Quality.IMPLAUSIBLE)
 
@@ -109,7 +116,7 @@ def _misfit_of(point: Point[Any]) -> float:
 
 def misfits_of(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
     """Return the misfit of each channel from its expectation; an empty list if nothing is known to compare with."""
-    usual = [one for one in before if one.accepted and _misfit_of(one) < WARNED]
+    usual = [one for one in before if one.accepted and not one.misfit_channels]
     if point.spectrum is not None:
         tones = [one for one in usual if one.spectrum is not None]
         force = _of_the_force(bench, point, tones, before) if isinstance(plan, LockedPlan) else []
@@ -139,7 +146,7 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
                 seen, wanted = complex(ratios[index]), complex(expected[index])
                 found = _misfit(channel.name, seen, wanted, allowed, by)
                 out += [found, *_turned(channel.name, seen, wanted, allowed, by, float(spread[index]), times)]
-    return out
+    return out + (_swapped(bench, np.abs(ratios), np.abs(shapes)) if locked and shapes is not None else [])
 
 
 def _of_the_force(
@@ -166,7 +173,7 @@ def _of_the_force(
     if misfitting is not None and _apart(point, misfitting) < _apart(point, nearest):
         times, factor = _against(bench, point, misfitting)
         theirs = _misfit_of(misfitting)
-        if factor < WARNED <= theirs and found.factor < theirs:
+        if factor < CHANGED <= theirs and found.factor < theirs:
             return [Misfit(force, times, 1.0, theirs, Seen.NOT_TRUSTED, _level_of(misfitting))]
     return [found]
 
@@ -225,6 +232,30 @@ def _turned(
     beyond = max(0.0, abs(turn_deg) - math.degrees(SURE * spread / abs(seen))) / times
     factor = WARNED * (beyond / WARNED_DEG) ** (math.log(REFUSED / WARNED) / math.log(REFUSED_DEG / WARNED_DEG))
     return [Misfit(name, abs(seen), abs(wanted), max(1.0, factor), by, turn_deg=turn_deg)]
+
+
+def _swapped(bench: Bench, sizes: np.ndarray, shapes: np.ndarray) -> list[Misfit]:
+    """Return a misfit that is warned of if the sizes fit the shapes much better with the cables of two channels exchanged."""
+    volts = np.abs([channel.sensitivity_v_per_unit for channel in bench.channels])
+    known = [
+        i for i in motions_of(bench) if sizes[i] > 0.0 and shapes[i] > ALLOWANCE * np.nanmax(shapes[motions_of(bench)])
+    ]
+
+    def deviation(one: int, other: int) -> float:
+        exchanged = sizes.copy()
+        exchanged[one], exchanged[other] = (sizes[b] * volts[b] / volts[a] for a, b in ((one, other), (other, one)))
+        off = np.log(exchanged[known] / shapes[known])
+        return float(np.max(np.abs(off - off[known.index(bench.index_of("drive"))]), initial=0.0))
+
+    if bench.index_of("drive") not in known:
+        return []
+    pairs = {(a, b): deviation(a, b) for a, b in combinations(known, 2)}
+    one, other = min(pairs, key=lambda pair: pairs[pair], default=(0, 0))
+    as_it_is = deviation(one, one)
+    if one == other or as_it_is < SWAPPED or pairs[one, other] > SWAPPED_FITS * as_it_is:
+        return []
+    names = [bench.channels[index].name for index in (one, other)]
+    return [Misfit(names[0], float(sizes[one]), float(shapes[one]), WARNED, Seen.SHAPES, swapped_with=names[1])]
 
 
 def _near_the_mode(bench: Bench, point: Point[Any]) -> bool:

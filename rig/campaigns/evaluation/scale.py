@@ -84,13 +84,16 @@ def _sentence(bench: Bench, per_newton: float, per_volt: float, bound: str, chec
     x, y = math.log(per_newton), math.log(per_volt)
     left = {"force": abs(y), "amplifier": abs(x), "drive": abs(x - y)}  # of both ratios, once this cause is taken out
     cause = min(left, key=lambda one: left[one])
-    look = {
-        "force": f"look at sensor, cable and sensitivity_v_per_unit of {names['force']}, or the damping has changed",
-        "drive": f"look at sensor, cable and sensitivity_v_per_unit of {names['drive']}",
-        "amplifier": "look at the gain of the amplifier",
+    at, look = {
+        "force": (
+            f"channel {names['force']}",
+            "look at its sensor, cable and sensitivity_v_per_unit, or the damping has changed",
+        ),
+        "drive": (f"channel {names['drive']}", "look at its sensor, cable and sensitivity_v_per_unit"),
+        "amplifier": ("amplifier", "look at its gain"),
     }[cause]
     when = f" of {checked.at[:16]}" if checked.at else ""
     return (
-        f"channel {names['drive']} moves {per_newton:.3g} times as far per newton and {per_volt:.3g} times as far per volt as "
-        f"in the last check{when}, {bound}: {look}; `rig check` again if the rig was changed"
+        f"{at}: the drive point moves {per_newton:.3g} times as far per newton and {per_volt:.3g} times as far per volt as in "
+        f"the last check{when}, {bound}: {look}; `rig check` again if the rig was changed"
     )

@@ -265,7 +265,7 @@ class Execution:
         return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
 
     def _start_judged(self, rows: Rows) -> list[Point[Any]]:
-        """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused; no point results."""
+        """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused."""
         if refusal := self.start.refusal_of_rows(rows):
             self.loop.request_stop(f"before the first level: {refusal}")
         else:

@@ -36,9 +36,8 @@ class StartJudgement:
     def __init__(self, bench: Bench, plan: Plan, checked: CheckedScale | None) -> None:
         self._bench, self._plan, self._checked = bench, plan, checked
         self._warning = ""
-        self._locked = isinstance(plan, LockedPlan)
-        self.pending = self._locked
-        """Whether nothing was judged yet."""
+        self.pending = isinstance(plan, LockedPlan)
+        """Whether the scale was not compared yet."""
 
     def refusal_of_rows(self, rows: Rows) -> str:
         """Judge rows recorded at the start voltage under a lock; return why the run must end, or an empty string."""
@@ -49,14 +48,12 @@ class StartJudgement:
             return ""  # a record that cannot be evaluated proves nothing; other checks end a run without a vibration
         target = Target(number=0, level=1.0)
         point = replace(planned_point(self._plan, target), vibration=vibration_part(vibration, rows))
-        self.pending = False
         return start_refusal(self._bench, self._plan, point) or self._judged(point, growth_1_s, at_start=True)
 
     def applied(self, point: Point[Any]) -> tuple[Point[Any], str]:
         """Judge a point unless the start was judged, and add the warning; also return why the run must end."""
         refusal = ""
         if self.pending and point.accepted and point.spectrum is not None:
-            self.pending = False
             refusal = self._judged(point)
         if refusal:
             return point.refused(refusal, Quality.IMPLAUSIBLE), refusal
@@ -67,6 +64,7 @@ class StartJudgement:
         if self._checked is None:
             return ""
         misfit = scale_misfit(self._bench, point, self._checked, growth_1_s, at_start=at_start)
+        self.pending = misfit is None
         if misfit is None or not misfit.warned:
             return ""
         self._warning = "" if misfit.refused else misfit.text

@@ -182,10 +182,9 @@ PROGRESS = np.dtype(
 )
 """Position of the run in the plan (one record). ``cycle``: oscillator periods at the inputs so far, with the fraction;
 ``unreached``: the output is at its limit and the present level is not reached; ``frozen_cycles``: periods for which a ramp
-waited because its level was not reached; ``waited_cycles``: those for which it waited for the phase; ``unlocked``: no lock
-was ever gained. ``kept_level``: the last held level with a lock; ``held_back``: the start segment does not end before the campaign has judged
-it; ``returning``: the level goes back there because the lock was
-lost.
+waited because its level was not reached; ``waited_cycles``: those for which it waited for the phase; ``unlocked``: no lock was
+ever gained. ``kept_level``: the last held level with a lock; ``held_back``: the start segment does not end before the campaign
+has judged it; ``returning``: the level goes back there because the lock was lost.
 
 ``retries``: how often a record is measured again at most; ``point``, ``tries_left``: how often the record of the present point
 still may be. ``held``, ``lost``: samples of the present segment with a held output, and lost ones; ``disturbed``: whether this

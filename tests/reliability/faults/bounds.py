@@ -80,7 +80,7 @@ def trip_s(fault: Fault, held: str, period_s: float) -> float | None:
     if fault.kind in BLIND and in_the_loop:
         return period_s * (HELD_PERIODS if held and fault.onset == "middle" else VOLTAGE_PERIODS)
     if fault.kind in RAISES_OUTPUT and held and fault.part in (held, "amplifier"):
-        return period_s * HELD_PERIODS
+        return period_s * (HELD_PERIODS if fault.onset == "middle" else VOLTAGE_PERIODS)
     return None
 
 

@@ -45,8 +45,8 @@ def judged(one, *before, plan=BACKBONE, known=(1.010938, 1.444326)):
 def test_a_shape_that_has_changed_as_nonlinear_modes_do_is_good_at_any_lag(beside, tip, lag_deg):
     found = judged(point(1.010938 * beside, 1.444326 * tip, lag_deg=lag_deg))
     assert found.accepted
-    assert not found.warnings
-    assert found.misfit < WARNED
+    assert all("seem swapped" in line for line in found.warnings)  # a few such shapes are those of exchanged cables
+    assert found.misfit < WARNED or found.warnings
 
 
 @pytest.mark.parametrize(
@@ -162,3 +162,16 @@ def test_three_standard_errors_of_the_phase_are_allowed():
     std = math.radians(2.0) * 1.11  # of the smaller ratio
     assert not judged(late(10.0, 0.0, std=std)).warnings
     assert judged(late(12.0, 0.0, std=std)).warnings
+
+
+def test_two_cables_that_are_exchanged_are_warned_of():
+    right = (1.0, 1.010938 / DRIVE_SHAPE, 1.444326 / DRIVE_SHAPE)
+    drive, beside, tip = right[1], right[0], right[2]  # what the inputs read: the first two are exchanged
+    exchanged = judged(point(beside * DRIVE_SHAPE, tip * DRIVE_SHAPE, drive=drive))
+    assert exchanged.accepted
+    assert any("seem swapped" in line and "acc_drive" in line for line in exchanged.warnings)
+
+
+@given(st.floats(0.93, 1.07), st.floats(0.93, 1.07))
+def test_shapes_that_differ_a_little_are_not_called_swapped(beside, tip):
+    assert not judged(point(1.010938 * beside, 1.444326 * tip)).warnings
