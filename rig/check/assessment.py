@@ -1,6 +1,7 @@
 """Derive the findings of a check from its recording, with or without an earlier check as reference."""
 
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Literal
 
@@ -28,7 +29,7 @@ from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 from vibrolock.results import Result
 
-__all__ = ["Assessment", "assess", "responses_in"]
+__all__ = ["Assessment", "assess", "checked_scale", "responses_in"]
 
 SKIPPED = 0.1  # part of the silence that is left out at its beginning because of the transient of the filters
 CUT_SHORT = "the multisine was not played to its end"
@@ -98,6 +99,22 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
     level = plan.levels_rms_v[-1] if found is not None else None
     findings += _clipping(recording, bench, level)
     return Assessment(bench, recording.path, recording.started, level, tuple(findings), found, mode, old)
+
+
+def checked_scale(path: Path, bench: Bench) -> CheckedScale:
+    """Return the scale of force and motion from the recording of a check of this bench.
+
+    Raises `RecordingError` if it is not the recording of a check, is of other channels, or does not tell the scale.
+    """
+    with Recording(path) as recording:
+        found = assess(recording)
+    for one, other in zip_longest(found.bench.channels, bench.channels):
+        if one != other:
+            name = (one or other).name if one or other else ""
+            raise RecordingError(f"{path}: is a check of other channels than those of the bench {bench.name} ({name})")
+    if found.scale is None:
+        raise RecordingError(f"{path}: the check does not tell the scale of force and motion: no mode was found in it")
+    return found.scale
 
 
 def _limits(bench: Bench) -> list[Finding]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["resume", "run"]
 
 Rehearsed = Annotated[Path | None, typer.Option(help="Rehearsal of the plan on this bench, for arming and the record.")]
+Check = Annotated[Path | None, typer.Option(help="Check of this bench to compare with, in place of the last one.")]
 Override = Annotated[
     str, typer.Option("--override-rehearsal", metavar="WHY", help="Run although the bench asks for another rehearsal.")
 ]
@@ -29,6 +30,7 @@ def run(
     output: Output,
     bench: Annotated[str | None, typer.Option(help="Bench to use instead of the plan's: a name or TOML file.")] = None,
     daq: Annotated[str | None, typer.Option(help="Driver to use instead of the bench's.")] = None,
+    check: Check = None,
     rehearsal: Rehearsed = None,
     override_rehearsal: Override = "",
     options: "RunOptions",
@@ -43,6 +45,10 @@ def run(
     chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
+    if check is not None:
+        from rig.check.assessment import checked_scale
+
+        options = replace(options, checked=checked_scale(check, chosen))
     options = _with_rehearsal(options, rehearsal, override_rehearsal)
     _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
 

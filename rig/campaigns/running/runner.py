@@ -10,7 +10,7 @@ from typing import Any
 
 import vibrolock
 from rig.arming.arming import armed
-from rig.arming.bench_memory import RememberedTrip, now, remember
+from rig.arming.bench_memory import RememberedTrip, memory_of, now, remember
 from rig.arming.checked_scale import CheckedScale
 from rig.arming.known_scale import known_scale, unproven_phase
 from rig.arming.rehearsed import Rehearsed, rehearsal_facts
@@ -127,7 +127,7 @@ def take_up(
         before = MeasuredBefore(left.done, left.numbers, points)
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
-        options = _still_rehearsed(recording, options)
+        options = _still_checked(recording, left.bench, _still_rehearsed(recording, options))
     plan, bench = left.plan, left.bench
     if segments := plan.segments(bench.sample_rate_hz, left.done):
         if not trust_code:
@@ -156,6 +156,13 @@ def _still_rehearsed(recording: Recording, options: RunOptions) -> RunOptions:
         return options
     known = {one.name: before[one.name] for one in fields(Rehearsed) if one.name in before}
     return replace(options, rehearsal=Rehearsed(**known))
+
+
+def _still_checked(recording: Recording, bench: Bench, options: RunOptions) -> RunOptions:
+    """Return the options with the check of the last part, if neither they nor the memory of the bench have one."""
+    if options.checked is not None or not recording.parts or memory_of(bench).check is not None:
+        return options
+    return replace(options, checked=_checked(recording.parts[-1].information.get("about", {})))
 
 
 def _further_part(

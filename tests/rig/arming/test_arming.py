@@ -2,7 +2,7 @@
 
 import io
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -172,6 +172,50 @@ def test_a_check_needs_arming_and_is_remembered_with_what_failed(tmp_path, monke
     assert memory.check.failed == ("polarity acc_magnet",)
     assert memory.check.recording == str(tmp_path / "check.h5")
     assert memory.check.fingerprint == fingerprint(bench(), DEVICE)
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_run_is_compared_with_the_scale_of_the_last_check_and_says_once_where_there_is_none(tmp_path):
+    def about(name):
+        with rig.run(PLAN, bench=bench(), output=tmp_path / name, arm=True) as run:
+            return run.recording.parts[-1].information["about"]
+
+    never = about("never.h5")
+    assert "checked" not in never
+    assert (
+        sum("the scale of force and motion is unproven: the bench was never checked" in r for r in never["remarks"])
+        == 1
+    )
+    found = check(bench(), tmp_path / "check.h5", RunOptions(arm=True))
+    checked = about("checked.h5")
+    assert checked["checked"] == asdict(found.scale)
+    assert not any("unproven" in remark for remark in checked["remarks"])
+    remember(bench(), check=passed(bench()))  # as an earlier version kept it
+    earlier = about("earlier.h5")
+    assert any("the last check kept no numbers of it" in remark for remark in earlier["remarks"])
+    remember(bench(), check=replace(passed(bench()), fingerprint="of another device", scale=found.scale))
+    assert any("the last check was of other channels" in remark for remark in about("other.h5")["remarks"])
+
+
+def test_a_memory_of_an_earlier_version_has_no_scale(state):
+    remember(bench(), check=passed(bench()))
+    path = memory_path(bench())
+    table = json.loads(path.read_text())
+    del table["check"]["scale"]
+    path.write_text(json.dumps(table))
+    assert memory_of(bench()).check.scale is None
+    assert memory_of(bench()).trip is None
+
+
+@pytest.mark.usefixtures("physical")
+def test_a_bench_without_another_shape_says_that_the_phase_of_the_drive_sensor_is_unproven(tmp_path):
+    channels = [channel.model_dump() for channel in bench().channels]
+    for channel in channels:
+        channel["mode_shape"] = None
+    alone = bench_with({"name": "beam next door", "block": 50, "channels": channels})
+    with rig.run(PLAN, bench=alone, output=tmp_path / "run.h5", arm=True) as run:
+        remarks = run.recording.parts[-1].information["about"]["remarks"]
+    assert sum("the phase of drive is unproven" in remark for remark in remarks) == 1
 
 
 @pytest.mark.usefixtures("physical")

@@ -1,0 +1,97 @@
+"""What is wrong from the first sample on ends a run at the start voltage, before the level rises."""
+
+import numpy as np
+import pytest
+
+from rig.arming.run_options import RunOptions
+from rig.campaigns.running.runner import carry_out
+from rig.check.run import check
+from tests.reliability.faults.plans import bench_for, plan_for
+from tests.rig.check.rewired import Rewiring, column, rewire, scaled
+from tests.rig.rigs import bench_with
+
+
+def late(name: str, samples: int) -> Rewiring:
+    """A sensor whose signal comes late."""
+    past: list[np.ndarray] = []
+
+    def rewiring(volts, bench):
+        index = column(bench, name)
+        past.append(volts[:, index].copy())
+        told = np.concatenate([np.zeros(samples), *past])[-volts.shape[0] - samples :][: volts.shape[0]]
+        volts[:, index] = told
+        del past[: -2 - samples // volts.shape[0]]
+
+    return rewiring
+
+
+@pytest.fixture(scope="module")
+def scale(tmp_path_factory):
+    """What a check of the sound bench has measured."""
+    return check(bench_for("m"), tmp_path_factory.mktemp("check") / "check.h5").scale
+
+
+def run(tmp_path, levels, **options):
+    recording = carry_out(plan_for(levels), bench_for(levels), tmp_path / "run.h5", RunOptions(seed=3, **options))
+    with recording:
+        return recording.parts[-1].end, np.abs(recording.parts[-1].rows("output_v")).max(), len(list(recording.points))
+
+
+@pytest.mark.parametrize("levels", ["N logarithmic", "N linear", "m"])
+def test_a_drive_sensor_10_ms_late_ends_the_run_at_the_start_voltage(tmp_path, monkeypatch, levels):
+    rewire(monkeypatch, late("drive", 50))
+    end, largest_v, points = run(tmp_path, levels)
+    assert end["text"].startswith("before the first level: channel drive: all others")
+    assert "refused from 45 deg" in end["text"]
+    assert largest_v < 1.05 * plan_for(levels).start_v
+    assert points == 0
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "levels"),
+    [("drive", 0.1, "m"), ("force", 0.1, "N linear"), ("force", 10.0, "N linear"), ("force", 0.1, "N logarithmic")],
+)
+def test_a_sensor_of_another_scale_than_in_the_check_ends_the_run_at_the_start_voltage(
+    tmp_path, monkeypatch, scale, channel, factor, levels
+):
+    rewire(monkeypatch, scaled(channel, factor))
+    end, largest_v, points = run(tmp_path, levels, checked=scale)
+    assert f"channel {channel}: " in end["text"]
+    assert largest_v < 1.05 * plan_for(levels).start_v
+    assert points == 0
+
+
+def test_half_of_the_scale_is_a_warning_of_every_point(tmp_path, monkeypatch, scale):
+    rewire(monkeypatch, scaled("force", 2.0))
+    with carry_out(plan_for("m"), bench_for("m"), tmp_path / "run.h5", RunOptions(seed=3, checked=scale)) as recording:
+        points = list(recording.points)
+    assert len(points) == 3
+    assert all(any("channel force: " in line for line in point["warnings"]) for point in points)
+
+
+def test_levels_in_volts_are_judged_with_the_first_point_and_go_no_further(tmp_path, monkeypatch, scale):
+    rewire(monkeypatch, scaled("force", 10.0))
+    end, _, points = run(tmp_path, "V", checked=scale)
+    assert "channel force: " in end["text"]
+    assert points < 3
+
+
+def test_a_sound_rig_goes_on_as_if_nothing_had_been_judged(tmp_path, scale):
+    with_check, without = (run(tmp_path / name, "m", **options) for name, options in _both(tmp_path, scale))
+    assert with_check[0]["reason"] == without[0]["reason"] == "completed"
+    assert with_check[0]["loop"]["samples"] == without[0]["loop"]["samples"]
+    assert with_check[1:] == without[1:]
+
+
+def _both(tmp_path, scale):
+    for name, options in (("with", {"checked": scale}), ("without", {})):
+        (tmp_path / name).mkdir()
+        yield name, options
+
+
+def test_the_command_takes_the_recording_of_a_check(tmp_path, command):
+    path = tmp_path / "check.h5"
+    check(bench_with({}, "magnet-beam"), path, RunOptions(seed=3))
+    command("run", "magnet-beam/backbone-short", "-o", tmp_path / "run.h5", "--check", path).succeeded()
+    ended = command("run", "friction-beam/backbone-short", "-o", tmp_path / "other.h5", "--check", path)
+    assert "is a check of other channels than those of the bench" in ended.err
