@@ -5,11 +5,9 @@ from dataclasses import replace
 import pytest
 
 from tests.docs.pages import ROOT
-from tests.reliability.faults.bounds import LEFT_TO_CHECK
 from tests.reliability.faults.matrix import CASES
 from tests.reliability.faults.observing import observe
 from tests.reliability.faults.page import BEGIN, END, TABLES, rows_of, written
-from tests.reliability.faults.table import FAULTS
 
 PAGE = ROOT / "docs" / "reference" / "fault-matrix.md"
 
@@ -19,13 +17,6 @@ def test_the_page_has_a_row_for_every_fault_of_the_matrix_and_no_other(heading):
     device, columns = TABLES[heading]
     wanted = {case.fault.name for case in CASES if case.device == device and case.levels in columns}
     assert rows_of(PAGE.read_text(encoding="utf-8"), heading) == wanted
-
-
-def test_what_is_left_to_the_check_is_a_fault_of_the_table_and_on_the_page():
-    text = PAGE.read_text(encoding="utf-8")
-    listed = {line.split("`")[1]: line.split(": ", 1)[1] for line in text.splitlines() if line.startswith("- `")}
-    assert listed == LEFT_TO_CHECK
-    assert set(listed) <= {fault.name for fault in FAULTS}
 
 
 def test_a_cell_says_what_was_seen_and_marks_what_keeps_no_bound():

@@ -56,6 +56,20 @@ def is_there(pid):
         return False
 
 
+def test_the_start_is_released_across_the_processes():
+    bench, held = slow_bench("virtual", block=4), []
+
+    def each(loop, chunks):
+        held.append(int(loop.tick.arrays.progress["held_back"][0]))
+        if chunks == 3:
+            loop.release_start()
+
+    with WorkerSession(bench, 3) as session:
+        ran(session, replace(tone(bench, 1.0), start_judged=True), each)
+    assert held[:3] == [1, 1, 1]
+    assert held[-1] == 0
+
+
 def test_rows_and_state_are_those_of_a_loop_in_this_process_bit_for_bit():
     bench = slow_bench("virtual", block=4)
     with make_daq(bench, 3) as daq:

@@ -279,6 +279,17 @@ def test_a_start_and_a_hold_go_on_until_the_harmonics_are_controlled_but_not_for
     assert walk.go(2).codes()[0] == "DONE"
 
 
+def test_a_start_that_is_judged_lasts_until_it_is_released_and_no_shorter():
+    walk = Walk(Segment(SegmentKind.START, -1, 1.0, 10.0), *_point(0, 2.0))
+    walk.progress["held_back"] = 1
+    assert walk.go(500).codes()[0] == "RUNNING"
+    assert max(walk.levels) == 1.0
+    walk.progress["held_back"] = 0
+    assert walk.go(0.1).codes()[0] == "DONE"
+    early = Walk(Segment(SegmentKind.START, -1, 1.0, 10.0), *_point(0, 2.0)).go(9)
+    assert early.codes()[0] == "RUNNING"
+
+
 def test_the_outcome_of_a_segment_tells_the_error_of_the_harmonics_and_those_left_alone():
     walk = Walk(Segment(SegmentKind.HOLD, -1, 1.0, 10.0), *_point(0, 2.0))
     walk.settling["distortion"], walk.settling["left_alone"] = 0.25, 1 << 5
