@@ -5,9 +5,10 @@ first is ``phi_d^2 / (2 zeta)``, the second ``1/(beta + alpha/Y)`` with the exci
 fault, the two together tell which: a force sensor changes the first, the amplifier the second, a drive sensor both. Damping
 that differs from that of the check looks like a force sensor that is off, so a factor of 1.5 is warned of in any case.
 
-While the vibration still builds up at a rate sigma, the motion per newton is that of a damping ratio larger by
-``sigma/omega``, and the motion per volt lies between that and the steady value. A factor that the check had, too, cannot be
-seen.
+The force's power goes into damping and growth: ``phi_d^2 |F/A| sin(lag)/2 = zeta + sigma/omega`` at a rate of growth sigma. This
+is the imaginary part of ``2 i omega a' + (omega_0^2 - omega^2 + 2 i zeta omega_0 omega) a = phi_d F`` for a slowly varying
+amplitude a. The motion per volt of a vibration that builds up lies between what it is and what it becomes. Neither is judged
+while the vibration changes quickly. A factor that the check had too cannot be seen.
 """
 
 import cmath
@@ -23,6 +24,7 @@ __all__ = ["REFUSED", "WARNED", "ScaleMisfit", "scale_misfit"]
 WARNED = 1.5
 REFUSED = 3.0
 MORE_DAMPING = 2.0  # growth of the damping from a check to a first level that is not refused
+STEADY = 0.5  # rate of growth over that of a decay by the damping of the check
 OF_RESONANCE = 0.5  # sine of the lag below which the mode alone does not determine the motion per newton
 
 
@@ -50,7 +52,7 @@ class ScaleMisfit(NamedTuple):
 def scale_misfit(
     bench: Bench, point: Point[Any], checked: CheckedScale, growth_1_s: float = 0.0, *, at_start: bool = False
 ) -> ScaleMisfit | None:
-    """Compare a vibration near resonance with a check; None if it is too far from resonance, or empty.
+    """Compare a vibration near resonance with a check; None if it is too far from resonance, not steady, or empty.
 
     ``growth_1_s``: relative rate at which the amplitude still grows. ``at_start``: whether the vibration is as small as that at
     the start voltage. At a first level the damping may be larger than in the check.
@@ -59,14 +61,17 @@ def scale_misfit(
     force, motion = (complex(fundamentals[bench.index_of(role)]) for role in ("force", "drive"))
     if not (abs(force) > 0.0 and abs(motion) > 0.0 and vibration.voltage_v > 0.0):
         return None
-    sine = abs(math.sin(cmath.phase(motion / force)))
-    if sine < OF_RESONANCE:
-        return None
     omega = 2.0 * math.pi * vibration.frequency_hz
-    building_up = 1.0 + max(0.0, growth_1_s) / omega / checked.damping_ratio
-    per_newton = abs(motion / force) / sine * building_up / checked.acceleration_per_newton
+    power = math.sin(cmath.phase(-force / motion))  # of the displacement's lag; 1 at phase resonance
+    growth = growth_1_s / omega / checked.damping_ratio
+    if power < OF_RESONANCE or abs(growth) > STEADY:
+        return None
+    damping = abs(force / motion) * power * checked.acceleration_per_newton - growth  # over that of the check
+    if damping <= 0.0:
+        return None
+    per_newton = 1.0 / damping
     steady = abs(motion) / vibration.voltage_v / checked.acceleration_per_volt
-    per_volt = min(max(1.0, steady), steady * building_up)  # the nearest to 1 of what it may become
+    per_volt = min(max(1.0, steady), steady * (1.0 + max(0.0, growth)))  # the nearest to 1 of what it may become
     factor = max(_factor(per_newton), _factor(per_volt))
     damped = not at_start and per_newton < 1.0 and _factor(per_volt) < WARNED
     allowed = REFUSED * (MORE_DAMPING if damped else 1.0)

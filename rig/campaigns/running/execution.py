@@ -123,6 +123,7 @@ class Execution:
         self.start = StartJudgement(bench, plan, checked)
         kinds = loop.tick.arrays.segments["kind"]
         self.start_segment = int(np.argmax(kinds == SegmentKind.START)) if (kinds == SegmentKind.START).any() else None
+        self.start_judged = 0  # sample up to which the start was judged
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -244,32 +245,37 @@ class Execution:
                 self._report(point)
 
     def _judge_start(self) -> None:
-        """Request the judgement of the vibration at the start voltage, once the loop has been locked there or its time is over.
+        """Request the judgement of the vibration at the start voltage, once the loop is locked there or its time is over.
 
-        The start lasts until it is judged.
+        The start lasts until it is judged, and a little longer while the vibration is not steady.
         """
         if self.start_segment is None:
             return
         entry, progress = self.tick.outcomes[self.start_segment], self.tick.arrays.progress[0]
         if Outcome(int(entry["outcome"])) is not Outcome.RUNNING:
             return
-        end, begin = self.tick.sample, int(entry["first_sample"])
+        end, begin = self.tick.sample, max(int(entry["first_sample"]), self.start_judged)
         first = end - self._start_samples()
-        elapsed = float(progress["cycle"] - progress["start_cycle"])
-        over = elapsed >= float(self.tick.arrays.segments[self.start_segment]["periods"])
-        if over or (self.last["lock"] == LockState.LOCKED and first >= begin):
-            self.start_segment = None
-            self.evaluations.ask(self._start_judged, self.kept.take(max(first, begin), end))
+        late = float(
+            progress["cycle"] - progress["start_cycle"] - self.tick.arrays.segments[self.start_segment]["periods"]
+        )
+        last = late >= self.start.longest_periods
+        if last or ((late >= 0.0 or self.last["lock"] == LockState.LOCKED) and first >= begin):
+            self.start_judged = end
+            self.evaluations.ask(self._judged_start, self.kept.take(max(first, begin), end), last)
 
     def _start_samples(self) -> int:
         return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
 
-    def _start_judged(self, rows: Rows) -> list[Point[Any]]:
+    def _judged_start(self, rows: Rows, last: bool) -> list[Point[Any]]:
         """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused."""
         if refusal := self.start.refusal_of_rows(rows):
             self.loop.request_stop(f"before the first level: {refusal}")
-        else:
+        elif last or not self.start.pending:
             self.loop.release_start()
+        else:
+            return []
+        self.start_segment = None
         return []
 
     def _note_refused(self) -> None:

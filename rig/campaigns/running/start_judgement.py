@@ -23,6 +23,7 @@ __all__ = ["PERIODS", "StartJudgement"]
 PERIODS = 10
 """Periods at the start voltage that are judged."""
 HARMONICS = 3
+LONGEST = 300.0
 
 
 class StartJudgement:
@@ -39,8 +40,16 @@ class StartJudgement:
         self.pending = isinstance(plan, LockedPlan)
         """Whether the scale was not compared yet."""
 
+    @property
+    def longest_periods(self) -> float:
+        """Periods for which the start may last longer until the scale can be compared: three time constants of the mode."""
+        return 0.0 if self._checked is None else min(LONGEST, 3.0 / (2.0 * math.pi * self._checked.damping_ratio))
+
     def refusal_of_rows(self, rows: Rows) -> str:
-        """Judge rows recorded at the start voltage under a lock; return why the run must end, or an empty string."""
+        """Judge rows recorded at the start voltage; return why the run must end, or an empty string.
+
+        If `pending` is still true afterwards, the vibration was not steady enough to compare its scale.
+        """
         try:
             vibration = recorded_vibration(self._bench, rows, HARMONICS)
             growth_1_s = self._growth_1_s(rows)
@@ -62,6 +71,7 @@ class StartJudgement:
     def _judged(self, point: Point[Any], growth_1_s: float = 0.0, *, at_start: bool = False) -> str:
         """Compare with the check, if there is one; keep what is warned of, and return what is refused."""
         if self._checked is None:
+            self.pending = False
             return ""
         misfit = scale_misfit(self._bench, point, self._checked, growth_1_s, at_start=at_start)
         self.pending = misfit is None

@@ -54,6 +54,7 @@ class BrokenRig:
         self._index = next(
             (i for i, c in enumerate(bench.channels) if fault is not None and c.role == fault.part), None
         )
+        self.swapped_with = next(i for i, channel in enumerate(bench.channels) if channel.role == "response")
         self._last_v = self._last_out_v = 0.0
         self._past = np.empty(0)
         self.first = 0
@@ -127,8 +128,8 @@ class BrokenRig:
             readings[broken, self._index] = delayed[broken]
             return
         if self._fault.kind == "swapped":
-            other = next(i for i, channel in enumerate(self._bench.channels) if channel.role == "response")
-            readings[np.ix_(broken, [self._index, other])] = readings[np.ix_(broken, [other, self._index])]
+            pair = [self._index, self.swapped_with]
+            readings[np.ix_(broken, pair)] = readings[np.ix_(broken, pair[::-1])]
             return
         if broken.any():
             spoil = SENSOR[self._fault.kind]

@@ -40,7 +40,8 @@ def test_a_fault_acts_from_its_sample_on_and_not_before(fault, whole):
     assert first <= changed[0] <= first + 40
     others = [index for index, channel in enumerate(BENCH.channels) if channel.role != fault.part]
     if len(others) < len(BENCH.channels):
-        others = [index for index in range(len(BENCH.channels)) if index != daq.broken._index]
+        touched = {daq.broken._index} | ({daq.broken.swapped_with} if fault.kind == "swapped" else set())
+        others = [index for index in range(len(BENCH.channels)) if index not in touched]
         np.testing.assert_array_equal(seen[:, others], whole[:, others])
         np.testing.assert_array_equal(np.concatenate(daq.broken.true), whole)
 

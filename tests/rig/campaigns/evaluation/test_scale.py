@@ -25,8 +25,8 @@ def point(force=1.0, drive=1.0, amplifier=1.0, damping=1.0, lag_deg=90.0):
     """A vibration at 1 V read by a force and a drive sensor of other sensitivities, behind an amplifier of another gain."""
     motion = 15.0 * amplifier
     harmonics = np.zeros((4, 3), complex)
-    turn = np.exp(1j * math.radians(lag_deg))
-    harmonics[:2, 1] = force * damping * motion / 100.0 * turn / math.sin(math.radians(lag_deg)), drive * motion
+    turn = np.exp(-1j * math.radians(lag_deg))
+    harmonics[:2, 1] = force * damping * motion / 100.0 * turn / abs(math.sin(math.radians(lag_deg))), drive * motion
     return made_point(vibration=made_vibration(harmonics, HZ))
 
 
@@ -69,12 +69,14 @@ def test_another_lag_near_resonance_is_no_misfit(lag_deg):
     assert scale_misfit(BENCH, point(lag_deg=lag_deg), CHECKED).factor == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("empty", [{"lag_deg": 10.0}, {"force": 0.0}, {"drive": 0.0}])
+@pytest.mark.parametrize("empty", [{"lag_deg": 10.0}, {"lag_deg": -90.0}, {"force": 0.0}, {"drive": 0.0}])
 def test_far_from_resonance_and_without_a_vibration_nothing_is_compared(empty):
     assert scale_misfit(BENCH, point(**empty), CHECKED) is None
 
 
 def test_a_vibration_that_builds_up_is_compared_with_what_it_becomes():
-    growth = 3.0 * DAMPING * 2.0 * math.pi * HZ  # a quarter of the final amplitude per newton
-    still = point(damping=4.0)
-    assert scale_misfit(BENCH, still, CHECKED, growth, at_start=True).factor == pytest.approx(1.0)
+    rate = DAMPING * 2.0 * math.pi * HZ
+    growing, decaying = point(damping=1.4), point(damping=0.6)  # of force per motion, in which the growth is
+    assert scale_misfit(BENCH, growing, CHECKED, 0.4 * rate, at_start=True).factor == pytest.approx(1.0)
+    assert scale_misfit(BENCH, decaying, CHECKED, -0.4 * rate, at_start=True).factor == pytest.approx(1.0)
+    assert scale_misfit(BENCH, point(damping=4.0), CHECKED, 3.0 * rate, at_start=True) is None
