@@ -27,7 +27,7 @@ def plan_text(
     bench_name: str,
     bench: Bench,
     plant: PlantModel,
-    ratios: tuple[Mapping[str, float], Mapping[str, float]],
+    ratios: tuple[Mapping[str, float], ...],
     chosen: Chosen,
     levels: LevelChoice,
     window: Window,
@@ -36,7 +36,7 @@ def plan_text(
 ) -> str:
     """Return a backbone plan as TOML.
 
-    ``ratios`` are the measured ratios of response channels to the drive point, and their standard errors.
+    ``ratios`` are the measured ratios of response channels to the drive point, their standard errors, and turns.
     """
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     volts = chosen.law == "phase"
@@ -103,9 +103,9 @@ def plan_text(
     facts += ["[plant]", *(_line(key, value) for key, value in plant.to_dict().items())]
     if ratios[0]:
         facts.append("# Motion of the response channels for that of the drive point, and standard errors.")
-        for key, values in zip(("response_ratios", "response_ratio_stds"), ratios, strict=True):
+        for key, values in zip(("response_ratios", "response_ratio_stds", "response_turns_deg"), ratios, strict=True):
             listed = ", ".join(f"{name} = {significant(value)}" for name, value in values.items())
-            facts.append(f"{key} = {{ {listed} }}")
+            facts += [f"{key} = {{ {listed} }}"] if values else []
     return (
         "\n".join([*_summary(plant, chosen), *head, *controller, *(settle if math.isfinite(settling) else []), *facts])
         + "\n"

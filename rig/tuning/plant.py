@@ -1,5 +1,6 @@
 """Fit the plant to the spectra of the linear test, and compare it with the bench's facts."""
 
+import cmath
 import math
 from collections.abc import Sequence
 from contextlib import suppress
@@ -24,6 +25,7 @@ __all__ = [
     "mass_ratios",
     "measured_ratio_stds",
     "measured_ratios",
+    "measured_turns_deg",
     "near",
     "plant_of",
     "voltage_responses",
@@ -82,6 +84,7 @@ def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
 
 
 ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
+WORTH_SAYING_DEG = 1.0
 WORTH_SAYING_HZ = 0.005
 WORTH_SAYING_SHAPE = 0.05
 TOLD = 3.0  # standard errors above which the motion of a channel counts as measured
@@ -166,6 +169,22 @@ def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> di
         if ratio > TOLD * error:
             out[channel.name] = ratio
     return out
+
+
+def measured_turns_deg(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
+    """Return by how much each response channel stands ahead of the phase of a real mode shape, deg in (-90, 90], by name.
+
+    Only turns of a degree and more are returned: smaller ones are within what other modes and noise do.
+    """
+    around = _within_bandwidth(responses, plant)
+    drive = responses.value[around, 1, 0]
+    rows = {channel.name: row for row, channel in enumerate(responses.outputs)}
+    turns = {
+        name: math.degrees(cmath.phase(complex(np.vdot(drive, responses.value[around, rows[name], 0]))))
+        for name in measured_ratios(responses, plant)
+    }
+    real = {name: -((90.0 - turn) % 180.0 - 90.0) for name, turn in turns.items()}
+    return {name: turn for name, turn in real.items() if abs(turn) >= WORTH_SAYING_DEG}
 
 
 def measured_ratio_stds(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:

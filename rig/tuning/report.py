@@ -50,6 +50,7 @@ def summary(tuning: Tuning) -> dict[str, Any]:
             "fit_error": plant.fit_error,
             "response_ratios": dict(tuning.response_ratios),
             "response_ratio_stds": dict(tuning.response_ratio_stds),
+            "response_turns_deg": dict(tuning.response_turns_deg),
         },
         "law": chosen.law,
         "low_pass_rad_s": chosen.low_pass_rad_s,

@@ -1,6 +1,7 @@
 """Tune a rig: from a bench alone to gains, margins, levels and a plan."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import get_args
@@ -28,13 +29,14 @@ from rig.tuning.levels import (
 )
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
-from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_ratios, plant_of
+from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_ratios, measured_turns_deg, plant_of
 from rig.tuning.shifts import frequency_window
 from vibrolock.results import Result
 
 __all__ = ["Tuning", "TuningRequest", "tune"]
 
 PURPOSE = "tuning"
+TURNED_DEG = 5.0  # of a response, from which it is worth a note
 NONLINEAR = 0.005  # distortion relative to the linear response of the force
 
 
@@ -98,6 +100,8 @@ class Tuning(Result):
     """Measured displacement of each response channel per displacement of the drive point at resonance, by name."""
     response_ratio_stds: dict[str, float]
     """Standard errors of these ratios, by name."""
+    response_turns_deg: dict[str, float]
+    """Measured turns of the response channels off the phases of a real mode shape, deg, by name; those of a degree and more."""
     chosen: Chosen
     """The chosen gains."""
     levels: LevelChoice
@@ -149,6 +153,8 @@ def tune(
     plant = plant_of(bench, test.responses, test.lead_samples)
     notes = compared_with_bench(bench, plant)
     measured, ratio_stds = measured_ratios(test.responses, plant), measured_ratio_stds(test.responses, plant)
+    turns_deg = measured_turns_deg(test.responses, plant)
+    notes += _turned(turns_deg)
     ratios = bench.response_ratios | measured
     highest_m = PART * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
     lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
@@ -181,12 +187,21 @@ def tune(
         plant=plant,
         response_ratios=measured,
         response_ratio_stds=ratio_stds,
+        response_turns_deg=turns_deg,
         chosen=chosen,
         levels=levels,
         harmonics=harmonics,
         notes=notes,
         plan_toml=plan_text(
-            named or name, bench, plant, (measured, ratio_stds), chosen, levels, window, harmonics, Path(recording)
+            named or name,
+            bench,
+            plant,
+            (measured, ratio_stds, turns_deg),
+            chosen,
+            levels,
+            window,
+            harmonics,
+            Path(recording),
         ),
     )
 
@@ -200,6 +215,16 @@ def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> tuple[str
     if "output" in lowest.bound:
         text += f"; the highest has an output of {bits:.0f} bits, less gain behind the converter leaves room for lower levels"
     return (text,)
+
+
+def _turned(turns_deg: Mapping[str, float]) -> tuple[str, ...]:
+    """Return a note on each response whose phase is not that of a real mode shape."""
+    return tuple(
+        f"channel {name} stands {abs(turn):.3g} deg {'ahead of' if turn > 0.0 else 'behind'} a real mode shape: a joint that "
+        "damps, or a sensor that is late; the plan takes this as known (plant.response_turns_deg)"
+        for name, turn in turns_deg.items()
+        if abs(turn) >= TURNED_DEG
+    )
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:

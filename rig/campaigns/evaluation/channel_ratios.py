@@ -40,9 +40,10 @@ def spread_of(bench: Bench, point: Point[Any], drive: int) -> np.ndarray | None:
 
 
 def shapes_of(bench: Bench, plan: Plan) -> np.ndarray | None:
-    """Mode shapes over that of the drive point; NaN for channels without a mode shape. None if the drive point has none.
+    """Mode shapes over that of the drive point, complex[n_channels]: NaN for channels without one, None if that has none.
 
-    The signs are those of the bench; the sizes are those that the plan's ``[plant]`` has as measured, else the bench's.
+    The signs are those of the bench; sizes and turns are those that the plan's ``[plant]`` has as measured, else the bench's
+    sizes and none.
     """
     at_drive = bench.specimen.drive_mode_shape
     if at_drive is None:
@@ -53,7 +54,9 @@ def shapes_of(bench: Bench, plan: Plan) -> np.ndarray | None:
     plant = plan.plant if isinstance(plan, KnownPlant) else None
     measured: dict[str, float] = {} if plant is None else plant.response_ratios
     sizes = [measured.get(channel.name, size) for channel, size in zip(bench.channels, np.abs(ratios), strict=True)]
-    return np.asarray(np.copysign(sizes, ratios))
+    turns: dict[str, float] = {} if plant is None else plant.response_turns_deg
+    turned = np.exp(1j * np.radians([turns.get(channel.name, 0.0) for channel in bench.channels]))
+    return np.asarray(np.copysign(sizes, ratios) * turned)
 
 
 def motions_of(bench: Bench) -> list[int]:

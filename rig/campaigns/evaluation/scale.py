@@ -5,8 +5,8 @@ first is ``phi_d^2 / (2 zeta)``, the second ``1/(beta + alpha/Y)`` with the exci
 fault, the two together tell which: a force sensor changes the first, the amplifier the second, a drive sensor both. Damping
 that differs from that of the check looks like a force sensor that is off, so a factor of 1.5 is warned of in any case.
 
-The force's power goes into damping and growth: ``phi_d^2 |F/A| sin(lag)/2 = zeta + sigma/omega`` at a rate of growth sigma. This
-is the imaginary part of ``2 i omega a' + (omega_0^2 - omega^2 + 2 i zeta omega_0 omega) a = phi_d F`` for a slowly varying
+The force's power goes into damping and growth: ``phi_d^2 |F/A| sin(lag)/2 = zeta + sigma/omega`` at a rate of growth sigma.
+This is the imaginary part of ``2 i omega a' + (omega_0^2 - omega^2 + 2 i zeta omega_0 omega) a = phi_d F`` for a slowly varying
 amplitude a. The motion per volt of a vibration that builds up lies between what it is and what it becomes. Neither is judged
 while the vibration changes quickly. A factor that the check had too cannot be seen.
 """

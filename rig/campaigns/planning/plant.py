@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
@@ -67,13 +67,17 @@ class PlantFacts(Configured):
     bench's mode shapes when levels and channels are checked."""
     response_ratio_stds: dict[str, NonNegativeFloat] = Field(default_factory=dict)
     """Standard errors of the ratios, by channel name; a missing one is unknown."""
+    response_turns_deg: dict[str, Annotated[float, Field(gt=-90, le=90)]] = Field(default_factory=dict)
+    """By how much each response channel stands ahead of the phase of a real mode shape, 0 or 180 degrees against the drive
+    point, at resonance, deg; a missing one is 0. Joints that damp make such turns."""
 
     @model_validator(mode="after")
     def _ratios_for_their_errors(self) -> Self:
-        for name in self.response_ratio_stds:
-            if name not in self.response_ratios:
-                known = ", ".join(self.response_ratios) or "it has none"
-                raise ValueError(f"response_ratio_stds.{name}: allowed is a channel of response_ratios: {known}")
+        for key in ("response_ratio_stds", "response_turns_deg"):
+            for name in getattr(self, key):
+                if name not in self.response_ratios:
+                    known = ", ".join(self.response_ratios) or "it has none"
+                    raise ValueError(f"{key}.{name}: allowed is a channel of response_ratios: {known}")
         return self
 
     @property
@@ -90,7 +94,7 @@ class PlantFacts(Configured):
     @property
     def model(self) -> PlantModel:
         """The plant model."""
-        return PlantModel(**self.model_dump(exclude={"response_ratios", "response_ratio_stds"}))
+        return PlantModel(**self.model_dump(exclude={"response_ratios", "response_ratio_stds", "response_turns_deg"}))
 
 
 class KnownPlant(Levels):

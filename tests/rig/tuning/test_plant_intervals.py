@@ -1,13 +1,14 @@
 """Intervals of mode and channels as `rig tune` fits them, from responses of virtual rigs whose modes are given."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from identification import Channel, FrequencyResponseMatrix
 from rig.drivers import make_daq
-from rig.tuning.plant import measured_ratio_stds, measured_ratios, plant_of
+from rig.tuning.plant import measured_ratio_stds, measured_ratios, measured_turns_deg, plant_of
 from simulators.analysis import frequency_response
 from tests.rig.rigs import bench_with
 
@@ -71,3 +72,12 @@ def test_the_intervals_hold_the_truth_with_a_neighbouring_mode_far_away_and_near
 def test_a_mode_that_the_model_lacks_is_seen_by_the_narrower_fits():
     far, near = (errors(neighbour, [0], noise=1e-4)[0] for neighbour in (6.0, 2.0))
     assert near[1][2] > 5.0 * far[1][2]
+
+
+@pytest.mark.parametrize(("turn_deg", "told"), [(0.0, None), (7.0, 7.0), (-12.0, -12.0), (187.0, 7.0), (0.4, None)])
+def test_a_response_that_stands_off_a_real_mode_shape_is_measured(turn_deg, told):
+    bench = bench_of(6.0)
+    matrix = responses(bench, 1e-4, np.random.default_rng(1))
+    turned = matrix.value * np.exp(1j * np.radians([0.0, 0.0, turn_deg]))[None, :, None]
+    found = measured_turns_deg(replace(matrix, value=turned), plant_of(bench, matrix, 0.0))
+    assert found == ({} if told is None else {"acc_magnet": pytest.approx(told, abs=0.1)})

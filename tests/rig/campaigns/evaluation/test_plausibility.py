@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.campaigns.evaluation.plausibility import REFUSED, WARNED, with_plausibility
+from rig.campaigns.planning.plant import PlantFacts
 from rig.campaigns.plans import load_plan
+from tests.controller.tuning.rigs import plant_of
 from tests.rig.campaigns.made_points import made_point, made_vibration
 from tests.rig.rigs import bench_with
 
@@ -141,6 +143,14 @@ def test_a_drive_sensor_that_is_late_is_refused_from_45_deg(turn_deg):
     assert not found.accepted
     assert f"{abs(turn_deg):.3g} deg {'ahead of' if turn_deg > 0 else 'behind'} it" in found.reason
     assert "refused from 45 deg" in found.reason
+
+
+def test_a_turn_that_the_modal_test_has_measured_is_expected():
+    plant = {**plant_of("magnet-beam").to_dict(), "response_ratios": {"acc_drive": 1.1, "acc_magnet": 1.6}}
+    plan = BACKBONE.model_copy(update={"plant": PlantFacts(**plant, response_turns_deg={"acc_magnet": 30.0})})
+    assert not judged(late(0.0, 30.0), plan=plan).warnings
+    assert judged(late(0.0, 0.0), plan=plan).warnings
+    assert judged(late(0.0, 30.0)).warnings
 
 
 def test_a_single_response_that_is_late_is_named():
