@@ -139,11 +139,10 @@ class Loop(DrivenLoop):
             pass
 
     def _chunks(self) -> Iterator[np.ndarray]:
-        chunk = self._chunk_samples()
         self._load_kernels()
         began = time.perf_counter()
         while not self.over:
-            readings, rows = self.tick.buffers(chunk)
+            readings, rows = self.tick.buffers(self._chunk_samples())
             start = time.perf_counter()
             done = self._advance(readings, rows)
             self.statistics.busy_s += time.perf_counter() - start
@@ -196,9 +195,17 @@ class Loop(DrivenLoop):
         return self.failure is not None or self.tick.over
 
     def _chunk_samples(self) -> int:
+        """Return the size of the next chunk: up to the end of the present 0.5 s, or 0.02 s if a clock paces the loop.
+
+        A start that is judged comes in chunks of a period up to its end, so that it lasts no longer than the judgement needs.
+        """
         seconds = PACED_CHUNK_S if self.paced or self.daq.capabilities.paced else CHUNK_S
-        blocks = max(1, round(seconds * self.daq.sample_rate_hz / self.daq.block))
-        return blocks * self.daq.block
+        block = self.daq.block
+        whole = max(1, round(seconds * self.daq.sample_rate_hz / block))
+        blocks = whole - self.statistics.samples // block % whole
+        if self.tick.start_held:
+            blocks = min(blocks, max(1, math.ceil(self.tick.start_left_samples / block)))
+        return blocks * block
 
     def _advance(self, readings: np.ndarray, rows: np.ndarray) -> int:
         if self._fused is not None:

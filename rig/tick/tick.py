@@ -16,7 +16,7 @@ from rig.tick.safety.following import FOLLOWING, see_frequency
 from rig.tick.safety.kernels import is_over
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
 from rig.tick.sequencer.judgement import SETTLING
-from rig.tick.sequencer.layout import PROGRESS
+from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 __all__ = ["Tick", "TickSettings"]
@@ -95,7 +95,7 @@ class Tick:
         progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
         progress["segments"] = len(segments)
         progress["retries"], progress["point"] = retries, -1
-        progress["held_back"] = int(start_judged)
+        progress["held_back"] = int(start_judged and any(one.kind is SegmentKind.START for one in segments))
         expected, following = expected_record(bench, smallest[force], smallest[drive], exciter), np.zeros(1, FOLLOWING)
         following["reference_v"] = expected["floor_v"]
         see_frequency(expected[0], following[0], omega)
@@ -152,6 +152,21 @@ class Tick:
     def request_stop(self) -> None:
         """Request a ramp to 0 V at frozen frequency, which ends the plan."""
         self.arrays.guard["stop_requested"] = 1
+
+    @property
+    def start_held(self) -> bool:
+        """Whether a start segment lasts until `release_start`."""
+        return bool(self.arrays.progress["held_back"][0])
+
+    @property
+    def start_left_samples(self) -> float:
+        """Samples of a period, or fewer if a start segment has less left of its time."""
+        progress = self.arrays.progress[0]
+        periods, segment = 1.0, int(progress["segment"])
+        if segment < self.arrays.segments.size and self.arrays.segments["kind"][segment] == SegmentKind.START:
+            left = float(self.arrays.segments["periods"][segment] - (progress["cycle"] - progress["start_cycle"]))
+            periods = min(periods, left) if left > 0.0 else periods
+        return periods * self.bench.sample_rate_hz / self.frequency_hz
 
     def release_start(self) -> None:
         """Let the start segment end at its time."""

@@ -20,6 +20,7 @@ from rig.loop.loop import Loop
 from rig.loop.session import LocalSession, open_session
 from rig.loop.worker.session import WorkerSession
 from rig.tick.safety.layout import EndReason, GuardMode
+from rig.tick.sequencer.layout import SegmentKind
 from tests.named_memory import named_memory
 from tests.rig.loop.worker.rigs import RATE_HZ, VOLTS, slow_bench, tone
 from tests.waiting import wait_until
@@ -64,8 +65,10 @@ def test_the_start_is_released_across_the_processes():
         if chunks == 3:
             loop.release_start()
 
+    settings = tone(bench, 1.0)
+    start = replace(settings.segments[-1], kind=SegmentKind.START)
     with WorkerSession(bench, 3) as session:
-        ran(session, replace(tone(bench, 1.0), start_judged=True), each)
+        ran(session, replace(settings, segments=(*settings.segments, start), start_judged=True), each)
     assert held[:3] == [1, 1, 1]
     assert held[-1] == 0
 
