@@ -21,11 +21,11 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from rig.monitor.connections import MOST_SOCKETS
 from rig.monitor.feed import Feed, Moment, Place
 from rig.monitor.plain_pages import HARDWARE, plain_page
 from rig.monitor.security import Guard, Keys
 from rig.monitor.stopping import Stopping
+from rig.monitor.visits import MOST_SOCKETS
 from rig.system.child import ChildFailed
 
 if TYPE_CHECKING:
