@@ -3,13 +3,13 @@
 import asyncio
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import parse_qs
 
 import h11
 from starlette.datastructures import Headers
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
+from rig.monitor.first_message import with_token
 from rig.monitor.security import Keys
 from rig.monitor.visits import Visit
 
@@ -77,8 +77,7 @@ class WebConnection(H11Protocol):
 
     def _shows_key(self) -> bool:
         """Return whether the last request has the cookie or the token of the address."""
-        token = parse_qs(self.scope["query_string"].decode("latin-1")).get("token", [""])[0]
-        return self._keys.known(Headers(raw=self.headers)) or self._keys.opens(token)
+        return self._keys.known(Headers(raw=self.headers)) or with_token(self.scope["query_string"], self._keys)
 
     def pause_writing(self) -> None:
         """The client does not read."""

@@ -1,4 +1,4 @@
-"""How many connections the page's server may hold: as many as the process may have descriptors for, less what else needs them."""
+"""How many connections the page's server may hold: as many as it has descriptors for, less those for everything else."""
 
 from contextlib import suppress
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Room(NamedTuple):
 
     waiting: int = 2048
     """Those that have not had their turn."""
-    strangers: int = 256
+    strangers: int = 128
     """Those that are listened to. By TLS each takes a quarter of a megabyte."""
 
 

@@ -27,7 +27,7 @@ class DoorServer(uvicorn.Server):
         """Start the application, then accept."""
         await super().startup(sockets=[])  # it listens nowhere itself
         (listening,) = sockets or ()
-        self.door = Door(listening, self._tls, self._connection)
+        self.door = Door(listening, self._tls, self._keys, self._connection)
         self._accepting = asyncio.create_task(self.door.accept())
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:

@@ -23,6 +23,7 @@ from rig.monitor.connections import FeedConnection, WebConnection
 from rig.monitor.door import BACKLOG
 from rig.monitor.door_server import DoorServer
 from rig.monitor.feed import Feed, Look
+from rig.monitor.first_message import LARGEST_HEADERS
 from rig.monitor.opening import open_in_browser
 from rig.monitor.priority import lower_priority
 from rig.monitor.security import Keys
@@ -35,7 +36,6 @@ __all__ = ["Address", "PageServer", "Serving", "serve"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 DEFAULT_PORTS = {"http": 80, "https": 443}
-LARGEST_HEADERS = 16384
 LARGEST_MESSAGE = 1024
 GRACE_S = 2
 LINGER_S = 60.0

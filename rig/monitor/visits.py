@@ -1,4 +1,4 @@
-"""Connections that have had their turn: strangers, of which only so many are listened to at a time, and those that have shown a key."""
+"""Connections that have had their turn: strangers, of which so many are listened to at a time, and those with a key."""
 
 import asyncio
 from collections.abc import Callable
@@ -58,6 +58,7 @@ class Visit:
             self._handshake.cancel()
 
     def _shaken(self, handshake: "asyncio.Task[object]") -> None:
+        self._handshake = None  # it may hold what failed, with all buffers
         if handshake.cancelled() or handshake.exception() is not None:  # asked, so that it is not logged
             self.gone()
 
@@ -86,6 +87,12 @@ class Visits:
             oldest.drop()
         visit = Visit(self, now_s)
         self.strangers[visit] = None
+        return visit
+
+    def known_at_once(self) -> Visit:
+        """Return a connection that has shown a key before it was opened."""
+        visit = Visit(self, 0.0)
+        self.know(visit)
         return visit
 
     def know(self, visit: Visit) -> None:

@@ -31,13 +31,11 @@ def trusting_all() -> ssl.SSLContext:
     return context
 
 
-async def stranger(kind: str, port: int, was_there: asyncio.Event) -> None:
+async def stranger(kind: str, port: int, tls: ssl.SSLContext | None, was_there: asyncio.Event) -> None:
     """Connect again and again."""
     while True:
         with suppress(OSError):
-            reader, writer = await asyncio.open_connection(
-                "127.0.0.1", port, ssl=trusting_all() if kind == "greeted" else None
-            )
+            reader, writer = await asyncio.open_connection("127.0.0.1", port, ssl=tls)
             was_there.set()
             writer.write(SAID[kind])
             await reader.read()
@@ -47,8 +45,9 @@ async def stranger(kind: str, port: int, was_there: asyncio.Event) -> None:
 
 async def crowd(kind: str, number: int, port: int) -> None:
     """So many strangers at once."""
+    tls = trusting_all() if kind == "greeted" else None
     events = [asyncio.Event() for _ in range(number)]
-    tasks = [asyncio.create_task(stranger(kind, port, event)) for event in events]
+    tasks = [asyncio.create_task(stranger(kind, port, tls, event)) for event in events]
     for event in events:
         await event.wait()
     print("all there", flush=True)
