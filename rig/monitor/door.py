@@ -1,9 +1,9 @@
 """The way to the page's server: whoever has no key cannot keep out those who have one.
 
 A connection is a stranger until a request on it has shown the browser's cookie or the token of the address. Internet addresses
-tell nobody apart: on one machine all have the same. At first a connection waits as a bare socket, until its first message has come whole:
-the headers of a request, or what begins a TLS handshake. That costs a descriptor, no handshake and no buffers, so that many can
-wait, which keeps them from coming anew. Then a request with a key is served at once, and everybody else in turn.
+tell nobody apart: on one machine all have the same. At first a connection waits as a bare socket, until its first message has
+come whole: the headers of a request, or what begins a TLS handshake. That costs a descriptor, no handshake and no buffers, so
+that many can wait, which keeps them from coming anew. Then a request with a key is served at once, and everybody else in turn.
 
 Where too many wait, the oldest is dropped, of those whose message is not whole or of those in the queue, whichever are more:
 neither crowd can push out the other.
@@ -66,7 +66,7 @@ class Door:
                     self._take((await loop.sock_accept(self._listening))[0])
                 except ConnectionAbortedError:
                     pass
-                except OSError:  # descriptors or memory of the whole system
+                except OSError:  # descriptors or memory are used up, by others too
                     self._drop_one()
                     await asyncio.sleep(RETRY_S)
                 accepted += 1

@@ -21,10 +21,10 @@ def is_whole(come: bytes, tls: bool) -> bool:
     """Return whether what has come is a message, or can no longer become one that is allowed."""
     if not tls:
         return len(come) >= LARGEST_HEADERS or HEADERS_END.search(come) is not None
-    if come[0] != HANDSHAKE:
-        return True
+    if len(come) < RECORD_HEAD:
+        return False
     length = int.from_bytes(come[3:RECORD_HEAD], "big")
-    return len(come) >= RECORD_HEAD and (length > LARGEST_RECORD or len(come) >= RECORD_HEAD + length)
+    return come[0] != HANDSHAKE or length > LARGEST_RECORD or len(come) >= RECORD_HEAD + length
 
 
 def shows_key(request: bytes, keys: Keys) -> bool:
