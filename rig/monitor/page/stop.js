@@ -54,6 +54,8 @@ export class Stop {
     this.say("sent", "STOP SENT");
     try {
       this.bySocket();
+    } catch {} // the form is sent all the same
+    try {
       await this.send();
     } catch (error) {
       this.asked = false;
