@@ -66,7 +66,7 @@ class Door:
                     self._take((await loop.sock_accept(self._listening))[0])
                 except ConnectionAbortedError:
                     pass
-                except OSError:  # descriptors or memory are used up, by others too
+                except (OSError, RuntimeError):  # descriptors or memory are used up; whatever it is, accepting goes on
                     self._drop_one()
                     await asyncio.sleep(RETRY_S)
                 accepted += 1
@@ -96,11 +96,15 @@ class Door:
             return
         loop = asyncio.get_running_loop()
         loop.remove_reader(connection)
+        come, closed = b"", False
         try:
             come = connection.recv(LARGEST, socket.MSG_PEEK)
+            closed = not come
+        except BlockingIOError:
+            pass
         except OSError:
-            come = b""
-        if not come:
+            closed = True
+        if closed:
             self._drop(connection, self._unfinished)
         elif not is_whole(come, self._tls is not None):
             waited_s = loop.time() - self._unfinished[connection]
