@@ -26,8 +26,8 @@ class DoorServer(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start the application, then accept."""
         await super().startup(sockets=[])  # it listens nowhere itself
-        (listening,) = sockets or ()
-        self.door = Door(listening, self._tls, self._keys, self._connection)
+        assert sockets is not None
+        self.door = Door(sockets[0], self._tls, self._keys, self._connection)
         self._accepting = asyncio.create_task(self.door.accept())
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
