@@ -31,7 +31,8 @@ RUN = (
     "seconds, channels, path = float(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])\n"
     "with rig.run(long_plan(seconds), bench=wide(channels), output=path, realtime=True) as run:\n"
     "    loop = run.recording.parts[-1].end['loop']\n"
-    "    print(json.dumps({'response_us': loop['response_us'], 'overruns': loop['overruns'], 'wall_s': loop['wall_s']}))\n"
+    "    kept = ('response_us', 'overruns', 'samples', 'wall_s')\n"
+    "    print(json.dumps({name: loop[name] for name in kept}))\n"
 )
 MONITOR = "from rig.cli import main; import sys; sys.argv = ['rig', 'monitor']; main()"
 TIMES = ("p50", "p99", "p99_9")
@@ -116,16 +117,20 @@ def main() -> None:
         watch(given.watch, given.clients)
         return
     pairs = []
-    for _ in range(given.pairs):
-        pairs.append([once(given.seconds, clients, given.channels) for clients in (given.clients, 0)])
+    for number in range(given.pairs):
+        order = (given.clients, 0)[:: (1, -1)[number % 2]]  # neither side always comes first
+        sides = {clients: once(given.seconds, clients, given.channels) for clients in order}
+        pairs.append([sides[given.clients], sides[0]])
         print(json.dumps(pairs[-1]), flush=True)
     for name in TIMES:
         ratios = [watched["response_us"][name] / alone["response_us"][name] for watched, alone in pairs]
         print(
             f"response {name}, watched over unwatched: {statistics.median(ratios):.3g} ({min(ratios):.3g} to {max(ratios):.3g})"
         )
-    late = [statistics.median(pair[side]["overruns"] for pair in pairs) for side in (0, 1)]
-    print(f"late blocks, watched and unwatched: {late[0]:g}, {late[1]:g}")
+    for side, name in enumerate(("watched", "unwatched")):
+        late = [pair[side]["overruns"] for pair in pairs]
+        among = statistics.median(pair[side]["samples"] for pair in pairs)
+        print(f"late blocks among {among:g}, {name}: {statistics.median(late):g} ({min(late)} to {max(late)})")
     for name in ("campaign", "server", "clients"):
         print(f"{name}: {statistics.median(pair[0]['cores'][name] for pair in pairs):.3f} of a core")
     print(f"campaign unwatched: {statistics.median(pair[1]['cores']['campaign'] for pair in pairs):.3f} of a core")

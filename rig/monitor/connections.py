@@ -1,15 +1,20 @@
-"""Connections to the page's server, bounded: neither their number nor the time that one may hang is without end."""
+"""Connections to the page's server: what is told of each to the door, and the time that one may hang, which is bounded."""
 
 import asyncio
 from collections.abc import Callable
+from typing import Any
 
+import h11
+from starlette.datastructures import Headers
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-__all__ = ["MOST_CONNECTIONS", "MOST_SOCKETS", "FeedConnection", "WebConnection"]
+from rig.monitor.first_message import with_token
+from rig.monitor.security import Keys
+from rig.monitor.visits import Visit
 
-MOST_CONNECTIONS = 128
-MOST_SOCKETS = 32
+__all__ = ["FeedConnection", "WebConnection"]
+
 REQUEST_S = 10.0
 """Time in which a request must have come in whole."""
 STUCK_S = 60.0
@@ -34,17 +39,19 @@ class _Deadline:
 
 
 class WebConnection(H11Protocol):
-    """A connection for HTTP."""
+    """A connection for HTTP. Without a key there is one answer on it."""
+
+    def __init__(self, visit: Visit, keys: Keys, **how: Any) -> None:
+        super().__init__(**how)
+        self._visit, self._keys = visit, keys
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection, or drop it where there are too many."""
+        """Take a connection."""
         self._request = _Deadline(REQUEST_S, self._give_up)
         self._stuck = _Deadline(STUCK_S, self._give_up)
+        self._visit.opened(transport)
         super().connection_made(transport)
-        if len(self.connections) > MOST_CONNECTIONS:
-            transport.abort()
-        else:
-            self._request.start()
+        self._request.start()
 
     def data_received(self, data: bytes) -> None:
         """Take data; a request that has begun must come in whole before its deadline."""
@@ -53,6 +60,24 @@ class WebConnection(H11Protocol):
             self._request.start()
         else:
             self._request.call_off()
+            if self._shows_key():
+                self._visit.shows_key()
+            else:
+                self.cycle.keep_alive = False
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        """Let a socket take over, which goes on under the same visit."""
+        if self._shows_key():
+            self._visit.shows_key()
+        super().handle_websocket_upgrade(event)
+        feed = self.transport.get_protocol()
+        if isinstance(feed, FeedConnection):
+            feed.visit = self._visit
+            self._visit.becomes_feed()
+
+    def _shows_key(self) -> bool:
+        """Return whether the last request has the cookie or the token of the address."""
+        return self._keys.known(Headers(raw=self.headers)) or with_token(self.scope["query_string"], self._keys)
 
     def pause_writing(self) -> None:
         """The client does not read."""
@@ -68,6 +93,7 @@ class WebConnection(H11Protocol):
         """Forget it."""
         self._request.call_off()
         self._stuck.call_off()
+        self._visit.gone()
         super().connection_lost(exc)
 
     def _give_up(self) -> None:
@@ -77,6 +103,8 @@ class WebConnection(H11Protocol):
 
 class FeedConnection(WebSocketsSansIOProtocol):
     """A connection that has become a socket."""
+
+    visit: Visit | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Take over a connection."""
@@ -96,4 +124,6 @@ class FeedConnection(WebSocketsSansIOProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""
         self._stuck.call_off()
+        if self.visit is not None:
+            self.visit.gone()
         super().connection_lost(exc)

@@ -29,7 +29,7 @@ from rig.text.printable import error_text
 
 __all__ = ["Feed", "Look", "Moment", "Place"]
 
-TICK_S = 1.0 / 30.0
+TICK_S = 1.0 / 15.0
 STILL_S = 0.25
 """Longest time between two messages where nothing changes: they show that the server lives."""
 UNWATCHED_S, WAITING_S = 1.0, 0.2

@@ -19,8 +19,11 @@ import uvicorn
 from rig.errors import ConfigurationError
 from rig.live.reader import View
 from rig.monitor.certificate import from_files, self_signed
-from rig.monitor.connections import MOST_CONNECTIONS, FeedConnection, WebConnection
+from rig.monitor.connections import FeedConnection, WebConnection
+from rig.monitor.door import BACKLOG
+from rig.monitor.door_server import DoorServer
 from rig.monitor.feed import Feed, Look
+from rig.monitor.first_message import LARGEST_HEADERS
 from rig.monitor.opening import open_in_browser
 from rig.monitor.priority import lower_priority
 from rig.monitor.security import Keys
@@ -33,7 +36,6 @@ __all__ = ["Address", "PageServer", "Serving", "serve"]
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 DEFAULT_PORTS = {"http": 80, "https": 443}
-LARGEST_HEADERS = 16384
 LARGEST_MESSAGE = 1024
 GRACE_S = 2
 LINGER_S = 60.0
@@ -98,7 +100,7 @@ class Address:
             if os.name == "posix":  # a port that was closed just now may be used again; elsewhere this means any port
                 listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listening.bind(address)
-            listening.listen(MOST_CONNECTIONS)
+            listening.listen(BACKLOG)
         except OSError as error:
             listening.close()
             where = f"`bind` = {self.bind}, `port` = {self.port}"
@@ -160,8 +162,7 @@ class PageServer:
             timeout_graceful_shutdown=GRACE_S,
         )
         config.load()
-        config.ssl = secured[0] if secured else None
-        self._server = uvicorn.Server(config)
+        self._server = DoorServer(config, self.keys, secured[0] if secured else None)
         for name in ("uvicorn", "asyncio"):  # what clients do wrong is no news for a terminal, which might be held
             logging.getLogger(name).setLevel(logging.CRITICAL)
 

@@ -47,11 +47,15 @@ class Keys:
 
     def admit(self, token: str) -> bool:
         """Return whether this is the token of the address; if so, it is replaced by another, and ``on_entry`` is called."""
-        if not same(token, self.entry):
+        if not self.opens(token):
             return False
         self.entry = secrets.token_urlsafe(TOKEN_BYTES)
         self.on_entry()
         return True
+
+    def opens(self, token: str) -> bool:
+        """Return whether this is the token of the address; it is not used up by that."""
+        return same(token, self.entry)
 
     def known(self, headers: Headers) -> bool:
         """Return whether a request has the cookie."""

@@ -21,11 +21,11 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from rig.monitor.connections import MOST_SOCKETS
 from rig.monitor.feed import Feed, Moment, Place
 from rig.monitor.plain_pages import HARDWARE, plain_page
 from rig.monitor.security import Guard, Keys
 from rig.monitor.stopping import Stopping
+from rig.monitor.visits import MOST_SOCKETS
 from rig.system.child import ChildFailed
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ TYPES = {
 LARGEST_FORM = 1024
 FORM_S = 5.0
 READ_S = 3.0
+STOP = "stop"
 NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
 ELSEWHERE = "Or type in a terminal of the same user: rig stop"
 HOW_TO_ENTER = (
@@ -143,7 +144,10 @@ class _Pages:
         return Response(text, media_type="application/json")
 
     async def follow(self, socket: WebSocket) -> None:
-        """Send what is new, to as many as may watch."""
+        """Send what is new, to as many as may watch; a message "stop" asks the run to ramp down, as the form does.
+
+        A socket is there already when others take all new connections.
+        """
         if not (self._keys.known(socket.headers) and self._keys.acts(socket.query_params.get("token"))):
             await socket.close(1008)  # before it is accepted: answered with status 403
             return
@@ -154,8 +158,9 @@ class _Pages:
         self._feed.clients += 1
         sending = asyncio.create_task(self._send(socket))
         try:
-            while (await socket.receive())["type"] != "websocket.disconnect":
-                pass  # whatever it says
+            while (said := await socket.receive())["type"] != "websocket.disconnect":
+                if said.get("text") == STOP:  # whatever else it says
+                    self._site.stopping.ask(self._feed.view)
         except (WebSocketDisconnect, RuntimeError):
             pass
         finally:

@@ -16,12 +16,13 @@ import { Traces } from "./traces.js";
 const at = (id) => document.getElementById(id);
 const token = at("token").value;
 
-const stop = new Stop(at("stop-form"), at("stopping")); // first: whatever fails below, STOP has its key
+let feed = null;
+const stop = new Stop(at("stop-form"), at("stopping"), () => feed?.send("stop")); // first: whatever fails below, STOP has its key
 
 let parts = [];
 let waiting = false;
 
-const feed = new Feed(token, (message) => {
+feed = new Feed(token, (message) => {
   for (const part of parts) {
     if (message.is === "whole") {
       part.reset(message);

@@ -38,6 +38,11 @@ export class Feed {
     };
   }
 
+  /** Say something by the socket, if there is one. */
+  send(word) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(word);
+  }
+
   hear(message) {
     this.heard = performance.now();
     this.refused = false;

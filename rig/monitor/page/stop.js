@@ -1,4 +1,5 @@
-// STOP: the plain form, sent without leaving the page where that works, and by a key. Says when the output is at 0 V.
+// STOP: by the socket, which needs no new connection, and by the plain form, sent without leaving the page where that works;
+// also by a key. Says when the output is at 0 V.
 
 const PATIENCE_MS = 1500;
 const LOOK_MS = 250;
@@ -7,9 +8,11 @@ const DONE = ["off", "none"]; // states of the server in which nothing more will
 const HARDWARE = "USE THE HARDWARE STOP";
 
 export class Stop {
-  constructor(form, words) {
+  /** `ask` sends the request by the socket, if there is one. */
+  constructor(form, words, ask) {
     this.form = form;
     this.words = words;
+    this.bySocket = ask;
     this.asked = this.failed = false;
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -49,6 +52,9 @@ export class Stop {
     if (this.failed) return this.form.submit(); // the second time without this script
     this.asked = true;
     this.say("sent", "STOP SENT");
+    try {
+      this.bySocket();
+    } catch {} // the form is sent all the same
     try {
       await this.send();
     } catch (error) {

@@ -34,7 +34,9 @@ def monitor(*words: str, **options: object) -> Iterator[tuple["subprocess.Popen[
     with started("monitor", *words, **options) as process:
         assert process.stdout is not None
         try:
-            yield process, address_in(process.stdout.readline())
+            first = process.stdout.readline()
+            line = process.stdout.readline() if "fingerprint" in first else first
+            yield process, address_in(line)
         finally:
             process.kill()
             process.communicate(timeout=LONG_S)

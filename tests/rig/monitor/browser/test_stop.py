@@ -22,7 +22,7 @@ def test_stop_ramps_down_and_says_when_the_output_is_at_0_v(page, told, how):
     how(page)
     page.shows("stopping", "RAMPING DOWN")
     page.shows("state", "ramping down")
-    assert told.causes == ["stopped on the page"]
+    assert set(told.causes) == {"stopped on the page"}  # by the socket and by the form
     told.end()
     page.shows("stopping", "OUTPUT AT 0 V")
     page.shows("detail", "OUTPUT AT 0 V")
@@ -35,7 +35,7 @@ def test_other_keys_and_escape_held_down_ask_for_nothing_more(page, told):
     page.run("document.dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape', repeat: true }))")
     key(page)
     page.shows("stopping", "RAMPING DOWN")
-    assert len(told.causes) == 1
+    assert len(told.causes) in (1, 2)  # once by the socket, once by the form
 
 
 def test_what_came_of_a_stop_is_not_said_of_the_next_run(browser, serve, told):
@@ -50,7 +50,7 @@ def test_what_came_of_a_stop_is_not_said_of_the_next_run(browser, serve, told):
     assert browser.text("stopping") == ""
     click(browser)
     browser.shows("stopping", "RAMPING DOWN")
-    assert len(shown[0].causes) == 1
+    assert len(shown[0].causes) in (1, 2)
 
 
 @pytest.mark.parametrize("how", [click, key])
@@ -61,6 +61,15 @@ def test_stop_works_where_the_socket_is_dead(browser, serve, told, how):
         browser.shows("stopping", "RAMPING DOWN")
         told.end()
         browser.shows("stopping", "OUTPUT AT 0 V")
+
+
+def test_stop_works_where_the_server_takes_no_new_connection(browser, serve, told):
+    with browser.before_the_page("window.fetch = () => new Promise(() => {});"):
+        browser.open(serve(always(told)))
+        browser.is_connected("live")
+        click(browser)
+        browser.shows("state", "ramping down")
+        assert told.causes == ["stopped on the page"]
 
 
 def test_stop_works_where_the_script_can_send_nothing(browser, serve, told):

@@ -1,0 +1,124 @@
+"""Connections that have had their turn: strangers, of which so many are listened to at a time, and those with a key."""
+
+import asyncio
+from collections.abc import Callable
+
+__all__ = ["MOST_FEEDS", "MOST_KNOWN", "MOST_SOCKETS", "Visit", "Visits"]
+
+TURN_S = 0.2
+"""Time that every stranger has for its handshake and its first request, however many others there are."""
+MOST_KNOWN = 64
+"""Connections with a key that are no sockets."""
+MOST_SOCKETS = 32
+"""Sockets that are sent the feed."""
+MOST_FEEDS = 2 * MOST_SOCKETS
+"""All sockets with a key, also those that are being told that they are too many."""
+
+
+class Visit:
+    """A connection from its handshake on."""
+
+    def __init__(self, visits: "Visits", began_s: float) -> None:
+        self._visits, self.began_s = visits, began_s
+        self._handshake: asyncio.Task[object] | None = None
+        self._transport: asyncio.Transport | None = None
+
+    def shakes_hands(self, handshake: "asyncio.Task[object]") -> None:
+        """It is being opened, with a TLS handshake if there is to be one."""
+        self._handshake = handshake
+        handshake.add_done_callback(self._shaken)
+
+    def opened(self, transport: asyncio.Transport) -> None:
+        """It is open."""
+        self._transport = transport
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it has shown a key."""
+        return self in self._visits.known
+
+    def shows_key(self) -> None:
+        """A request on it had the cookie, or the token of the address."""
+        self._visits.know(self)
+
+    def becomes_feed(self) -> None:
+        """It has become a socket."""
+        self._visits.follow(self)
+
+    def gone(self) -> None:
+        """It is closed."""
+        self._visits.forget(self)
+
+    def drop(self) -> None:
+        """Close it at once, whatever it does."""
+        self.gone()
+        if self._transport is not None:
+            self._transport.abort()
+        elif self._handshake is not None:
+            self._handshake.cancel()
+
+    def _shaken(self, handshake: "asyncio.Task[object]") -> None:
+        self._handshake = None  # it may hold what failed, with all buffers
+        if handshake.cancelled() or handshake.exception() is not None:  # asked, so that it is not logged
+            self.gone()
+
+
+class Visits:
+    """All of them, the oldest first; ``on_room`` is called when one of the places for ``most_strangers`` has become free."""
+
+    def __init__(self, most_strangers: int) -> None:
+        self._most_strangers = most_strangers
+        self.strangers: dict[Visit, None] = {}
+        self.known: dict[Visit, None] = {}
+        self.feeds: dict[Visit, None] = {}
+        self.on_room: Callable[[], None] = lambda: None
+
+    def until_room_s(self, now_s: float) -> float:
+        """Return how long it takes until another stranger can be taken; 0 if there is room, or it can be made."""
+        if len(self.strangers) < self._most_strangers:
+            return 0.0
+        return max(next(iter(self.strangers)).began_s + TURN_S - now_s, 0.0)
+
+    def begin(self, now_s: float) -> Visit:
+        """Return a new stranger, for which the oldest is dropped where there are too many."""
+        while len(self.strangers) >= self._most_strangers:
+            oldest = next(iter(self.strangers))
+            del self.strangers[oldest]  # its place is taken
+            oldest.drop()
+        visit = Visit(self, now_s)
+        self.strangers[visit] = None
+        return visit
+
+    def known_at_once(self) -> Visit:
+        """Return a connection that has shown a key before it was opened."""
+        visit = Visit(self, 0.0)
+        self.know(visit)
+        return visit
+
+    def know(self, visit: Visit) -> None:
+        """Count a connection as known, and as the one used last."""
+        self.known.pop(visit, None)
+        self.known[visit] = None
+        while len(self.known) > MOST_KNOWN:
+            next(iter(self.known)).drop()
+        self._leaves(visit)
+
+    def follow(self, visit: Visit) -> None:
+        """Count a socket; one without a key stays a stranger until it is refused."""
+        if visit not in self.known:
+            return
+        del self.known[visit]
+        self.feeds[visit] = None
+        if len(self.feeds) > MOST_FEEDS:
+            visit.drop()
+
+    def forget(self, visit: Visit) -> None:
+        """A connection is closed."""
+        self.known.pop(visit, None)
+        self.feeds.pop(visit, None)
+        self._leaves(visit)
+
+    def _leaves(self, stranger: Visit) -> None:
+        if stranger in self.strangers:
+            del self.strangers[stranger]
+            self.on_room()
