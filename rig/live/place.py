@@ -19,7 +19,19 @@ from pathlib import Path
 from rig.errors import RecordingError
 from rig.system.locking import is_locked, lock
 
-__all__ = ["FACTS", "FRAME_FILE", "LINES", "LOCK", "STOP", "TRACES", "base_folder", "lives", "new_folder", "remove", "runs"]
+__all__ = [
+    "FACTS",
+    "FRAME_FILE",
+    "LINES",
+    "LOCK",
+    "STOP",
+    "TRACES",
+    "base_folder",
+    "lives",
+    "new_folder",
+    "remove",
+    "runs",
+]
 
 FACTS, FRAME_FILE, TRACES, LINES = "facts.json", "frame", "traces", "lines.jsonl"
 STOP, LOCK = "stop", "lock"
@@ -83,7 +95,7 @@ def new_folder(facts: bytes) -> tuple[Path, int]:
 
 
 def remove(folder: Path) -> None:
-    """Remove the folder of a run, which nobody finds from now on. What is in it and not of a run stays, and so does the folder."""
+    """Remove the folder of a run, which nobody finds from now on. Files in it that are of no run stay, and so does it then."""
     with suppress(OSError):
         folder = folder.rename(_hidden(folder))
     _empty(folder)

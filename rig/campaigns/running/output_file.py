@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
-from rig.recording.journal import journal_path
+from rig.recording.journal import check_journal, journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.system.locking import exclusive
 
@@ -25,6 +25,8 @@ def make_way(output: Path, overwrite: bool) -> None:
                 raise RecordingError(f"{path}: exists already; choose another name, or `overwrite`")
         if output.exists():
             kind_of(output)  # only files of this program are overwritten
+        if journal_path(output).exists():
+            check_journal(journal_path(output))
     except OSError as error:
         raise RecordingError(f"{output}: cannot be used ({error.strerror})") from None
 
@@ -88,7 +90,7 @@ def _holds_a_part(journal: Path) -> bool:
 
 
 def _before(path: Path) -> Path:
-    return path.with_name(path.name + ".before")
+    return path.with_name(f"{path.name}.vibrolock-before")  # a name that none but this program uses
 
 
 def _moved(path: Path) -> Path:
