@@ -6,10 +6,11 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from rig.errors import RigError
 from rig.recording.examination import LARGEST_RATIO, SMALL_BYTES
 from rig.system.child import MEMORY_BYTES
 
-__all__ = ["most_bytes", "read_values", "reason", "write_values"]
+__all__ = ["TooMuchData", "most_bytes", "read_values", "reason", "write_values"]
 
 MOST_BYTES = 2_000_000_000
 """Data of a file of any size."""
@@ -27,7 +28,7 @@ def most_bytes(path: Path) -> int:
 def write_values(value: Any, folder: Path, most: int = MOST_BYTES) -> None:
     """Write ``value`` into ``folder``; values other than numbers, texts and containers become the name of their type.
 
-    Raises ValueError for values that take more than ``most`` bytes of memory when they are read back.
+    Raises `TooMuchData` for values that take more than ``most`` bytes of memory when they are read back.
     """
     with (folder / _NUMBERS).open("wb") as numbers:
         tree = _Taking(numbers, most).apart(value)
@@ -38,6 +39,13 @@ def read_values(folder: Path) -> Any:
     """Read back the value that `write_values` wrote."""
     with (folder / _NUMBERS).open("rb") as numbers:
         return _put_together(json.loads((folder / _TREE).read_text(encoding="ascii")), numbers)
+
+
+class TooMuchData(RigError):  # noqa: N818 (says what happened)
+    """The contents of a file take more memory than is allowed for a file of its size."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__(f"holds more than {most} bytes of data, which are allowed in a file of this size")
 
 
 class _Taking:
@@ -78,7 +86,7 @@ class _Taking:
     def _spend(self, size: int) -> None:
         self._left -= size
         if self._left < 0:
-            raise ValueError(f"it holds more than {self._most} bytes of data, the most for a file of its size")
+            raise TooMuchData(self._most)
 
 
 def _kind(value: Any) -> str:

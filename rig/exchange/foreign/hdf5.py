@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.exchange.child_values import most_bytes
+from rig.exchange.child_values import TooMuchData, most_bytes
 
 __all__ = ["DEEPEST", "Budget", "plain_dataset", "read_hdf5"]
 
@@ -20,7 +20,7 @@ _PLAIN = "biufc"
 
 
 class Budget:
-    """Bytes and items that may still be read; `spend` raises ValueError beyond them."""
+    """Bytes and items that may still be read; `spend` raises TooMuchData or ValueError beyond them."""
 
     def __init__(self, path: Path) -> None:
         self._most = self._bytes = most_bytes(path)
@@ -30,7 +30,7 @@ class Budget:
         """Count one item of ``size`` bytes."""
         self._bytes, self._items = self._bytes - size, self._items - 1
         if self._bytes < 0:
-            raise ValueError(f"it holds more than {self._most} bytes of data, the most for a file of its size")
+            raise TooMuchData(self._most)
         if self._items < 0:
             raise ValueError(f"it holds more than {_MOST_ITEMS} items")
 
