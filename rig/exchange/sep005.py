@@ -11,10 +11,12 @@ from identification.errors import IdentificationError
 from identification.mapping.units import si_of
 from rig.exchange.child_reading import ImportFailed
 from rig.system.text_files import read_text
+from rig.text.printable import shown
 
 __all__ = ["data_of_series", "series_in"]
 
 _LARGEST_JSON_BYTES = 500_000_000
+_HIGHEST_HZ = 1e100  # of any number
 
 UNEVEN = 1e-6  # of the step
 
@@ -61,7 +63,7 @@ def data_of_series(series: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def _text(one: Mapping[str, Any], key: str, number: int) -> str:
     if not isinstance(value := one.get(key), str):
-        raise ImportFailed(f"series[{number}].{key} = {value!r}: allowed is a text")
+        raise ImportFailed(f"series[{number}].{key} = {shown(value)}: allowed is a text")
     return value
 
 
@@ -87,8 +89,8 @@ def _rate(one: Mapping[str, Any], number: int) -> float:
                 f"series[{number}].time: allowed are evenly spaced, increasing instants, one for each of the data"
             )
         fs = 1.0 / step
-    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < np.inf:
-        raise ImportFailed(f"series[{number}].fs = {fs!r}: allowed is a number above 0")
+    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _HIGHEST_HZ:
+        raise ImportFailed(f"series[{number}].fs = {shown(fs)}: allowed is a number above 0")
     return float(fs)
 
 

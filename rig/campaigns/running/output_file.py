@@ -59,17 +59,18 @@ def put_back(output: Path) -> str:
     their journal is the recording now; the old one is removed once this journal has become a file (`forget_before`).
 
     Returns:
-        One line that says what was put back; empty if nothing was.
+        One line that says what was put back or removed; empty if nothing was.
     """
-    journal = journal_path(output)
+    journal, told = journal_path(output), ""
     if journal.exists():
         with exclusive(journal):  # refuses if that run is still writing
             if _holds_a_part(journal):
                 return ""
             journal.unlink()
+            told = f"{output}: a run into it was killed before it began; nothing was recorded"
     left = [path for path in (output, journal) if _before(path).exists()]
     if not left or output.exists():
-        return ""
+        return told
     for path in left:
         _before(path).replace(path)
     return f"{output}: a run that was to overwrite it was killed before it began; the recording is back under its name"

@@ -143,9 +143,4 @@ class SteppedSinePlan(TonePlan):
         frequencies = self.frequencies_at_each_level
         self.check_levels(bench, (min(frequencies), max(frequencies)))
         self.check_frequencies(bench, **{"lowest frequency": min(frequencies), "highest frequency": max(frequencies)})
-        highest = int(bench.sample_rate_hz / max(frequencies) / 2.0) - 1
-        if self.harmonics > highest:
-            raise ConfigurationError(
-                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s and "
-                f"{max(frequencies):g} Hz"
-            )
+        self.check_evaluated(self.harmonics, bench, max(frequencies), spare=1)
