@@ -10,7 +10,6 @@ from controller import AmplitudeLaw
 from rig.bench import Bench
 from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.plan import Target, TonePlan
-from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
 
