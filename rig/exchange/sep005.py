@@ -86,7 +86,7 @@ def _rate(one: Mapping[str, Any], number: int) -> float:
         step = _step(time, data)
         if step is None:
             raise ImportFailed(
-                f"series[{number}].time: allowed are evenly spaced, increasing instants, one for each of the data"
+                f"series[{number}].time: allowed are evenly spaced instants that increase, one for each of the data"
             )
         fs = 1.0 / step
     if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _HIGHEST_HZ:

@@ -56,7 +56,7 @@ def test_of_a_strange_table_a_mapping_is_proposed_or_refused(tmp_path, command, 
     "time", [[1, 1], [2, 1], [1, np.nan], ["a", "b"], [[1, 2]], [None, 1], [0, 10**400], "ab", {}, 3]
 )
 def test_instants_that_do_not_increase_evenly_are_refused(time):
-    with pytest.raises(RigError, match=r"series\[0\]\.time: allowed are evenly spaced, increasing instants"):
+    with pytest.raises(RigError, match=r"series\[0\]\.time: allowed are evenly spaced instants that increase"):
         data_of_series([{"data": [1.0, 2.0], "name": "F", "unit_str": "N", "time": time}])
 
 
