@@ -12,10 +12,10 @@ numba itself is loaded when a kernel is first called, so that a module may decla
 import contextlib
 import enum
 import functools
+import glob
 import hashlib
 import os
 import re
-import shutil
 import tempfile
 import threading
 import time
@@ -50,6 +50,7 @@ need no reference counts, which would cost a third of the time of a sample."""
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 _UNUSED_AFTER_DAYS = 30
 _DAY_S = 86400.0
+_INDEX = re.compile(r".+-[0-9a-f]{24}\.py\d+\w*\.nbi")  # numba's name, with the kernel's digest
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -213,7 +214,7 @@ def _first_writable() -> Path | None:
             os.utime(folder)
         except OSError:
             continue
-        _remove_unused(parent)
+        _remove_unused(folder)
         return folder
     return None
 
@@ -233,14 +234,12 @@ def note_use(index: Path) -> None:
             os.utime(index)
 
 
-def _remove_unused(parent: Path) -> None:
-    """Remove machine code that was not used for a month, and the cache folders of earlier versions."""
+def _remove_unused(folder: Path) -> None:
+    """Remove machine code that was not used for a month. The folder may be one with files of the user's beside it."""
     oldest = time.time() - _UNUSED_AFTER_DAYS * _DAY_S
     with contextlib.suppress(OSError):
-        for folder in parent.iterdir():
-            if folder.is_dir() and folder.name != "kernels" and folder.stat().st_mtime < oldest:
-                shutil.rmtree(folder, ignore_errors=True)
-        for index in (parent / "kernels").glob("*.nbi"):
-            if index.stat().st_mtime < oldest:
-                for file in index.parent.glob(f"{index.stem}.*"):
-                    file.unlink(missing_ok=True)
+        for index in folder.glob("*.nbi"):
+            if _INDEX.fullmatch(index.name) and index.stat().st_mtime < oldest:
+                for file in folder.glob(f"{glob.escape(index.stem)}.*"):
+                    if file.suffix in (".nbi", ".nbc", ".lock"):
+                        file.unlink(missing_ok=True)

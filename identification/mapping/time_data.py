@@ -1,5 +1,6 @@
 """Mappings of time data: what a file of somebody else holds, and which records it makes."""
 
+from pathlib import PureWindowsPath
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -36,6 +37,10 @@ class SampledChannel(ChannelMapping):
 
     @model_validator(mode="after")
     def _moves(self) -> "SampledChannel":
+        if self.file == ".." or PureWindowsPath(self.file).name != self.file:  # no separator and drive of any system
+            raise ValueError(
+                f"file = {self.file!r} of channel '{self.name}': allowed is the name of a file beside the one that is imported"
+            )
         if self.scale == 0.0:
             raise ValueError(f"scale = 0 of channel '{self.name}': allowed is any number but 0")
         if self.axes is not None:

@@ -134,10 +134,11 @@ class Study(Result, ABC):
 
 def draw(study: Study, figure: Path) -> None:
     """Draw an analysis into ``figure`` (png, pdf or svg, by its suffix); raise `RecordingError` if it cannot be written."""
-    from rig.drawing.page import page_for
+    from rig.drawing.page import check_replaceable, page_for
     from rig.drawing.style import title
 
     check_ending(figure)
+    check_replaceable(figure)
     with page_for(figure, study.figure_in) as page:
         study.draw_on(page)
         title(page, f"{study.subject.bench.specimen.name}: {study.title}")

@@ -83,6 +83,10 @@ def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], out
         raise ConfigurationError(f"-o {output}: allowed with --matrix or --daq")
     if output is not None and output.suffix not in (".toml", ".json"):
         raise ConfigurationError(f"-o {output}: allowed is a file .toml or .json")
+    if output is not None and output.exists():
+        from rig.matrix import read_rows
+
+        read_rows(output)  # only rows of a matrix are replaced
 
 
 def _matrix(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["emulate"]
 
+WRITTEN = "# Written by `rig emulate`, which replaces this file."
 SHORTEST_BLOCK_S = 0.002
 """Shortest block of the written bench, s. A host with ordinary scheduling keeps up with it."""
 
@@ -105,8 +106,21 @@ def _pair(text: str) -> list[str]:
 def _check_bench_file(path: Path | None) -> None:
     from rig.errors import ConfigurationError
 
-    if path is not None and (path.suffix != ".toml" or not path.parent.is_dir()):
+    if path is None:
+        return
+    if path.suffix != ".toml" or not path.parent.is_dir():
         raise ConfigurationError(f"--bench-file {path}: allowed is a .toml file in a folder that exists")
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(WRITTEN))
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
+    if start not in (b"", WRITTEN.encode()):
+        raise ConfigurationError(
+            f"--bench-file {path}: exists already and was not written by `rig emulate`; choose another name"
+        )
 
 
 def _write_bench(path: Path, text: str) -> None:
@@ -134,6 +148,7 @@ def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> st
     options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware)
     lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
     head = [
+        WRITTEN,
         f"base = {jsonlib.dumps(base)}",
         f"block = {block}",
         "",

@@ -30,6 +30,9 @@ def plot_(
         str, typer.Option(help="screen, paper (one column, 85 mm), slide (16:9), or a style sheet of matplotlib.")
     ] = "screen",
     size: Annotated[str, typer.Option(metavar="WxH", help="Width and height, mm, or the width alone.")] = "",
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace OUTPUT also where it is no figure of ours.")
+    ] = False,
 ) -> None:
     """Draw what is in a file; of several files, or with axes of one's own, their curves over one another."""
     from rig.drawing.style import restyle
@@ -39,7 +42,8 @@ def plot_(
     view = View(amplitude, channel, harmonic, _limits_hz(frequency))
     restyle(style, size_mm=_size_mm(size))
     try:
-        plot(files, output, lateness=lateness, labels=label or (), view=None if view == View() else view)
+        chosen = None if view == View() else view
+        plot(files, output, lateness=lateness, labels=label or (), view=chosen, overwrite=overwrite)
     finally:
         restyle()
 

@@ -29,8 +29,27 @@ _PANEL_IN, _TITLE_IN, _MOST_IN = 1.6, 0.3, 8.9
 """Heights on a narrow page: of a panel, of the title, and of the column of a journal, which is the most."""
 
 
+_MARKS = {
+    ".png": ({"Software": "vibrolock"}, b"Software\0vibrolock"),
+    ".pdf": ({"Creator": "vibrolock"}, b"/Creator (vibrolock)"),
+    ".svg": ({"Creator": "vibrolock"}, b"<dc:title>vibrolock</dc:title>"),
+}
+"""By the suffix of a figure: what it says of who made it, and how that stands in its file."""
 COLLAPSED = "constrained_layout not applied"
 """Beginning of what matplotlib warns of where axes have no room."""
+
+
+def check_replaceable(figure: Path) -> None:
+    """Raise `RecordingError` for a file that exists and is no figure of this program."""
+    mark = _MARKS[figure.suffix.lower()][1]
+    try:
+        ours = not figure.is_file() or mark in figure.read_bytes()
+    except OSError as error:
+        raise RecordingError(f"{figure}: cannot be written: {error.strerror}") from None
+    if not ours:
+        raise RecordingError(
+            f"{figure}: exists already and is no figure of this program; choose another name, or --overwrite"
+        )
 
 
 @contextmanager
@@ -48,7 +67,7 @@ def page_for(file: Path, size_in: tuple[float, float]) -> Iterator["Figure"]:
         yield page
         _lay_out(page)
         try:
-            page.savefig(file)
+            page.savefig(file, metadata=_MARKS[file.suffix.lower()][0])
         except OSError as error:
             raise RecordingError(f"{file}: cannot be written: {error.strerror}") from None
 

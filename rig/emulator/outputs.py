@@ -31,6 +31,8 @@ class Converter:
         """Bring the output from where it is to 0 V by a ramp of ``ramp_samples`` that begins at an instant."""
         self._is_open, self._closes, self._ramp_samples = False, instant, ramp_samples
         self._from_v = self.held_v
+        if ramp_samples == 0.0:
+            self.held_v = 0.0  # at once: it may be opened again before a sample is put out
 
     def is_closing(self, first: int) -> bool:
         """Whether the output was brought down and its ramp may still be under way at sample ``first``."""

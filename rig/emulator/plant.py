@@ -1,6 +1,7 @@
 """The plant behind a device's converters: a virtual rig, its wiring, and a log of the output."""
 
 import os
+import re
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +18,7 @@ from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
 
-__all__ = ["LoggedPlant", "Plant", "VirtualPlant", "Wiring"]
+__all__ = ["LoggedPlant", "Plant", "VirtualPlant", "Wiring", "check_log"]
 
 WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
 
@@ -179,17 +180,38 @@ class VirtualPlant:
         return np.rint(scaled, out=scaled).astype(self._dtype), flags
 
 
+_LOGGED = re.compile(rb"[\d.]+ \d+ [\d.e+-]+\s")
+"""What the log of a plant begins with."""
+
+
+def check_log(path: Path) -> None:
+    """Raise `ConfigurationError` for a file that exists and is no log of an output, or cannot be read."""
+    try:
+        start = b""
+        if path.is_file():
+            with path.open("rb") as stream:
+                start = stream.read(100)
+    except OSError as error:
+        raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
+    if start and not _LOGGED.match(start):
+        raise ConfigurationError(
+            f"log_output = {str(path)!r}: exists already and is no log of an emulator; choose another name"
+        )
+
+
 class LoggedPlant:
     """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V.
 
     A further line with 0 V marks that the device was stopped.
 
-    A file that cannot be made is a `ConfigurationError`; a disk that is full later ends the writing and nothing else.
+    A file that cannot be made, or that exists and is no such log, is a `ConfigurationError`; a disk that is full later ends
+    the writing and nothing else.
     """
 
     def __init__(self, plant: Plant, path: Path) -> None:
         self._plant = plant
         try:
+            check_log(path)
             self._descriptor = os.open(
                 path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644
             )  # open as long as the device lives

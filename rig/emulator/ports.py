@@ -109,11 +109,11 @@ def named(port: str, link: Path | None) -> Iterator[str]:
 
 
 def _name(link: Path, path: str) -> None:
-    """Make a symbolic link to a port; a link to a port that no longer exists is replaced."""
+    """Make a symbolic link to a port; a link to such a port that no longer exists is replaced, and nothing else."""
     try:
         if link.is_symlink():
             target = link.readlink()
-            if target != Path(path) and link.exists():
+            if target != Path(path) and (link.exists() or target.parent != Path(path).parent):
                 raise ConfigurationError(
                     f"link = {str(link)!r}: leads to {target} already; end the emulator there, or remove the link"
                 )

@@ -12,6 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from rig.emulator.plant import check_log
 from rig.emulator.ports import named, pseudo_terminal
 from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqRefused
@@ -63,6 +64,8 @@ def running(settings: EmulatorSettings) -> Iterator[Running]:
 
 def _program(path: Path, settings: EmulatorSettings, held: ExitStack) -> Running:
     """A program of this computer. Line and pipes are passed on as descriptors."""
+    if settings.log_output is not None:
+        check_log(settings.log_output)
     line, port = held.enter_context(pseudo_terminal(settings.link))
     with ExitStack() as theirs:
         requests, output = os.pipe()

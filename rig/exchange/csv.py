@@ -7,8 +7,9 @@ read back exactly.
 import csv
 import json
 import re
-from collections.abc import Sequence
-from itertools import islice
+from array import array
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,7 @@ from rig.text.contents import Contents
 if TYPE_CHECKING:
     from identification.mapping.csv_layout import CsvLayout
 
-__all__ = ["read_csv", "table_of_ours", "units_of_csv", "write_csv"]
+__all__ = ["columns_in", "read_csv", "table_lines", "table_of_ours", "units_of_csv", "write_csv"]
 
 LARGEST_BYTES = 1_000_000_000
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
@@ -47,10 +48,10 @@ def write_csv(items: Sequence[Contents], path: Path) -> None:
 def _others(item: Contents) -> dict[str, Any]:
     """Return everything that is not in the table, and how its columns form arrays."""
     loose = {}
-    for name, array in item.arrays.items():
+    for name, values in item.arrays.items():
         if name not in item.rows:
-            pairs = np.stack([np.real(array), np.imag(array)], -1) if np.iscomplexobj(array) else np.asarray(array)
-            loose[name] = {"complex": bool(np.iscomplexobj(array)), "values": pairs.tolist()}
+            pairs = np.stack([np.real(values), np.imag(values)], -1) if np.iscomplexobj(values) else np.asarray(values)
+            loose[name] = {"complex": bool(np.iscomplexobj(values)), "values": pairs.tolist()}
     table = {
         name: {
             "axis": axis,
@@ -62,17 +63,32 @@ def _others(item: Contents) -> dict[str, Any]:
     return {"attributes": dict(item.attributes), "table": table, "arrays": loose}
 
 
+def columns_in(path: Path, layout: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the columns of any CSV file by name, and the units in ``__file_units__`` where a line after the names has them.
+
+    ``layout`` holds the keys of a `identification.mapping.csv_layout.CsvLayout`. Raises `ImportFailed`.
+    """
+    from identification.mapping.csv_layout import CsvLayout
+
+    if layout is not None:
+        return {**read_csv(path, CsvLayout(**layout)), "__file_units__": {}}
+    if table_of_ours(path) is not None:
+        return read_csv(path)
+    return {**read_csv(path), "__file_units__": units_of_csv(path)}
+
+
 def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
     """Return kind, arrays and attributes of a file that `write_csv` wrote; None for other files.
 
     Raises `ImportFailed` if the file is damaged.
     """
     lines = _lines(path)
-    if not lines or not lines[0].startswith(_KIND):
+    first = next(lines, "")
+    if not first.startswith(_KIND):
         return None
     try:
-        others = json.loads(lines[1].removeprefix(_OTHERS))
-        rows = np.array([[float(cell) for cell in row] for row in csv.reader(lines[4:])])
+        others = json.loads(next(lines, "").removeprefix(_OTHERS))
+        rows = _matrix(csv.reader(islice(lines, 2, None)))
         arrays: dict[str, Any] = {}
         column = 0
         for name, told in others["table"].items():
@@ -88,9 +104,21 @@ def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | No
         if column != rows.shape[1]:
             raise ValueError(f"{rows.shape[1]} columns, the comment tells of {column}")
         arrays |= {name: _loose(told) for name, told in others["arrays"].items()}
-        return lines[0].removeprefix(_KIND).strip(), arrays, others["attributes"]
-    except (ValueError, KeyError, IndexError, TypeError) as error:
+        return first.removeprefix(_KIND).strip(), arrays, others["attributes"]
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, csv.Error) as error:
         raise ImportFailed(f"{path}: is a damaged or changed CSV file of ours ({error})") from None
+
+
+def _matrix(rows: Iterable[Sequence[str]]) -> Any:
+    """float64[n_rows, n_columns] of rows of numbers; raise ValueError if their lengths differ."""
+    found = array("d")
+    width = count = 0
+    for count, row in enumerate(rows, 1):
+        width = width or len(row)
+        if len(row) != width:
+            raise ValueError(f"row {count}: {len(row)} values, the first has {width}")
+        found.extend(map(float, row))
+    return np.frombuffer(found).reshape(count, width)
 
 
 def _loose(told: dict[str, Any]) -> Any:
@@ -98,8 +126,14 @@ def _loose(told: dict[str, Any]) -> Any:
     return values[..., 0] + 1j * values[..., 1] if told["complex"] else values
 
 
-def _lines(path: Path) -> list[str]:
-    return read_text(path, LARGEST_BYTES, ImportFailed).splitlines()
+def _lines(path: Path) -> Iterator[str]:
+    """Yield the lines, as `str.splitlines` does, without all of them in memory beside the text."""
+    text = read_text(path, LARGEST_BYTES, ImportFailed)
+    start = 0
+    while start < len(text):
+        stop = text.find("\n", start) + 1 or len(text)
+        yield from text[start:stop].splitlines()
+        start = stop
 
 
 def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Any]:
@@ -109,37 +143,38 @@ def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Any]:
     ``#`` are skipped, and so are lines of units right after the names (texts, or a 1). Raises `ImportFailed`, with the line,
     for anything that is not a number, for rows of unequal length, and for decimal commas unless the layout has them.
     """
-    lines = _table_lines(path)[0 if layout is None else layout.skip_lines :]
+    lines = islice(table_lines(path), 0 if layout is None else layout.skip_lines, None)
     told = None if layout is None else layout.names
-    if len(lines) < (2 if told is None else 1):
+    first = list(islice(lines, 2 if told is None else 1))
+    if len(first) < (2 if told is None else 1):
         raise ImportFailed(f"{path}: holds no table; wanted is a line of names, then rows of numbers")
-    comma = _separator(lines, layout)
-    names = [name.strip() for name in (_cells(lines[0][1], comma) if told is None else told)]
+    comma = _separator(first, layout)
+    names = [name.strip() for name in (_cells(first[0][1], comma) if told is None else told)]
     if told is None and (len(set(names)) < len(names) or any(_number(name) is not None for name in names)):
         raise ImportFailed(
-            f"{path}: the first line must name every column, each differently; it is '{lines[0][1][:60]}'"
+            f"{path}: the first line must name every column, each differently; it is '{first[0][1][:60]}'"
         )
     point = "." if layout is None else layout.decimal
-    rows: list[list[float | None]] = []
-    for number, line in lines[1 if told is None else 0 :]:
+    rows = array("d")
+    for number, line in chain(first[1 if told is None else 0 :], lines):
         cells = _cells(line, comma)
         values = [_number(cell if point == "." else cell.replace(",", ".")) for cell in cells]
         if not rows and _is_units(cells, values):
             continue
         if len(cells) != len(names) or None in values:
             wrong = next((cell for cell, value in zip(cells, values, strict=True) if value is None), None)
-            what = f"{len(cells)} values for {len(names)} names" if wrong is None else f"'{wrong}' is no number"
+            what = f"{len(cells)} values for {len(names)} names" if wrong is None else f"'{wrong[:60]}' is no number"
             hint = "; write decimals with a point" if wrong is not None and "," in wrong else ""
             raise ImportFailed(f"{path}, line {number}: {what}{hint}")
-        rows.append(values)
+        rows.extend(value for value in values if value is not None)
     if not rows:
         raise ImportFailed(f"{path}: holds names, but no row of numbers")
-    return dict(zip(names, np.array(rows, dtype=np.float64).T, strict=True))
+    return dict(zip(names, np.frombuffer(rows).reshape(-1, len(names)).T, strict=True))
 
 
 def units_of_csv(path: Path) -> dict[str, str]:
     """Return the units of the columns of any CSV file, by name, if a line of units follows the names."""
-    lines = _table_lines(path, 2)
+    lines = list(islice(table_lines(path), 2))
     if len(lines) < 2:
         return {}
     comma = _separator(lines, None)
@@ -149,10 +184,9 @@ def units_of_csv(path: Path) -> dict[str, str]:
     return {name.strip(): cell.strip() for name, cell in zip(names, cells, strict=True) if cell.strip()}
 
 
-def _table_lines(path: Path, most: int | None = None) -> list[tuple[int, str]]:
-    """Return the lines that are neither empty nor comments, with their numbers; ``most`` of them."""
-    found = ((number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#"))
-    return list(islice(found, most))
+def table_lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are neither empty nor comments, with their numbers."""
+    return ((number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#"))
 
 
 def _separator(lines: Sequence[tuple[int, str]], layout: "CsvLayout | None") -> str:
@@ -163,7 +197,13 @@ def _separator(lines: Sequence[tuple[int, str]], layout: "CsvLayout | None") -> 
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    return line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
+    """Return the cells of a line; raise `ImportFailed` for one that is no line of a table."""
+    try:
+        return line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
+    except csv.Error as error:
+        raise ImportFailed(
+            f"the line '{line[:40]} ...' of {len(line)} characters is no line of a table ({error})"
+        ) from None
 
 
 def _is_units(cells: Sequence[str], values: Sequence[float | None]) -> bool:

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from rig.exchange.child_reading import ImportFailed, read_in_child
+from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.text.contents import Contents
 
-__all__ = ["read_mat", "structures_of_ours", "write_mat"]
+__all__ = ["parsed_mat", "read_mat", "structures_of_ours", "write_mat"]
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
 _LONGEST = 31  # largest number of characters of a field name that every reader of version 5 accepts
@@ -74,7 +74,21 @@ def _table(channels: Sequence[Mapping[str, str]]) -> Any:
 
 def read_mat(path: Path) -> dict[str, Any]:
     """Read a MAT file (version 4 to 7.3) as nested dictionaries, lists and arrays; raise `ImportFailed` if this fails."""
-    return read_in_child("rig.exchange.mat_process", path, "MAT file")
+    found: dict[str, Any] = read_in_child("mat", path, NAMES["mat"])
+    return found
+
+
+def parsed_mat(path: Path) -> dict[str, Any]:
+    """Read a MAT file in this process, which may crash; the child process does. May raise any error."""
+    from scipy.io import loadmat
+
+    from rig.exchange.foreign.matlab_hdf5 import read_matlab_hdf5
+
+    try:
+        found: dict[str, Any] = loadmat(str(path), simplify_cells=True, appendmat=False)
+    except NotImplementedError:  # version 7.3
+        return read_matlab_hdf5(path)
+    return found
 
 
 def structures_of_ours(data: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:

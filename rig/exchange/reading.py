@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.bench.configuration import read_toml, validated
 from rig.errors import ConfigurationError
-from rig.exchange.child_reading import ImportFailed
+from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.mat import read_mat, structures_of_ours
 from rig.exchange.sources import format_of, read_data
 from rig.text.printable import shown
@@ -202,10 +202,9 @@ def _from_mat(path: Path, options: Mapping[str, Any]) -> Any:
 
 
 def _from_csv(path: Path, options: Mapping[str, Any]) -> Any:
-    from rig.exchange.csv import table_of_ours
     from rig.exchange.kinds import put_together
 
-    ours = table_of_ours(path)
+    ours = read_in_child("table of ours", path, NAMES["csv"])
     if ours is None:
         raise ImportFailed(f"{path}: was not written by this package; {_PROPOSAL}")
     return put_together(*ours)

@@ -1,17 +1,37 @@
 """Time series of SEP005 (SDyPy), in memory, as data that a mapping describes."""
 
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from identification import IdentificationError
+from identification.errors import IdentificationError
 from identification.mapping.units import si_of
 from rig.exchange.child_reading import ImportFailed
+from rig.system.text_files import read_text
+from rig.text.printable import shown
 
-__all__ = ["data_of_series"]
+__all__ = ["data_of_series", "series_in"]
+
+_LARGEST_JSON_BYTES = 500_000_000
+_HIGHEST_HZ = 1e100  # of any number
 
 UNEVEN = 1e-6  # of the step
+
+
+def series_in(path: Path) -> dict[str, Any]:
+    """Return what `data_of_series` makes of the series in a JSON file; raise `ImportFailed` as well if there are none."""
+    try:
+        series = json.loads(read_text(path, _LARGEST_JSON_BYTES, ImportFailed))
+    except (ValueError, RecursionError) as error:
+        raise ImportFailed(f"{path}: is no JSON ({error})") from None
+    if not isinstance(series, list) or not all(isinstance(one, Mapping) for one in series):
+        raise ImportFailed(
+            f"{path}: is no list of SEP005 time series, dictionaries with data, name, unit_str, fs or time"
+        )
+    return data_of_series(series)
 
 
 def data_of_series(series: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -43,14 +63,14 @@ def data_of_series(series: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def _text(one: Mapping[str, Any], key: str, number: int) -> str:
     if not isinstance(value := one.get(key), str):
-        raise ImportFailed(f"series[{number}].{key} = {value!r}: allowed is a text")
+        raise ImportFailed(f"series[{number}].{key} = {shown(value)}: allowed is a text")
     return value
 
 
 def _data(one: Mapping[str, Any], number: int) -> Any:
     try:
         data = np.asarray(one["data"], np.float64)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise ImportFailed(f"series[{number}].data: allowed is a list of numbers") from None
     if data.ndim != 1 or data.size < 2:
         raise ImportFailed(f"series[{number}].data: has shape {data.shape}, allowed is (n,) with n from 2")
@@ -63,11 +83,25 @@ def _rate(one: Mapping[str, Any], number: int) -> float:
     if fs is None and time is None:
         raise ImportFailed(f"series[{number}].fs: is missing, and so is time; wanted is one of them")
     if fs is None:
-        instants = np.asarray(time, np.float64)
-        steps = np.diff(instants)
-        if instants.shape != data.shape or not np.all(np.abs(steps - steps.mean()) <= 1e-3 * abs(steps.mean())):
-            raise ImportFailed(f"series[{number}].time: allowed are evenly spaced instants, one for each of the data")
-        fs = 1.0 / float(steps.mean())
-    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < float(fs) < np.inf:
-        raise ImportFailed(f"series[{number}].fs = {fs!r}: allowed is a number above 0")
+        step = _step(time, data)
+        if step is None:
+            raise ImportFailed(
+                f"series[{number}].time: allowed are evenly spaced instants that increase, one for each of the data"
+            )
+        fs = 1.0 / step
+    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _HIGHEST_HZ:
+        raise ImportFailed(f"series[{number}].fs = {shown(fs)}: allowed is a number above 0")
     return float(fs)
+
+
+def _step(time: Any, data: Any) -> float | None:
+    """Return the time between samples, s; None if these are no instants of evenly spaced samples."""
+    try:
+        instants = np.asarray(time, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    if instants.shape != data.shape or not np.all(np.isfinite(instants)):
+        return None
+    steps = np.diff(instants)
+    step = float(steps.mean())
+    return step if step > 0.0 and np.all(np.abs(steps - step) <= 1e-3 * step) else None

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import ConfigurationError
-from rig.exchange.child_reading import ImportFailed, read_in_child
+from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 
 if TYPE_CHECKING:
     from identification.mapping.csv_layout import CsvLayout
@@ -25,8 +25,6 @@ FORMATS = {
 """Formats that are read, with the suffixes that identify them."""
 EXPORTS = ("mat", "uff", "csv")
 """Formats that are written."""
-
-_LARGEST_JSON_BYTES = 500_000_000
 
 
 def format_of(path: Path, given: str, option: str, known: tuple[str, ...] = tuple(FORMATS)) -> str:
@@ -88,28 +86,14 @@ def _uff(path: Path, units: str) -> dict[str, Any]:
 
 
 def _csv(path: Path, layout: "CsvLayout | None") -> dict[str, Any]:
-    from rig.exchange.csv import read_csv, table_of_ours, units_of_csv
-
-    if table_of_ours(path) is not None and layout is None:
-        return read_csv(path)
-    return {**read_csv(path, layout), "__file_units__": units_of_csv(path) if layout is None else {}}
+    options = {} if layout is None else {"layout": layout.model_dump(mode="json")}
+    found: dict[str, Any] = read_in_child("csv", path, NAMES["csv"], **options)
+    return found
 
 
 def _sep005(path: Path) -> dict[str, Any]:
-    import json
-
-    from rig.exchange.sep005 import data_of_series
-    from rig.system.text_files import read_text
-
-    try:
-        series = json.loads(read_text(path, _LARGEST_JSON_BYTES, ImportFailed))
-    except (ValueError, RecursionError) as error:
-        raise ImportFailed(f"{path}: is no JSON ({error})") from None
-    if not isinstance(series, list) or not all(isinstance(one, Mapping) for one in series):
-        raise ImportFailed(
-            f"{path}: is no list of SEP005 time series, dictionaries with data, name, unit_str, fs or time"
-        )
-    return data_of_series(series)
+    found: dict[str, Any] = read_in_child("sep005", path, NAMES["sep005"])
+    return found
 
 
 def _foreign(path: Path, format_: str) -> dict[str, Any]:
@@ -117,9 +101,7 @@ def _foreign(path: Path, format_: str) -> dict[str, Any]:
 
     The units of HDF5 files are attributes called ``units`` or ``unit``.
     """
-    from rig.exchange.foreign.process import NAMES
-
-    data = read_in_child("rig.exchange.foreign.process", path, NAMES[format_], format_)
+    data: dict[str, Any] = read_in_child(format_, path, NAMES[format_])
     if format_ != "hdf5":
         return data
     if data.get("@format") == "vibrolock":

@@ -10,7 +10,7 @@ from rig.campaigns.evaluation.figure import draw_failure
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
-from rig.drawing.page import page_for
+from rig.drawing.page import check_replaceable, page_for
 from rig.errors import RecordingError
 from rig.figures.curves import View
 from rig.figures.lateness import draw_lateness
@@ -34,12 +34,13 @@ def plot(
     lateness: bool = False,
     labels: Sequence[str] = (),
     view: View | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Draw the contents of ``source`` into ``figure`` (png, pdf or svg, by its suffix).
 
     With ``lateness``, draw the timing of the recording's control loop instead. Of several files, or with ``labels`` or a
-    ``view``, draw the curves alone, over one another (`rig.figures.overlay.overlay`). Raises `RecordingError` if a file cannot
-    be read or the figure cannot be written.
+    ``view``, draw the curves alone, over one another (`rig.figures.overlay.overlay`). Without ``overwrite``, only figures of
+    this program are replaced. Raises `RecordingError` if a file cannot be read or the figure cannot be written.
     """
     sources = [source] if isinstance(source, Path) else list(source)
     if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
@@ -48,6 +49,8 @@ def plot(
         raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
     if figure.exists() and any(one.exists() and figure.samefile(one) for one in sources):
         raise RecordingError(f"{figure}: is the file that is read; choose another name")
+    if not overwrite:
+        check_replaceable(figure)
     size_in, draw = drawing_of(sources, lateness=lateness, labels=labels, view=view)
     with page_for(figure, size_in) as page:
         draw(page)

@@ -19,6 +19,8 @@ class Results:
 
     def __init__(self, path: str) -> None:
         self._path = Path(path).absolute()
+        if self._path.exists() and not _is_result(self._path):
+            raise pytest.UsageError(f"--rig-result {path}: exists already and is no such result; choose another name")
         self._subject: dict[str, Any] = {}
         self._started = datetime.now(UTC).isoformat(timespec="seconds")
         self._tests: dict[str, dict[str, Any]] = {}
@@ -48,6 +50,15 @@ class Results:
             "tests": list(self._tests.values()),
         }
         self._path.write_text(json.dumps(document, indent=2, default=str) + "\n", encoding="utf-8")
+
+
+def _is_result(path: Path) -> bool:
+    try:
+        return {"exit_status", "tests"} <= dict(
+            json.loads(path.read_bytes() or b'{"exit_status": 0, "tests": []}')
+        ).keys()
+    except (OSError, ValueError, TypeError, RecursionError):
+        return False
 
 
 def _reason(why: Any) -> str:

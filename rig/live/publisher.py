@@ -7,7 +7,6 @@ of bins has been raised.
 
 import mmap
 import os
-import shutil
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -19,7 +18,7 @@ import numpy as np
 
 from rig.live.binning import put_bin
 from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
-from rig.live.place import FACTS, FRAME_FILE, LINES, STOP, TRACES, new_folder
+from rig.live.place import FRAME_FILE, LINES, STOP, TRACES, new_folder, remove
 from rig.live.stopping import heeding
 from rig.live.time_left import time_left_s
 from rig.loop.loop import RunningLoop
@@ -88,7 +87,7 @@ class Publisher:
     ) -> None:
         self._remark = remark
         self._failed = False
-        self.folder, self._lock = new_folder()
+        self.folder, self._lock = new_folder(encode(facts, what="facts of the run"))
         try:
             rows = recorded_row(n_channels)
             self._recent: list[np.ndarray] = []  # chunks that hold the last rows, for the frame's window
@@ -100,13 +99,12 @@ class Publisher:
             self._n_bins = 0
             self._torn = False  # the last line, because the memory was full
             self._written = self._lateness = -np.inf
-            (self.folder / FACTS).write_bytes(encode(facts, what="facts of the run"))
             self._lines = os.open(self.folder / LINES, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
             self._frames = _reserved(self.folder / FRAME_FILE, HEAD + FRAME.itemsize + self._most_rows * rows.itemsize)
             self._traces = _reserved(self.folder / TRACES, HEAD + BINS * self._bins.itemsize)
         except BaseException:
             os.close(self._lock)
-            shutil.rmtree(self.folder, ignore_errors=True)
+            remove(self.folder)
             raise
 
     def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
@@ -167,7 +165,7 @@ class Publisher:
         self._frames.close()
         self._traces.close()
         os.close(self._lines)
-        shutil.rmtree(self.folder, ignore_errors=True)
+        remove(self.folder)
         os.close(self._lock)
 
     def __enter__(self) -> Self:

@@ -19,7 +19,7 @@ from rig.rehearsal.files import write_bench, write_plan
 from rig.rehearsal.foreseen import foreseen_by
 from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
 from rig.rehearsal.knowledge import gathered
-from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, draws_path, rehearse
+from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse
 from rig.rehearsal.remedies import Effect, improve
 
 __all__ = [
@@ -119,7 +119,7 @@ def rehearse_into(
         raise RecordingError(f"{output}: is a folder, or in none; the name of a file is wanted")
     journal = draws_path(output)
     if overwrite and output.exists():
-        journal.unlink(missing_ok=True)
+        discard_draws(journal)
     found = rehearse(request, journal, begin_anew=overwrite, progress=listener.draw, jobs=jobs)
     save(found, output)
     journal.unlink(missing_ok=True)

@@ -1,6 +1,7 @@
 """Gives the page's address to a browser through a file that only the user can read: a command line is seen by everybody."""
 
 import os
+import re
 import secrets
 import threading
 import time
@@ -16,6 +17,8 @@ from rig.live.place import base_folder
 __all__ = ["open_in_browser"]
 
 PREFIX = "open-"
+HEAD = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>vibrolock</title>'
+_FILE = re.compile(rf"{PREFIX}[0-9a-f]{{16}}\.html")
 READ_S = 60.0
 """Time after which a browser has read the file, or never will."""
 
@@ -36,15 +39,9 @@ def open_in_browser(url: str, say: Callable[[str], None]) -> Path | None:
 
 def _written(url: str) -> Path:
     folder = base_folder()
-    for left in folder.glob(f"{PREFIX}*.html"):  # of servers that were killed
-        with suppress(OSError):
-            if time.time() - left.stat().st_mtime > READ_S:
-                left.unlink()
+    _remove_old(folder)
     path = folder / f"{PREFIX}{secrets.token_hex(8)}.html"
-    text = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>vibrolock</title>'
-        f'<meta http-equiv="refresh" content="0;url={escape(url)}"></head><body></body></html>'
-    ).encode()
+    text = f'{HEAD}<meta http-equiv="refresh" content="0;url={escape(url)}"></head><body></body></html>'.encode()
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     try:
         with os.fdopen(descriptor, "wb") as stream:
@@ -53,6 +50,17 @@ def _written(url: str) -> Path:
         path.unlink(missing_ok=True)
         raise
     return path
+
+
+def _remove_old(folder: Path) -> None:
+    """Remove the files of servers that were killed, known by name and content."""
+    for left in folder.iterdir():
+        with suppress(OSError):
+            if _FILE.fullmatch(left.name) and time.time() - left.lstat().st_mtime > READ_S:
+                with left.open("rb") as stream:
+                    ours = stream.read(len(HEAD)) == HEAD.encode()
+                if ours:
+                    left.unlink()
 
 
 def _open(uri: str, say: Callable[[str], None]) -> None:

@@ -18,6 +18,7 @@ from rig.recording import jsontext
 
 __all__ = [
     "LARGEST_PAYLOAD",
+    "MAGIC",
     "TWICE",
     "BadBlockError",
     "Block",

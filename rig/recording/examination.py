@@ -6,14 +6,15 @@ from typing import Any
 
 from rig.errors import RecordingError
 
-__all__ = ["LARGEST_RATIO", "MOST_OBJECTS", "check_attributes", "examine", "objects_in"]
+__all__ = ["LARGEST_RATIO", "MOST_OBJECTS", "SMALL_BYTES", "check_attributes", "examine", "objects_in"]
 
 MOST_OBJECTS = 200_000
 """Groups and datasets of a file; a recording of 1000 parts has about 60 000."""
 LARGEST_RATIO = 200
 """Bytes that the datasets may declare per byte of the file; the compression used (LZF) reaches 88 on zeros."""
 
-_SMALL_BYTES = 2**26
+SMALL_BYTES = 2**26
+"""Bytes that the datasets of any file may declare."""
 _LARGEST_CHUNK_BYTES = 2**28
 _LARGEST_ATTRIBUTE_BYTES = 2**16
 _MOST_ATTRIBUTES = 1000
@@ -36,7 +37,7 @@ def examine(file: Any, size: int) -> None:
                 texts += item.size
             else:
                 declared += item.size * dtype.itemsize
-    if declared > max(_SMALL_BYTES, LARGEST_RATIO * size):
+    if declared > max(SMALL_BYTES, LARGEST_RATIO * size):
         raise RecordingError(
             f"its datasets declare {declared} bytes in a file of {size}; allowed are {LARGEST_RATIO} times its size"
         )

@@ -40,8 +40,7 @@ class StoredPart(Part):
             if values.shape != (self.n_rows, *wanted.shape) or values.dtype != wanted.base:
                 raise RecordingError(f"{path}: damaged: {values.name} is {values.dtype} of shape {values.shape}")
 
-    def read(self, start: int, stop: int) -> NDArray[Any]:
-        """Read rows from the datasets of all fields; see ``Part.read``."""
+    def _read_rows(self, start: int, stop: int) -> NDArray[Any]:
         rows = np.empty(stop - start, self.row_dtype)
         for name in self.row_dtype.names or ():
             rows[name] = self._read_field(name, start, stop)

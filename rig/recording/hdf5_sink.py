@@ -17,14 +17,14 @@ __all__ = ["Sink"]
 
 
 class Sink(io.RawIOBase):
-    """A new file at ``path``, replacing what is there; opened and closed as any file object.
+    """A new file at ``path``, where nothing may be; opened and closed as any file object.
 
     Raises:
         OSError: on construction, where it cannot be created.
     """
 
     def __init__(self, path: Path) -> None:
-        self._file = path.open("w+b", buffering=0)
+        self._file = path.open("x+b", buffering=0)
         self._position = 0
         self._held: list[tuple[int, bytes]] = []
         self._error: OSError | None = None

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording import jsontext
 from rig.recording.appending import BlockFile, NameLost
-from rig.recording.blocks import LARGEST_PAYLOAD, TWICE, BlockKind
+from rig.recording.blocks import LARGEST_PAYLOAD, MAGIC, TWICE, BlockKind
 from rig.recording.header import Column, Header, packed
 from rig.recording.journal_blocks import Tail, read_journal
 from rig.recording.journal_contents import JournalContents
 from rig.system.locking import synchronise_folder
 
-__all__ = ["Column", "Header", "JournalWriter", "journal_path", "read_journal", "set_aside"]
+__all__ = ["Column", "Header", "JournalWriter", "check_journal", "journal_path", "read_journal", "set_aside"]
 
 _ROWS_BLOCK_BYTES = 2**20
 
@@ -31,6 +31,14 @@ _ROWS_BLOCK_BYTES = 2**20
 def journal_path(output: str | Path) -> Path:
     """Path of the journal of the recording ``output``: ``OUT.h5`` -> ``OUT.h5.journal``."""
     return Path(f"{output}.journal")
+
+
+def check_journal(path: Path) -> None:
+    """Raise ``RecordingError`` for a file with the name of a journal that is none, not even a damaged one."""
+    with path.open("rb") as stream:
+        start = stream.read(_ROWS_BLOCK_BYTES)
+    if start and MAGIC not in start:
+        raise RecordingError(f"{path}: not a journal of this program; move it away, or choose another name")
 
 
 def set_aside(path: Path) -> Path:

@@ -9,7 +9,9 @@ from rig.errors import RecordingError
 from rig.recording.blocks import TWICE, BadBlockError, Block, BlockKind, Gap, following_block, read_block
 from rig.recording.header import Header
 
-__all__ = ["JournalBlocks", "Tail", "read_journal"]
+__all__ = ["EMPTY", "JournalBlocks", "Tail", "read_journal"]
+
+EMPTY = "is empty: its run was killed before it began, and nothing was recorded; start it again"
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,9 @@ class JournalBlocks:
         except BadBlockError as error:
             second = following_block(stream, 1, size, 1)
             if second is None or second.kind is not BlockKind.HEADER:
-                why = f"at its beginning: {error}" if size else "it is empty"
-                raise RecordingError(f"{self.path}: not a readable journal; {why}") from error
+                if not size:
+                    raise RecordingError(f"{self.path}: {EMPTY}") from None
+                raise RecordingError(f"{self.path}: not a readable journal; at its beginning: {error}") from error
             return replace(second, gap=Gap(second.start, second.sequence, f"{error} (at byte 0)"))
 
     @property

@@ -52,8 +52,7 @@ class JournalPart(Part):
         elif self._n_gaps == MOST_TOLD + 1:
             self.dropped_reason += "; and more of the kind"
 
-    def read(self, start: int, stop: int) -> NDArray[Any]:
-        """Read rows across blocks; see ``Part.read``."""
+    def _read_rows(self, start: int, stop: int) -> NDArray[Any]:
         rows = np.empty(stop - start, self.row_dtype)
         view, itemsize = rows.view(np.uint8).data, self.row_dtype.itemsize
         row, block = start, bisect_right(self._firsts, start) - 1

@@ -12,6 +12,7 @@ from rig.recording.hdf5_sink import Sink
 from rig.recording.header import FORMAT, SCHEMA, check_schema
 from rig.recording.integrity import append_trailer, integrity_of
 from rig.system.locking import synchronise_folder
+from rig.system.whole_file import beginning
 from rig.text.printable import error_text
 
 __all__ = ["file_integrity", "identify", "kind_in", "new_file", "open_file", "open_unchecked", "reading"]
@@ -117,16 +118,18 @@ def kind_in(file: Any) -> str:
 def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]]]:
     """Write an HDF5 file that appears under ``path`` whole or not at all, in place of what was there before.
 
-    It is written as ``PATH.part`` in the same folder, given its digest, forced to the disk and renamed. ``kept`` ends the
-    error's line. Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk is full.
+    It is written as ``PATH.vibrolock-part`` in the same folder, given its digest, forced to the disk and renamed. ``kept``
+    ends the error's line. Yields the open ``h5py.File`` and a function to call after each large write: it raises once the disk
+    is full.
 
     Raises:
         RecordingError: it cannot be written; ``path`` is then as it was.
     """
     import h5py
 
-    part = path.with_name(f"{path.name}.part")
+    part = None
     try:
+        part = beginning(path)
         with Sink(part) as sink:
             with h5py.File(sink, "w", rdcc_nbytes=_CACHE_BYTES) as file:
                 yield file, sink.check
@@ -140,5 +143,6 @@ def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]
         why = error.strerror if isinstance(error, OSError) and error.strerror else error_text(error)
         raise RecordingError(f"{path}: cannot be written ({why}); {kept}") from error
     finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+        if part is not None:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)

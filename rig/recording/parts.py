@@ -75,9 +75,18 @@ class Part(ABC):
         first, last, _ = slice(start, stop).indices(self.n_rows)
         return self._read_field(field, first, max(first, last))
 
-    @abstractmethod
     def read(self, start: int, stop: int) -> NDArray[Any]:
-        """Read rows ``start`` to ``stop`` (0 <= start <= stop <= n_rows): a structured array, ``(stop - start,)``."""
+        """Read rows ``start`` to ``stop``: a structured array, ``(stop - start,)``.
+
+        Raises:
+            RecordingError: there are no such rows, or the file cannot be read any more.
+        """
+        if not 0 <= start <= stop <= self.n_rows:
+            raise RecordingError(f"rows {start} to {stop}: allowed are 0 <= start <= end <= {self.n_rows}")
+        return self._read_rows(start, stop)
+
+    @abstractmethod
+    def _read_rows(self, start: int, stop: int) -> NDArray[Any]: ...
 
     @abstractmethod
     def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]: ...

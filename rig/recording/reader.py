@@ -12,8 +12,10 @@ from rig.recording.hdf5_recording import opened_recording, read_recording
 from rig.recording.header import Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.journal import journal_path
+from rig.recording.journal_blocks import EMPTY
 from rig.recording.journal_contents import JournalContents
 from rig.recording.parts import Part
+from rig.recording.told_values import check_told
 from vibrolock.results import Result
 
 __all__ = ["Part", "RecordedPlan", "Recording"]
@@ -46,9 +48,13 @@ class Recording(Result):
         self.integrity = VERIFIED
         with ExitStack() as stack:
             self._header, self.parts = self._open(stack, journal if _holds_anything(journal) else None)
+            for number, part in enumerate(self.parts, 1):
+                check_told(part, f"{self.path}: part {number}")
             self._stack = stack.pop_all()
 
     def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:
+        if journal is None and not self.path.exists() and journal_path(self.path).exists():
+            raise RecordingError(f"{journal_path(self.path)}: {EMPTY}")
         if journal is None or self.path.exists():
             file, self.integrity = opened_recording(self.path)
             stack.enter_context(file)
@@ -118,7 +124,7 @@ class Recording(Result):
     @property
     def latest(self) -> dict[int, dict[str, Any]]:
         """The last result of each point of the current plan, keyed by the number of the point, in the order of the plan."""
-        results = {int(point["number"]): point for point in self.points}
+        results = self._by_number()
         numbers = self.plans[-1].numbers
         return {n: results[n] for n in (sorted(results) if numbers is None else numbers) if n in results}
 
@@ -126,8 +132,14 @@ class Recording(Result):
     def former(self) -> dict[int, dict[str, Any]]:
         """The last result of each point that an earlier plan asked for and the plan in force does not, by number."""
         asked = self.latest
-        results = {int(point["number"]): point for point in self.points}
+        results = self._by_number()
         return {n: results[n] for n in sorted(results) if n not in asked}
+
+    def _by_number(self) -> dict[int, dict[str, Any]]:
+        for point in self.points:
+            if point.get("number") is None:
+                raise RecordingError(f"{self.path}: part {point['part'] + 1}: a point's number: is missing")
+        return {point["number"]: point for point in self.points}
 
     @property
     def complete(self) -> bool:

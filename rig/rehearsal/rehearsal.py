@@ -4,7 +4,6 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from pathlib import Path
@@ -23,9 +22,10 @@ from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
 from vibrolock.results import Result
 
-__all__ = ["Draw", "Rehearsal", "RehearsalRequest", "draws_path", "rehearse"]
+__all__ = ["Draw", "Rehearsal", "RehearsalRequest", "discard_draws", "draws_path", "rehearse"]
 
 MOST_DRAWS = 100_000
+_HEAD = '{"rehearsal": "'  # beginning of every journal of draws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,6 +142,20 @@ def draws_path(output: Path) -> Path:
     return output.with_name(f"{output.name}.draws")
 
 
+def discard_draws(journal: Path) -> None:
+    """Remove the journal of a rehearsal. Raises `RecordingError` if it is none of this program's, or cannot be removed."""
+    try:
+        with journal.open(encoding="utf-8") as stream:
+            start = stream.read(len(_HEAD))
+        if not _HEAD.startswith(start):
+            raise RecordingError(f"{journal}: holds no draws of a rehearsal; move it away, or choose another name")
+        journal.unlink()
+    except FileNotFoundError:
+        return
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{journal}: cannot be removed ({error})") from None
+
+
 def rehearse(
     request: RehearsalRequest,
     journal: Path | None = None,
@@ -187,7 +201,8 @@ def _begun(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[i
         raise RecordingError(f"{journal}: cannot be read ({error})") from None
     tables = list(_whole_lines(lines))
     if begin_anew and tables[:1] != [head]:
-        _write(journal, [head])
+        discard_draws(journal)
+        _append(journal, head)
         return {}
     if not tables or tables[0] != head:
         raise RecordingError(
@@ -209,8 +224,7 @@ def _whole_lines(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
 
 
 def _write(journal: Path, tables: Sequence[Mapping[str, Any]]) -> None:
-    with suppress(OSError):
-        journal.unlink()
+    discard_draws(journal)
     for table in tables:
         _append(journal, table)
 

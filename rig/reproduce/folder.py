@@ -7,12 +7,14 @@ from typing import Any
 from rig.errors import RecordingError
 from rig.reproduce.options import Options
 from rig.system.text_files import read_text
+from rig.system.whole_file import whole_file
 
-__all__ = ["prepare", "write_json"]
+__all__ = ["begin", "prepare", "write_json"]
 
 
 def prepare(options: Options) -> None:
     """Create the folders; raise `RecordingError` if one contains a study with other settings, or cannot be created."""
+    begin(options.folder, "study.json")
     try:
         options.recordings.mkdir(parents=True, exist_ok=True)
         options.models_folder.mkdir(parents=True, exist_ok=True)
@@ -22,14 +24,22 @@ def prepare(options: Options) -> None:
     _same(options.result("models.json"), options.of_the_models)
 
 
+def begin(folder: Path, first: str) -> None:
+    """Refuse a folder that holds files but not ``first``, the file that a study of this program has from its beginning.
+
+    Raises `RecordingError`.
+    """
+    try:
+        if folder.is_dir() and not (folder / first).exists() and any(folder.iterdir()):
+            raise RecordingError(f"{folder}: holds files that are of no such study; choose an empty or a new folder")
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be read: {error.strerror}") from None
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write a document completely or not at all; raise `RecordingError` if it cannot be written."""
-    new = path.with_name(path.name + ".new")
-    try:
-        new.write_text(json.dumps(value, indent=1), encoding="utf-8")
-        new.replace(path)
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be written: {error.strerror}") from None
+    with whole_file(path) as part:
+        part.write_text(json.dumps(value, indent=1), encoding="utf-8")
 
 
 def _same(path: Path, settings: dict[str, Any]) -> None:

@@ -9,7 +9,18 @@ from rig.errors import RecordingError, RigError
 from rig.system.locking import synchronise_folder
 from rig.text.printable import error_text
 
-__all__ = ["whole_file"]
+__all__ = ["beginning", "whole_file"]
+
+
+def beginning(path: Path) -> Path:
+    """Return the path beside ``path`` under which a file is begun. None but this program uses it; nothing is there now.
+
+    Raises:
+        OSError: what a killed process has left there cannot be removed.
+    """
+    part = path.with_name(f"{path.name}.vibrolock-part")
+    part.unlink(missing_ok=True)
+    return part
 
 
 @contextmanager
@@ -18,9 +29,10 @@ def whole_file(path: Path) -> Iterator[Path]:
 
     Raises `RecordingError` with the system's reason if that fails; ``path`` is then unchanged.
     """
-    part = path.with_name(f"{path.name}.part")
+    part = None
     try:
-        part.write_bytes(b"")
+        part = beginning(path)
+        part.touch(exist_ok=False)
         yield part
         with part.open("rb+") as stream:
             os.fsync(stream.fileno())
@@ -31,8 +43,9 @@ def whole_file(path: Path) -> Iterator[Path]:
     except Exception as error:  # the libraries of the formats hide the system's error in one of their own
         raise RecordingError(f"{path}: cannot be written ({_reason(error)}); nothing was changed") from error
     finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
+        if part is not None:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
 
 
 def _reason(error: BaseException) -> str:

@@ -47,6 +47,11 @@ def test_emulator_and_firmware_do_the_same(program: Path, hosts: list[Host]) -> 
         assert [str(one) for one in differences(host.python, firmware)] == [], f"seed {seed}"
 
 
+def test_disarmed_and_armed_20_us_apart_both_put_out_0_v(program: Path) -> None:
+    host = random_script(990327, 150)
+    assert [str(one) for one in differences(host.python, run_firmware(program, host.python.script(host.events)))] == []
+
+
 def test_the_scripts_come_to_all_that_can_happen(hosts: list[Host]) -> None:
     flags: Counter[int] = Counter()
     counted: Counter[str] = Counter()

@@ -7,12 +7,14 @@ Unknown keys are ignored. Keys of parts that are missing, as in files of earlier
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
-from types import NoneType
-from typing import Any, TypeVar, get_args, get_type_hints, overload
+from types import NoneType, UnionType
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints, overload
 
 import numpy as np
 
 from rig.campaigns.evaluation.point import ARRAY, PAIRS, PART, Point, Quality
+from rig.errors import RecordingError
+from rig.text.printable import shown
 
 __all__ = ["as_complex", "as_pairs", "names_of", "point_from", "stored", "value_of"]
 
@@ -71,10 +73,13 @@ def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Poi
     """Return a point from its JSON form.
 
     ``result`` is the class of the results that only its kind of campaign has; if None, the point has no such results. Raises
-    KeyError if a key is missing that points of all versions have.
+    RecordingError if a key is missing that points of all versions have, or a value is of another type.
     """
     table = {FORMER.get(key, key): value for key, value in table.items()}
-    point: Point[Any] = _read(Point, {**table, "quality": _quality(table)}, result)
+    try:
+        point: Point[Any] = _read(Point, {**table, "quality": _quality(table)}, result)
+    except KeyError as error:
+        raise RecordingError(f"a point's {error.args[0]}: is missing") from None
     return point
 
 
@@ -100,19 +105,53 @@ def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) 
             if one.default is MISSING:
                 found[one.name] = table[one.name] if kind is Point and not optional else None
             continue
-        value = table[one.name]
+        found[one.name] = _value(one, inner, table[one.name])
+    return kind(**found)
+
+
+def _value(one: Field[Any], inner: type[Any] | None, stored_value: Any) -> Any:
+    """Return the value of a field from its JSON form; raise RecordingError for one of another type."""
+    value = stored_value
+    try:
         if one.name == "quality":
-            value = Quality(value) if value in set(Quality) else Quality.REJECTED
-        elif value is not None and one.metadata == PAIRS:
-            value = as_complex(value)
-        elif value is not None and one.metadata == ARRAY:
-            value = np.asarray(value, float)
-        elif isinstance(value, list):
+            return Quality(value) if value in set(Quality) else Quality.REJECTED
+        if value is not None and one.metadata == PAIRS:
+            return as_complex(value)
+        if value is not None and one.metadata == ARRAY:
+            return np.asarray(value, float)
+        if isinstance(value, list):
             value = tuple(_read(inner, item) for item in value) if inner is not None else _tuples(value)
         elif isinstance(value, Mapping) and inner is not None:
             value = _read(inner, value)
-        found[one.name] = value
-    return kind(**found)
+    except (ValueError, TypeError, LookupError, AttributeError, OverflowError):
+        fits = False
+    else:
+        fits = value is None or _fits(value, one.type)
+    if not fits:
+        raise RecordingError(f"a point's {one.name} = {shown(stored_value)}: is not what a recording holds there")
+    return value
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Return whether a value is of a type; of types that JSON does not have, everything is."""
+    options = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    return any(_is(value, option) for option in options)
+
+
+def _is(value: Any, kind: Any) -> bool:
+    if kind in (float, int):
+        return isinstance(value, float | int) and not isinstance(value, bool)
+    if kind in (bool, str, NoneType):
+        return isinstance(value, kind)
+    if get_origin(kind) is Literal:
+        return value in get_args(kind)
+    if get_origin(kind) is tuple:
+        inside = get_args(kind)
+        if not isinstance(value, tuple) or (inside[-1] is not Ellipsis and len(value) != len(inside)):
+            return False
+        kinds = inside[:1] * len(value) if inside[-1] is Ellipsis else inside
+        return all(item is None or _fits(item, one) for item, one in zip(value, kinds, strict=True))
+    return True
 
 
 def _first_key(kind: Any) -> str:

@@ -135,6 +135,11 @@ class MultisinePlan(OpenLoopPlan):
         self.check_frequencies(bench, lowest_hz=self.lowest_hz, highest_hz=self.highest_hz)
         design = self.design(bench.sample_rate_hz)
         most = LARGEST_WAVEFORMS // design.period_samples
+        if most < 1:
+            raise ConfigurationError(
+                f"resolution_hz = {self.resolution_hz:g} Hz: a period has {design.period_samples} samples at "
+                f"{bench.sample_rate_hz:g} samples/s; allowed are {LARGEST_WAVEFORMS}"
+            )
         if self.realisations > most:
             raise ConfigurationError(
                 f"realisations = {self.realisations}: allowed is up to {most} of {design.period_samples} samples, "

@@ -60,11 +60,7 @@ class LockedPlan(KnownPlant, Plan):
                 f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
                 f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
             )
-        highest = int(bench.sample_rate_hz / window[1] / 2.0) - 2
-        if self.harmonics > highest:
-            raise ConfigurationError(
-                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s"
-            )
+        self.check_evaluated(self.harmonics, bench, window[1], spare=2)
         if window[0] < allowed[0] or window[1] > allowed[1]:
             raise ConfigurationError(
                 f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"

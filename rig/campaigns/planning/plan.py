@@ -167,6 +167,20 @@ class Plan(Configured):
         """Return the waveforms of unit peak that the segments play, float64[n, period]; None if they play none."""
         return None
 
+    def check_evaluated(self, harmonics: int, bench: Bench, highest_hz: float, spare: int) -> None:
+        """Refuse more ``harmonics`` of a frequency than are measured: ``spare`` fewer than half the samples of a period."""
+        rate_hz = bench.sample_rate_hz
+        most = int(rate_hz / highest_hz / 2.0) - spare
+        if most < 1:
+            raise ConfigurationError(
+                f"{highest_hz:g} Hz: is too high for {rate_hz:g} samples/s of the bench {bench.name}; allowed is up to "
+                f"{rate_hz / (2.0 * (1 + spare)):g} Hz"
+            )
+        if harmonics > most:
+            raise ConfigurationError(
+                f"harmonics = {harmonics}: allowed is up to {most} of {highest_hz:g} Hz at {rate_hz:g} samples/s"
+            )
+
     @abstractmethod
     def check(self, bench: Bench) -> None:
         """Raise `ConfigurationError`, before anything moves, for what the bench cannot do."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
-from rig.recording.journal import journal_path
+from rig.recording.journal import check_journal, journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.system.locking import exclusive
 
@@ -25,6 +25,8 @@ def make_way(output: Path, overwrite: bool) -> None:
                 raise RecordingError(f"{path}: exists already; choose another name, or `overwrite`")
         if output.exists():
             kind_of(output)  # only files of this program are overwritten
+        if journal_path(output).exists():
+            check_journal(journal_path(output))
     except OSError as error:
         raise RecordingError(f"{output}: cannot be used ({error.strerror})") from None
 
@@ -57,17 +59,18 @@ def put_back(output: Path) -> str:
     their journal is the recording now; the old one is removed once this journal has become a file (`forget_before`).
 
     Returns:
-        One line that says what was put back; empty if nothing was.
+        One line that says what was put back or removed; empty if nothing was.
     """
-    journal = journal_path(output)
+    journal, told = journal_path(output), ""
     if journal.exists():
         with exclusive(journal):  # refuses if that run is still writing
             if _holds_a_part(journal):
                 return ""
             journal.unlink()
+            told = f"{output}: a run into it was killed before it began; nothing was recorded"
     left = [path for path in (output, journal) if _before(path).exists()]
     if not left or output.exists():
-        return ""
+        return told
     for path in left:
         _before(path).replace(path)
     return f"{output}: a run that was to overwrite it was killed before it began; the recording is back under its name"
@@ -88,7 +91,7 @@ def _holds_a_part(journal: Path) -> bool:
 
 
 def _before(path: Path) -> Path:
-    return path.with_name(path.name + ".before")
+    return path.with_name(f"{path.name}.vibrolock-before")  # a name that none but this program uses
 
 
 def _moved(path: Path) -> Path:

@@ -10,7 +10,6 @@ from controller import AmplitudeLaw
 from rig.bench import Bench
 from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.plan import Target, TonePlan
-from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
 
@@ -143,9 +142,4 @@ class SteppedSinePlan(TonePlan):
         frequencies = self.frequencies_at_each_level
         self.check_levels(bench, (min(frequencies), max(frequencies)))
         self.check_frequencies(bench, **{"lowest frequency": min(frequencies), "highest frequency": max(frequencies)})
-        highest = int(bench.sample_rate_hz / max(frequencies) / 2.0) - 1
-        if self.harmonics > highest:
-            raise ConfigurationError(
-                f"harmonics = {self.harmonics}: allowed is up to {highest} at {bench.sample_rate_hz:g} samples/s and "
-                f"{max(frequencies):g} Hz"
-            )
+        self.check_evaluated(self.harmonics, bench, max(frequencies), spare=1)

@@ -9,25 +9,28 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["DEEPEST", "MOST_BYTES", "Budget", "plain_dataset", "read_hdf5"]
+from rig.exchange.child_values import TooMuchData, most_bytes
 
-MOST_BYTES = 2_000_000_000
+__all__ = ["DEEPEST", "Budget", "plain_dataset", "read_hdf5"]
+
 DEEPEST = 32
 _MOST_ITEMS = 100_000
+_TEXT_BYTES = 100
 _PLAIN = "biufc"
 
 
 class Budget:
-    """Bytes and items that may still be read; `spend` raises ValueError beyond them."""
+    """Bytes and items that may still be read; `spend` raises TooMuchData or ValueError beyond them."""
 
-    def __init__(self) -> None:
-        self._bytes, self._items = MOST_BYTES, _MOST_ITEMS
+    def __init__(self, path: Path) -> None:
+        self._most = self._bytes = most_bytes(path)
+        self._items = _MOST_ITEMS
 
     def spend(self, size: int) -> None:
         """Count one item of ``size`` bytes."""
         self._bytes, self._items = self._bytes - size, self._items - 1
         if self._bytes < 0:
-            raise ValueError(f"it holds more than {MOST_BYTES} bytes of data")
+            raise TooMuchData(self._most)
         if self._items < 0:
             raise ValueError(f"it holds more than {_MOST_ITEMS} items")
 
@@ -37,7 +40,7 @@ def read_hdf5(path: Path) -> dict[str, Any]:
     import h5py
 
     with h5py.File(path, "r") as file:
-        return {**dict(_attributes(file, "")), **_group(file, Budget(), ())}
+        return {**dict(_attributes(file, "")), **_group(file, Budget(path), ())}
 
 
 def _group(group: Any, budget: Budget, above: tuple[Any, ...]) -> dict[str, Any]:
@@ -70,8 +73,26 @@ def plain_dataset(item: Any, budget: Budget) -> Any:
         return "<data in another file>"
     if item.shape is None:
         return np.zeros(0)
-    budget.spend(int(np.prod(item.shape, dtype=float)) * item.dtype.itemsize)
+    if not _is_plain(item.dtype):
+        return f"<{item.dtype}>"
+    budget.spend(int(np.prod(item.shape, dtype=float)) * _size(item.dtype))
     return _plain(item[()], item.dtype)
+
+
+def _is_plain(dtype: Any) -> bool:
+    """Return whether a type has numbers or texts, at least in one column: others are not read, lists could be of any length."""
+    import h5py
+
+    if dtype.names:
+        return any(_is_plain(dtype[name]) for name in dtype.names)
+    return dtype.kind in f"{_PLAIN}S" or h5py.check_string_dtype(dtype) is not None
+
+
+def _size(dtype: Any) -> int:
+    """Return the memory of one value, bytes; each text becomes an object."""
+    if dtype.names:
+        return sum(_size(dtype[name]) for name in dtype.names)
+    return int(dtype.itemsize) + (_TEXT_BYTES if dtype.kind in "SO" else 0)
 
 
 def _plain(value: Any, dtype: Any) -> Any:

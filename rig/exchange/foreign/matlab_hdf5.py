@@ -18,7 +18,7 @@ def read_matlab_hdf5(path: Path) -> dict[str, Any]:
     """Return the variables of a file; raise OSError, ValueError or errors of h5py if it cannot be read."""
     import h5py
 
-    budget = Budget()
+    budget = Budget(path)
     with h5py.File(path, "r") as file:
         return {
             name: _link(file, name, file, budget, 0)

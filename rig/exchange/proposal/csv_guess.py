@@ -8,12 +8,10 @@ from typing import Literal
 
 from identification.mapping.csv_layout import CsvLayout
 from identification.mapping.units import UNITS
-from rig.exchange.child_reading import ImportFailed
-from rig.system.text_files import read_text
+from rig.exchange.csv import table_lines
 
 __all__ = ["guessed_layout"]
 
-_LARGEST_BYTES = 1_000_000_000
 _LOOKED_AT = 100
 _ALIKE = 3
 Separator = Literal[",", ";", "\t", " "]
@@ -25,12 +23,7 @@ _NUMBER = {
 
 def guessed_layout(path: Path) -> CsvLayout | None:
     """Return the layout; None if the file begins with one line of names (and one of units), or no table is found."""
-    lines = [
-        line
-        for line in read_text(path, _LARGEST_BYTES, ImportFailed).splitlines()
-        if line.strip() and not line.startswith("#")
-    ]
-    lines = list(islice(lines, _LOOKED_AT))
+    lines = [line for _, line in islice(table_lines(path), _LOOKED_AT)]
     for separator, decimal in ((",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")):
         first = _first_row(lines, separator, decimal)
         if first is None:
@@ -56,7 +49,10 @@ def _known(separator: str) -> Separator:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    cells = line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
+    try:
+        cells = line.split() if separator == " " else next(csv.reader([line], delimiter=separator))
+    except csv.Error:
+        return [line]
     return [cell.strip() for cell in cells]
 
 

@@ -2,19 +2,20 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.mapping.csv_layout import CsvLayout
-from rig.exchange.child_reading import ImportFailed
+from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
 from rig.exchange.proposal.csv_guess import guessed_layout
 from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_of, rate_in, role_of, transient_periods
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
 
-__all__ = ["proposed_mapping"]
+__all__ = ["proposed", "proposed_mapping"]
 
 _FEWEST_SAMPLES = 16
 _MOST_CHANNELS = 16
@@ -37,9 +38,18 @@ def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") 
     ImportFailed
         If a file cannot be read, or holds no array long enough to be a signal.
     """
-    first = paths[0]
+    for number, path in enumerate(paths):
+        format_of(path, format_ if not number else "", "`format`")
+    others = [str(path) for path in paths[1:]]
+    found = read_in_child("proposal", paths[0], "file of time data", others=others, format_=format_, units=units)
+    return found["text"], tuple(found["missing"])
+
+
+def proposed(first: Path, others: Sequence[str], format_: str, units: str) -> dict[str, Any]:
+    """Return text and what is missing, see `proposed_mapping`; in a child process, for what files hold may be large."""
     layout = None
     found: list[FileContents] = []
+    paths = [first, *map(Path, others)]
     for number, path in enumerate(paths):
         if path.parent.resolve() != first.parent.resolve():
             raise ImportFailed(
@@ -52,7 +62,7 @@ def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") 
     proposal = _proposal(found, first, layout)
     forms = [format_of(path, format_ if not number else "", "`format`") for number, path in enumerate(paths)]
     relative = {path.name if number else "" for number, path in enumerate(paths) if forms[number] == "wav"}
-    return text_of(proposal, found, [path.name for path in paths], relative), proposal.missing
+    return {"text": text_of(proposal, found, [path.name for path in paths], relative), "missing": proposal.missing}
 
 
 def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | None) -> Proposal:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError
-from rig.exchange.child_reading import ImportFailed
+from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.uff.units import file_units
 from rig.system.text_files import read_bytes
 
-__all__ = ["Dataset", "degree_of", "read_uff", "time_data_in"]
+__all__ = ["Dataset", "datasets_in", "degree_of", "read_uff", "time_data_in"]
 
 Dataset = Mapping[str, Any]
 LARGEST_BYTES = 2_000_000_000
@@ -21,6 +21,12 @@ _DIRECTION = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 
 
 def read_uff(path: Path) -> list[Dataset]:
+    """Return what `datasets_in` reads, by a child process; raise `ImportFailed` as it does."""
+    found: list[Dataset] = read_in_child("uff", path, NAMES["uff"])
+    return found
+
+
+def datasets_in(path: Path) -> list[Dataset]:
     """Return datasets 55, 58, 151 and 164 of a universal file, in their order.
 
     Raises `ImportFailed` if the file is missing, not a universal file or cut short, or if a dataset cannot be read.

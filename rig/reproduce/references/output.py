@@ -5,7 +5,7 @@ from typing import Any
 
 from rig.errors import RecordingError
 from rig.models.files.files import save
-from rig.reproduce.folder import write_json
+from rig.reproduce.folder import begin, write_json
 from rig.reproduce.references.data import DataSet
 from rig.reproduce.references.figure import draw_reference
 from rig.reproduce.references.result import OURS, Line, StudyResult
@@ -17,7 +17,8 @@ RESULTS = "reference.json"
 
 
 def prepared(folder: Path) -> None:
-    """Make the folder; raise `RecordingError` if that fails, before anything is computed."""
+    """Make the folder; raise `RecordingError` if that fails or it holds other files, before anything is computed."""
+    begin(folder, RESULTS)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

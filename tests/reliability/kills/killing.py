@@ -158,7 +158,7 @@ def _look(case: Case, output: Path, witness: Path, before: np.ndarray | None, fo
 
 def _nothing_recorded(output: Path, before: np.ndarray | None, found: Outcome) -> None:
     """Killed before the first row: an old recording is there, under its name or, until somebody asks for it, another."""
-    aside = output.with_name(output.name + ".before")
+    aside = output.with_name(output.name + ".vibrolock-before")
     if before is not None and not (output.exists() or aside.exists()):
         found.wrong.append("the recording that was to be overwritten is gone")
 

@@ -76,7 +76,7 @@ def objections(ended: Ended, output: Path, *, succeeds: bool) -> list[str]:
     if not succeeds and not (last[0].startswith("rig: ") or ended.output):
         wrong.append(f"nothing said: {ended.complaint[-300:]!r}")
     if output.parent.is_dir():
-        wrong += [f"left behind: {path.name}" for path in output.parent.glob("*.part")]
+        wrong += [f"left behind: {path.name}" for path in output.parent.glob("*.vibrolock-part")]
     if output.exists() or journal_path(output).exists():
         try:
             with Recording(output) as recording:

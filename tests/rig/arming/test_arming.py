@@ -426,7 +426,7 @@ def test_a_campaign_that_dies_leaves_a_caution(monkeypatch, tmp_path):
 
 @pytest.mark.usefixtures("physical")
 def test_where_nothing_can_be_remembered_nothing_moves(monkeypatch, tmp_path):
-    memory_path(bench()).with_name(memory_path(bench()).name + ".part").mkdir(parents=True)
+    memory_path(bench()).with_name(memory_path(bench()).name + ".vibrolock-part").mkdir(parents=True)
     started = Started(monkeypatch, as_ever)
     output = tmp_path / "run.h5"
     with pytest.raises(RecordingError, match="cannot be written"):
@@ -452,13 +452,13 @@ def test_a_start_that_fails_leaves_the_earlier_recording_its_journal_and_no_trip
     output = tmp_path / "run.h5"
     with rig.run(PLAN, bench=bench(), output=output, arm=True):
         pass
-    journal_path(output).write_bytes(b"left by an earlier run")
+    journal_path(output).write_bytes(b"VLJB left by an earlier run")
     before = output.read_bytes()
     Started(monkeypatch, refused)
     with pytest.raises(DaqRefused):
         rig.run(PLAN, bench=bench(), output=output, arm=True, overwrite=True)
     assert output.read_bytes() == before
-    assert journal_path(output).read_bytes() == b"left by an earlier run"
+    assert journal_path(output).read_bytes() == b"VLJB left by an earlier run"
     journal_path(output).unlink()
     with pytest.raises(DaqRefused):
         rig.resume(output, plan=plan_with(levels_v=(0.4, 0.5), record_periods=4), arm=True)

@@ -110,6 +110,21 @@ def test_disarmed_and_armed_again_within_a_block_it_leaves_what_it_has_put_out()
     np.testing.assert_array_equal(bench.plant.output_v[60:70], [1, 1, 1, 0, 0, 0, 1, 1, 1, 1])
 
 
+def test_disarmed_and_armed_again_between_two_samples_it_holds_0_v() -> None:
+    """No sample of 0 V was put out between the two, but the converter was at 0 V."""
+    bench = Bench()
+    bench.armed(watchdog_s=10.0)
+    bench.drive(4, 1.0)
+    bench.pass_time(0.05 + 0.2 / RATE_HZ)
+    held = bench.plant.output_v.size
+    assert bench.plant.output_v[-1] == 1.0
+    bench.ask(Command.DISARM)
+    assert bench.ask(Command.ARM, value=ARM_KEY).status == Status.DONE
+    bench.pass_time(0.03)
+    assert bench.plant.output_v.size > held
+    np.testing.assert_array_equal(bench.plant.output_v[held + 1 :], 0.0)
+
+
 def test_an_output_does_not_take_the_place_of_one_that_is_due_in_the_block_under_way() -> None:
     bench = Bench()
     bench.armed(watchdog_s=10.0)

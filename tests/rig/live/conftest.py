@@ -13,7 +13,11 @@ from tests.docs.pages import ROOT
 def place(monkeypatch, tmp_path):
     """The folder in which the runs of a test are found."""
     monkeypatch.setenv("VIBROLOCK_LIVE", str(tmp_path / "live"))
-    return tmp_path / "live"
+    return (
+        tmp_path
+        / "live"
+        / f"vibrolock-{os.getuid() if sys.platform != 'win32' else os.environ.get('USERNAME', 'user')}"
+    )
 
 
 @pytest.fixture

@@ -315,7 +315,7 @@ def test_a_journal_has_one_writer_at_a_time(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "it is empty"),
+        (b"", "is empty: its run was killed before it began"),
         (b"hello, world", "no block begins there"),
         (b"VLJB\x01", "the file ends within a block's head"),
     ],

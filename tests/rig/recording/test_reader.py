@@ -262,3 +262,15 @@ def test_points_that_count_follow_the_plan_in_force_and_earlier_results_give_way
         assert after.points == points
         assert after.latest == {3: points[3], 1: points[4]}
         assert [plan.plan for plan in after.plans] == [header().configuration["plan"], {"levels_n": [0.56, 0.1]}]
+
+
+def test_a_journal_of_0_bytes_is_said_to_be_of_a_run_that_never_began(tmp_path, command):
+    (tmp_path / "OUT.h5.journal").touch()
+    for typed in (
+        "show OUT.h5",
+        "plot OUT.h5 -o x.png",
+        "resume OUT.h5",
+        "report OUT.h5 -o x.html",
+        "export OUT.h5 -o x.mat",
+    ):
+        assert "OUT.h5.journal: is empty: its run was killed before it began" in command(typed).err

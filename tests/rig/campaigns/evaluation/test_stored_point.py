@@ -12,6 +12,7 @@ from rig.campaigns.dwell.points import DwellResult
 from rig.campaigns.evaluation.point import Attempt, Quality, RowRange, point_name
 from rig.campaigns.evaluation.stored_point import as_complex, as_pairs, names_of, point_from, stored, value_of
 from rig.campaigns.kinds import KINDS
+from rig.errors import RecordingError
 from tests.docs.test_file_format import PLANS
 from tests.rig.campaigns.made_points import made_point, made_vibration
 
@@ -66,7 +67,7 @@ def test_keys_that_an_earlier_version_did_not_write_are_none_and_unknown_ones_ar
 
 
 def test_a_point_without_a_number_is_refused():
-    with pytest.raises(KeyError, match="number"):
+    with pytest.raises(RecordingError, match="a point's number: is missing"):
         point_from({"accepted": True})
 
 

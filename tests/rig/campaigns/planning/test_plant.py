@@ -273,3 +273,14 @@ def test_a_plant_with_a_wrong_key_is_named():
     table["plant"]["damping"] = 0.1
     with pytest.raises(ConfigurationError, match=r"plant\.damping: unknown key"):
         plan_from(table, "plan")
+
+
+@pytest.mark.parametrize(("highest_hz", "spare"), [(1000.0, 2), (3000.0, 2), (2000.0, 1), (500000.0, 1)])
+def test_a_frequency_too_high_for_any_harmonic_is_named_with_the_highest_allowed(highest_hz, spare):
+    plan, bench = load_plan("magnet-beam/backbone"), load_bench("magnet-beam")
+    with pytest.raises(
+        ConfigurationError, match=f"{highest_hz:g} Hz: is too high for 5000 samples/s.*up to (.*) Hz"
+    ) as refused:
+        plan.check_evaluated(7, bench, highest_hz, spare)
+    allowed_hz = float(str(refused.value).split()[-2])
+    plan.check_evaluated(1, bench, allowed_hz, spare)

@@ -18,7 +18,7 @@ def killed(tmp_path):
     journal(journal_path(output), 300)
     finalise(journal_path(output), output)
     good = output.read_bytes()
-    output.rename(tmp_path / "OUT.h5.before")
+    output.rename(tmp_path / "OUT.h5.vibrolock-before")
     return output, good
 
 
@@ -40,7 +40,7 @@ def test_a_journal_with_rows_has_taken_its_place_and_the_old_recording_goes_when
     assert put_back(output) == ""
     with Recording(output) as recording:
         assert recording.n_rows == 50
-    assert (output.parent / "OUT.h5.before").exists()
+    assert (output.parent / "OUT.h5.vibrolock-before").exists()
 
 
 def test_the_next_run_and_the_next_resumption_put_it_back_and_say_so(killed, monkeypatch):

@@ -1,0 +1,75 @@
+"""Values that a part of a recording tells: refused where a file is opened, so that whatever reads them can rely on them.
+
+What the fields of points mean is checked where points are read (`rig.campaigns.evaluation.stored_point`).
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from rig.errors import RecordingError
+from rig.text.printable import shown
+
+__all__ = ["LARGEST_NUMBER", "check_told"]
+
+LARGEST_NUMBER = 1e100
+"""A finite number beyond it is no measurement; its square could be no number any more."""
+_LARGEST_INTEGER = 2**63
+_DEEPEST = 32
+_COUNTS = ("number", "sample", "row", "stride", "first_sample", "end_sample")
+_TEXTS = ("what", "text", "reason", "quality", "level_unit")
+_TRUTHS = ("accepted", "tripped", "completed")
+
+
+def check_told(part: Any, where: str) -> None:
+    """Check points, events, information and end of a part (`rig.recording.parts.Part`).
+
+    Raises:
+        RecordingError: it names the value and what is allowed, after ``where``.
+    """
+    ends = {} if part.end is None else {"end": part.end}
+    tables = {
+        "information": part.information,
+        **ends,
+        **{f"points[{number}]": point for number, point in enumerate(part.points)},
+        **{f"events[{number}]": event for number, event in enumerate(part.events)},
+    }
+    for name, table in tables.items():
+        for key, value, allowed in _faults(table, name):
+            raise RecordingError(f"{where}: {key} = {shown(value)}: allowed is {allowed}")
+    for number, event in enumerate(part.events):
+        if event.get("what") == "telemetry" and not all(
+            event.get(key) is not None for key in ("row", "sample", "stride")
+        ):
+            raise RecordingError(
+                f"{where}: events[{number}]: allowed is an event telemetry with row, sample and stride"
+            )
+
+
+def _faults(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, Any, str]]:
+    """Yield key, value and what is allowed for each value that is not allowed."""
+    for key in _COUNTS:
+        least = int(key == "stride")
+        if (value := table.get(key)) is not None and (type(value) is not int or not least <= value < _LARGEST_INTEGER):
+            yield f"{name}.{key}", value, f"a whole number from {least}"
+    for key in _TEXTS:
+        if not isinstance(value := table.get(key), str | None):
+            yield f"{name}.{key}", value, "a text"
+    for key in _TRUTHS:
+        if not isinstance(value := table.get(key), bool | None):
+            yield f"{name}.{key}", value, "true or false"
+    yield from _too_large(table, name, 0)
+
+
+def _too_large(value: Any, name: str, depth: int) -> Iterator[tuple[str, Any, str]]:
+    if isinstance(value, float | int):
+        if LARGEST_NUMBER < abs(value) < float("inf"):
+            yield name, value, f"a number up to {LARGEST_NUMBER:g}"
+    elif isinstance(value, dict | list):
+        if depth > _DEEPEST:
+            yield name, "...", f"a value of up to {_DEEPEST} levels"
+            return
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, item in items:
+            if item.__class__ is float and -LARGEST_NUMBER <= item <= LARGEST_NUMBER:
+                continue  # nearly all of them
+            yield from _too_large(item, f"{name}.{key}" if isinstance(value, dict) else f"{name}[{key}]", depth + 1)
