@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from rig.bench import Bench
 from rig.conformance.contract import DriverContract
 from rig.conformance.loopback import with_loopback
-from rig.conformance.subject import NotApplicable
-from rig.conformance.timing import SLOW_TEST
-from rig.conformance.ways_out import KILLING_TEST, last_output_v
+from rig.conformance.subject import NotApplicable, Unproven
+from rig.conformance.timing import SLOW_TESTS
+from rig.conformance.without_host import KILLING_TEST, last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
+from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqError, NotArmed
 
 __all__ = ["Finding", "check_driver", "require_arming"]
@@ -22,11 +25,11 @@ __all__ = ["Finding", "check_driver", "require_arming"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of one test of the contract; ``detail`` says why it failed or did not apply."""
+    """Result of one test of the contract; ``detail`` says why it failed, did not apply, or what would prove it."""
 
     test: str
     duty: str
-    outcome: Literal["passed", "failed", "not applicable"]
+    outcome: Literal["passed", "failed", "not applicable", "unproven"]
     detail: str = ""
 
 
@@ -49,8 +52,19 @@ class _OnBench(DriverContract):
     def witness(self, daq: DAQ | None) -> float | None:
         return super().witness(daq) if self._output_log is None else last_output_v(self._output_log)
 
+    def known_inputs(self, outputs: np.ndarray, block: int) -> np.ndarray | None:
+        """Those of a virtual rig of the same bench."""
+        if self._bench.driver.name != "virtual":
+            return None
+        with VirtualDAQ(self._bench) as known:
+            known.start(block)
+            return np.vstack([known.exchange(part.copy()) for part in outputs.reshape(-1, block)])
+
     def skip(self, reason: str) -> None:
         raise NotApplicable(reason)
+
+    def unproven(self, reason: str) -> None:
+        raise Unproven(reason)
 
 
 def require_arming(bench: Bench, arm: bool) -> None:
@@ -77,11 +91,11 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     contract = _OnBench(bench, output_log)
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
     slow = False
-    for name in sorted(names, key=lambda name: name != SLOW_TEST):
+    for name in sorted(names, key=lambda name: name not in SLOW_TESTS):
         found = _found(contract, name) if not slow else _left_out(contract, name)
         yield found
         _clear_after(found, name, contract)
-        slow = slow or (name == SLOW_TEST and found.outcome == "failed")
+        slow = slow or (name in SLOW_TESTS and found.outcome == "failed")
 
 
 def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
@@ -97,6 +111,8 @@ def _found(contract: DriverContract, name: str) -> Finding:
     words, duty = _words(contract, name)
     try:
         getattr(contract, name)()
+    except Unproven as reason:
+        return Finding(words, duty, "unproven", str(reason))
     except NotApplicable as reason:
         return Finding(words, duty, "not applicable", str(reason))
     except Exception as error:  # a driver may fail in any way: that is what is looked for
