@@ -40,7 +40,7 @@ class GoneTests(TimingTests):
                 host_was_late = host.was_late(began, time.perf_counter())
         finally:
             daq.close()
-        assert daq.state is State.CLOSED
+        assert daq.state is State.CLOSED, f"after close the driver is {daq.state.value}"
         for what, taken_s in (("exchange", closing_s - before_s), ("close", closed_s - closing_s)):
             if taken_s > self.prompt_s and host_was_late:
                 self.unproven("this machine was too busy to say who was late: try again when it is idle")

@@ -14,7 +14,6 @@ from rig.errors import DaqRefused
 __all__ = ["LifeCycleTests"]
 
 CYCLES = 3
-ENDING_S = 1.0  # that a thread may take to end
 DESCRIPTORS = Path("/proc/self/fd")
 
 
@@ -23,7 +22,8 @@ class LifeCycleTests(DriverUnderTest):
 
     def test_nothing_is_opened_by_the_constructor(self) -> None:
         """A driver that was made and thrown away leaves no trace."""
-        assert self.make().state is State.CLOSED
+        state = self.make().state
+        assert state is State.CLOSED, f"a driver that was only made is {state.value}"
 
     def test_the_life_cycle_is_open_start_stop_close(self) -> None:
         """Every step leads to its state."""
@@ -37,7 +37,7 @@ class LifeCycleTests(DriverUnderTest):
         try:
             for step, state in steps:
                 step()
-                assert daq.state is state
+                assert daq.state is state, f"after {step.__name__} the driver is {daq.state.value}, not {state.value}"
         finally:
             daq.close()
 
@@ -49,7 +49,7 @@ class LifeCycleTests(DriverUnderTest):
         daq.start(1)
         daq.close()
         daq.close()
-        assert daq.state is State.CLOSED
+        assert daq.state is State.CLOSED, f"after close the driver is {daq.state.value}"
 
     def test_a_driver_may_be_opened_again(self) -> None:
         """After close, the same object works once more."""
@@ -69,15 +69,16 @@ class LifeCycleTests(DriverUnderTest):
 
     def test_close_leaves_nothing_behind(self) -> None:
         """Neither a thread nor an open file is more after every cycle."""
-        threads, files = [], []
+        kept, threads, files = [], [], []
         for _ in range(CYCLES):
             before = set(threading.enumerate())
-            with self.make() as daq:
+            kept.append(self.make())
+            with kept[-1] as daq:
                 daq.start(1)
                 daq.exchange(np.zeros(1))
-            threads.append(_left(before))
+            threads.append(_left(before, self.prompt_s))
             files.append(len(list(DESCRIPTORS.iterdir())) if DESCRIPTORS.is_dir() else 0)
-        assert not all(threads), f"after close {threads[-1]} still runs"  # one that every driver shares begins once
+        assert not all(threads), f"after close these threads still run: {', '.join(threads[-1])}"  # one that every driver shares begins once
         assert not all(fewer < more for fewer, more in zip(files, files[1:], strict=False)), (
             f"every cycle from open to close leaves a file or port open: {files} were open"
         )
@@ -91,7 +92,7 @@ class LifeCycleTests(DriverUnderTest):
                 raise KeyError("anything")
         except KeyError:
             pass
-        assert daq.state is State.CLOSED
+        assert daq.state is State.CLOSED, f"after an error inside the context the driver is {daq.state.value}"
 
     def test_steps_out_of_order_are_refused(self) -> None:
         """Exchange before start and after stop, start before open and after close, open twice, start twice."""
@@ -139,7 +140,7 @@ class LifeCycleTests(DriverUnderTest):
                 daq.exchange(np.zeros(7))
         except DaqRefused:
             pass
-        assert daq.state is State.CLOSED
+        assert daq.state is State.CLOSED, f"after a refusal inside the context the driver is {daq.state.value}"
         with daq:
             daq.start(1)
             assert daq.exchange(np.zeros(1)).shape == (1, len(daq.channels))
@@ -148,10 +149,13 @@ class LifeCycleTests(DriverUnderTest):
         """Identity in text, statistics in numbers, remarks in lines, all known once open."""
         with self.make() as daq:
             for name, value in daq.identity.items():
-                assert isinstance(name, str)
-                assert isinstance(value, str)
-            assert all(isinstance(value, int | float) for value in daq.statistics.values())
-            assert all(isinstance(remark, str) and "\n" not in remark for remark in daq.remarks)
+                assert isinstance(name, str), f"identity: {name!r} is no text"
+                assert isinstance(value, str), f"identity: {name} = {value!r} is no text"
+            for name, number in daq.statistics.items():
+                assert isinstance(number, int | float), f"statistics: {name} = {number!r} is no number"
+            for remark in daq.remarks:
+                assert isinstance(remark, str), f"remarks: {remark!r} is no text"
+                assert "\n" not in remark, f"remarks: {remark!r} is more than one line"
 
     def test_capabilities_are_the_same_before_and_while_running(self) -> None:
         """Whether something physical moves is known before anything is started."""
@@ -159,7 +163,7 @@ class LifeCycleTests(DriverUnderTest):
             before = daq.capabilities
             daq.start(1)
             daq.exchange(np.zeros(1))
-            assert daq.capabilities == before
+            assert daq.capabilities == before, f"capabilities were {before} and are {daq.capabilities} while running"
 
     def test_rate_range_and_channels_are_those_of_the_bench(self) -> None:
         """Once it is open and while it runs: what the device cannot do it refuses."""
@@ -178,9 +182,9 @@ class LifeCycleTests(DriverUnderTest):
                     daq.exchange(np.zeros(1))
 
 
-def _left(before: set[threading.Thread]) -> list[str]:
-    """Names of the threads that were not there before, once they have had a second to end."""
-    end = time.monotonic() + ENDING_S
+def _left(before: set[threading.Thread], wait_s: float) -> list[str]:
+    """Names of the threads that were not there before, once they have had time to end."""
+    end = time.monotonic() + wait_s
     for thread in set(threading.enumerate()) - before:
         thread.join(max(0.0, end - time.monotonic()))
     return [thread.name for thread in set(threading.enumerate()) - before]

@@ -15,7 +15,6 @@ __all__ = ["LOOKS_S", "STILL", "UNSEEN", "LookingAtTheOutput", "Seen", "loopback
 
 STILL = 0.1  # of the amplitude: an output below it counts as 0 V
 LOOKS_S = 0.02
-MESSAGE_S = 1.0  # to a device in another process of a busy machine
 UNSEEN = (
     "nobody sees the output: connect it to a channel with loopback = true, or override witness (voltmeter, second DAQ)"
 )
@@ -35,10 +34,17 @@ class Seen(NamedTuple):
 class LookingAtTheOutput(DriverUnderTest):
     """Steps of tests that look at the output."""
 
+    message_s = 1.0
+    """Time that a message takes to the device, and what it does to the witness, at most, s."""
+
+    def make_visible(self) -> DAQ:
+        """A driver that is not open, with a loopback where there is one."""
+        return self.make_loopback() or self.make()
+
     @contextmanager
     def driven(self) -> Iterator[DAQ]:
         """A driver with its output at the amplitude, confirmed independently."""
-        with self.make() as daq:
+        with self.make_visible() as daq:
             daq.start(min(10, daq.capabilities.largest_block))
             if self.witness(daq) is None and loopback_of(daq) is None:
                 self.unproven(UNSEEN)
@@ -56,13 +62,20 @@ class LookingAtTheOutput(DriverUnderTest):
 
     def look(self, daq: DAQ) -> Seen:
         """What is on the output once a message has had its time; without a witness by the loopback, which needs a block."""
-        end = time.monotonic() + MESSAGE_S
-        while (seen := self.witness(daq)) is not None and seen > STILL * self.amplitude_v and time.monotonic() < end:
-            time.sleep(LOOKS_S)
+        seen = self.witnessed(daq, 0.0)
         if seen is not None:
             return Seen(seen, after_restart=False)
         was_running = daq.state is State.RUNNING
         return Seen(self.reading_before_new_output(daq), after_restart=not was_running)
+
+    def witnessed(self, daq: DAQ, expected_v: float) -> float | None:
+        """What the witness sees once it sees what is expected, or a message has had its time; None without a witness."""
+        end = time.monotonic() + self.message_s
+        while (seen := self.witness(daq)) is not None and time.monotonic() < end:
+            if abs(seen - expected_v) <= STILL * self.amplitude_v:
+                break
+            time.sleep(LOOKS_S)
+        return seen
 
     def require_still(self, seen: Seen, when: str, *taken_away: str) -> None:
         """Require 0 V. What a restart shows counts only if it shows an output left without the methods ``taken_away``."""

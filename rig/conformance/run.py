@@ -1,11 +1,11 @@
 """The contract without pytest: every test once over an installed driver, with what came out."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -20,7 +20,11 @@ from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqError, NotArmed
 
-__all__ = ["Finding", "check_driver", "require_arming"]
+__all__ = ["OUTCOMES", "Finding", "check_driver", "require_arming", "unproven"]
+
+Outcome = Literal["passed", "failed", "not applicable", "unproven"]
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+"""In the order in which they are counted."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ class Finding:
 
     test: str
     duty: str
-    outcome: Literal["passed", "failed", "not applicable", "unproven"]
+    outcome: Outcome
     detail: str = ""
 
 
@@ -96,6 +100,15 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
         yield found
         _clear_after(found, name, contract)
         slow = slow or (name in SLOW_TESTS and found.outcome == "failed")
+
+
+def unproven(findings: Iterable[Finding]) -> dict[str, list[str]]:
+    """The tests that could not be judged, by the reason."""
+    out: dict[str, list[str]] = {}
+    for finding in findings:
+        if finding.outcome == "unproven":
+            out.setdefault(finding.detail, []).append(finding.test)
+    return out
 
 
 def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:

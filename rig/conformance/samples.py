@@ -27,9 +27,10 @@ class SamplesTests(DriverUnderTest):
         for block in self.blocks:
             with self.running(block) as daq:
                 inputs = daq.exchange(np.zeros(daq.block))
-                assert inputs.shape == (daq.block, len(daq.channels))
-                assert inputs.dtype == np.float64
-                assert np.isfinite(inputs).all()
+                wanted = daq.block, len(daq.channels)
+                assert inputs.shape == wanted, f"inputs are of shape {inputs.shape}: allowed is {wanted}"
+                assert inputs.dtype == np.float64, f"inputs are {inputs.dtype}: allowed is float64"
+                assert np.isfinite(inputs).all(), f"block {daq.block}: inputs of the first block are not finite"
 
     def test_every_input_is_filled(self) -> None:
         """Whatever the driver is handed: no number in ``inputs`` is one that was there before."""
@@ -53,7 +54,7 @@ class SamplesTests(DriverUnderTest):
             kept = first.copy()
             voltages[:] = self.amplitude_v
             daq.exchange(voltages)
-            np.testing.assert_array_equal(first, kept)
+            assert np.array_equal(first, kept, equal_nan=True), "the inputs of a call have changed at the next call"
 
     def test_the_inputs_handed_out_are_not_written_to_again(self) -> None:
         """The caller may keep them: no array is handed out twice, and none changes later."""
@@ -74,14 +75,16 @@ class SamplesTests(DriverUnderTest):
             kept = voltages.copy()
             for _ in range(3):
                 daq.exchange(voltages)
-                np.testing.assert_array_equal(voltages, kept)
+                assert np.array_equal(voltages, kept), "the driver has written into the voltages that it was handed"
 
     def test_the_latency_is_known_and_not_negative(self) -> None:
         """u[i] cannot show before y[i], filters are part of the latency, and it stays what it was at start."""
         for block in self.blocks:
             with self.running(block) as daq:
                 said = daq.latency_samples, daq.filter_delay_samples
-                assert 0.0 <= said[1] <= said[0]
+                assert 0.0 <= said[1] <= said[0], (
+                    f"filter_delay_samples = {said[1]:g}: allowed is 0 to latency_samples = {said[0]:g}"
+                )
                 for _ in range(KEPT_BLOCKS):
                     daq.exchange(np.zeros(daq.block))
                 assert (daq.latency_samples, daq.filter_delay_samples) == said, (
@@ -129,15 +132,20 @@ class SamplesTests(DriverUnderTest):
     def test_a_repeatable_device_repeats_itself(self) -> None:
         """Two runs with the same outputs return the same inputs."""
         answers = [self._answers(max(self.blocks), self.sine(REPEATED_SAMPLES, 1000.0))[0] for _ in range(2)]
-        np.testing.assert_array_equal(*answers)
+        differ = int((answers[0] != answers[1]).sum())
+        assert not differ, f"two runs with the same outputs differ in {differ} of {answers[0].size} readings"
 
     def test_every_block_size_gives_the_same_samples(self) -> None:
         """Open loop, a repeatable device whose latency does not depend on the block answers the same voltages alike."""
         runs = [self._answers(block, self.sine(REPEATED_SAMPLES, 1000.0)) for block in self.blocks]
         if len({latency for _, latency in runs}) > 1:
             self.skip("the device has a queue, whose length in samples depends on the block")
-        for answer, _ in runs[1:]:
-            np.testing.assert_array_equal(answer, runs[0][0])
+        for block, (answer, _) in zip(self.blocks[1:], runs[1:], strict=True):
+            rows = min(len(answer), len(runs[0][0]))
+            differ = int((answer[:rows] != runs[0][0][:rows]).sum())
+            assert not differ, (
+                f"in blocks of {block} samples {differ} of {answer.size} readings differ from those in blocks of {self.blocks[0]}"
+            )
 
     def test_every_channel_reads_what_is_known_of_it(self) -> None:
         """Each within 5 %: a wrong gain, two columns that are swapped, or a channel that stands still show here."""
@@ -177,7 +185,8 @@ class SamplesTests(DriverUnderTest):
             daq.stop()
             daq.start(block)
             inputs = np.vstack([daq.exchange(np.zeros(block)) for _ in range(-(-5000 // block))])
-            assert np.std(inputs[-1000:], axis=0).max() < self.tolerance_v
+            rest_v = float(np.std(inputs[-1000:], axis=0).max())
+            assert rest_v < self.tolerance_v, f"at 0 V the inputs are at {rest_v:.3g} V RMS: allowed is {self.tolerance_v:g} V"
 
     def test_lost_samples_are_rows_of_nan_with_their_flag_and_nothing_else_is(self) -> None:
         """Flags uint16[n]; a row is either lost, all NaN, flagged and counted, or there."""
@@ -186,11 +195,11 @@ class SamplesTests(DriverUnderTest):
                 for _ in range(20):
                     counted = sum(daq.counters.values())
                     inputs = daq.exchange(np.zeros(daq.block))
-                    assert daq.flags.shape == (daq.block,)
-                    assert daq.flags.dtype == np.uint16
+                    said = daq.flags.dtype, daq.flags.shape
+                    assert said == (np.uint16, (daq.block,)), f"flags are {said}: allowed is uint16 [{daq.block}]"
                     lost = (daq.flags & LOST) != 0
-                    assert np.isnan(inputs[lost]).all()
-                    assert np.isfinite(inputs[~lost]).all()
+                    assert np.isnan(inputs[lost]).all(), "a row that is flagged as lost is not NaN"
+                    assert np.isfinite(inputs[~lost]).all(), "a row that is not flagged as lost is not finite"
                     assert not lost.any() or sum(daq.counters.values()) > counted, "lost samples are not counted"
 
     def test_counters_are_whole_numbers_that_only_grow(self) -> None:
@@ -200,5 +209,5 @@ class SamplesTests(DriverUnderTest):
             for _ in range(20):
                 daq.exchange(np.zeros(daq.block))
             for name, count in daq.counters.items():
-                assert isinstance(count, int)
-                assert count >= before.get(name, 0)
+                assert isinstance(count, int), f"counters: {name} = {count!r} is no whole number"
+                assert count >= before.get(name, 0), f"counters: {name} was {before[name]} and is {count}"

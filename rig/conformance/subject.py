@@ -38,6 +38,9 @@ class DriverUnderTest(ABC):
     blocks = (1, 4, 10)
     """Block sizes that are tried, if the driver allows them."""
 
+    prompt_s = 1.0
+    """Time that stop and close may take, and that it may take to find out that the device is gone, s."""
+
     @abstractmethod
     def make(self) -> DAQ:
         """A driver that is not open."""

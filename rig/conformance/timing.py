@@ -47,8 +47,6 @@ class TimingTests(DriverUnderTest):
     """Difference from the sample rate that a device's clock may have, as a share."""
     clock_s = 3.0
     """Time over which the clock is compared, s."""
-    prompt_s = 1.0
-    """Time that stop and close may take, and that it may take to find out that the device is gone, s."""
 
     def test_a_block_takes_no_longer_than_it_lasts(self) -> None:
         """The median of some blocks: up to twice its own time where the device has a clock, ten times where it has none."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rig.conformance.looking import UNSEEN, LookingAtTheOutput, replaced
+from rig.conformance.looking import STILL, UNSEEN, LookingAtTheOutput, replaced
 from rig.daq import State
 from rig.errors import DaqError
 
@@ -14,9 +14,23 @@ __all__ = ["WaysOutTests"]
 class WaysOutTests(LookingAtTheOutput):
     """Tests that look at the output from outside."""
 
+    def test_a_witness_sees_the_voltage_that_was_handed_over(self) -> None:
+        """Held outputs of either sign and of half the amplitude, within 10 % of the amplitude."""
+        with self.make_visible() as daq:
+            if self.witness(daq) is None:
+                self.unproven("no witness but the driver's own loopback: a gain of both cancels. Override witness")
+            daq.start(min(10, daq.capabilities.largest_block))
+            for level_v in (self.amplitude_v, -self.amplitude_v, 0.5 * self.amplitude_v):
+                self.drive(daq, level_v)
+                seen = self.witnessed(daq, abs(level_v))
+                assert seen is not None
+                assert abs(seen - abs(level_v)) <= STILL * self.amplitude_v, (
+                    f"{level_v:g} V were handed over for {daq.queue_blocks + 2} blocks, and {seen:.3g} V are on the output"
+                )
+
     def test_open_and_start_leave_the_output_at_0_v(self) -> None:
         """Also after the device was driven; what it was driven with does not come back. Only a witness sees it."""
-        daq = self.make()
+        daq = self.make_visible()
         try:
             for when in ("at first", "after it was driven"):
                 daq.open()

@@ -72,7 +72,7 @@ class WithoutHostTests(LookingAtTheOutput):
         seen = self.witness(None)
         if seen is not None:
             return Seen(seen, after_restart=False)
-        with self.make() as daq:
+        with self.make_visible() as daq:
             return Seen(self.reading_before_new_output(daq), after_restart=True)
 
     def _drive_and_kill(self, bench: Bench) -> None:

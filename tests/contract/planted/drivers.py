@@ -7,7 +7,6 @@ from collections import deque
 
 import numpy as np
 
-from rig.daq import State
 from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.virtual.faults import OUTPUT_HELD
 from rig.errors import DaqDisconnected
@@ -105,4 +104,3 @@ class QueuedUnseenDAQ(UnseenDAQ):
 
 
 GOOD = (VirtualDAQ, TimedDAQ, PacedDAQ, UnseenDAQ, QueuedUnseenDAQ)
-RUNNING = State.RUNNING

@@ -1,7 +1,6 @@
 """Faults of the life cycle: opening, starting, closing, refusing."""
 
 import threading
-import time
 
 import numpy as np
 
@@ -226,12 +225,3 @@ class SaysAnotherRange(VirtualDAQ):
     def _start(self):
         super()._start()
         self.output_range_v *= 2.0
-
-
-@planted("a_block_takes_no_longer_than_it_lasts")
-class SleepsForASecond(VirtualDAQ):
-    """sleeps for a second in every block"""
-
-    def _exchange(self, voltages, inputs):
-        time.sleep(1.0)
-        super()._exchange(voltages, inputs)

@@ -99,11 +99,13 @@ class ShiftsItsOutputs(VirtualDAQ):
 class IsABlockLate(PacedDAQ):
     """outputs are put out a block later than the latency says"""
 
-    kept_v = 0.0
+    def _start(self):
+        super()._start()
+        self.kept_v = np.zeros(self.block)
 
     def _exchange(self, voltages, inputs):
-        kept, self.kept_v = self.kept_v, voltages.copy()
-        super()._exchange(np.zeros(self.block) if np.size(kept) != self.block else kept, inputs)
+        kept_v, self.kept_v = self.kept_v, voltages.copy()
+        super()._exchange(kept_v, inputs)
 
 
 @planted(LATENCY)
@@ -264,7 +266,7 @@ class IsABlockLateAfterAnUnderrun(Lingers):
     """outputs are off by a block after an underrun"""
 
     def _linger(self, voltages, inputs, late):
-        super()._take(self.before, inputs, late)
+        PacedDAQ._take(self, self.before, inputs, late)
 
 
 @planted("after_an_underrun_every_output_has_its_place_again")
@@ -273,5 +275,14 @@ class ReadsABlockLateAfterAnUnderrun(Lingers):
 
     def _linger(self, voltages, inputs, late):
         fresh = np.empty_like(inputs)
-        super()._take(voltages, fresh, late)
+        PacedDAQ._take(self, voltages, fresh, late)
         inputs[:], self.kept = getattr(self, "kept", self.inputs_before), fresh
+
+
+@planted("after_an_underrun_every_output_has_its_place_again")
+class HoldsWithoutAFlag(PacedDAQ):
+    """outputs that come too late are replaced by the one before them, without a flag"""
+
+    def _take(self, voltages, inputs, late):
+        super()._take(voltages, inputs, late)
+        self.flags[:] = 0

@@ -49,8 +49,11 @@ class Stalls(TimedDAQ):
         self.now_s += self.stall_s * (self.calls % self.every == 0)
 
 
-class StallsByTheClock(PacedDAQ, Stalls):
-    pass
+@planted("a_block_takes_no_longer_than_it_lasts")
+class SleepsForASecond(Stalls):
+    """sleeps for a second in every block"""
+
+    stall_s, every = 1.0, 1
 
 
 @planted(STALL)
