@@ -44,38 +44,38 @@ class LookingAtTheOutput(DriverUnderTest):
     @contextmanager
     def driven(self) -> Iterator[DAQ]:
         """A driver with its output at the amplitude, confirmed independently."""
-        with self.make_visible() as daq:
+        with self.punctual(), self.make_visible() as daq:
             daq.start(min(10, daq.capabilities.largest_block))
             if self.witness(daq) is None and loopback_of(daq) is None:
                 self.unproven(UNSEEN)
-            self.drive(daq, self.amplitude_v)
-            seen = self.witness(daq)
+            seen = self.drive(daq, self.amplitude_v)
             assert seen is None or seen > STILL * self.amplitude_v, (
                 f"{self.amplitude_v:g} V were handed over for {daq.queue_blocks + 2} blocks, and {seen:g} V are on the output"
             )
             yield daq
 
-    def drive(self, daq: DAQ, level_v: float) -> None:
-        """Hand a voltage over until it is on the converter."""
-        for _ in range(daq.queue_blocks + 2):
-            daq.exchange(np.full(daq.block, level_v))
+    def drive(self, daq: DAQ, level_v: float) -> float | None:
+        """Hand a voltage over until it is on the converter and the witness sees it, or a message has had its time.
+
+        Returns what the witness sees, V; None without one.
+        """
+        end = time.monotonic() + self.message_s
+        while True:
+            for _ in range(daq.queue_blocks + 2):
+                daq.exchange(np.full(daq.block, level_v))
+            seen = self.witness(daq)
+            if seen is None or abs(seen - abs(level_v)) <= STILL * self.amplitude_v or time.monotonic() > end:
+                return seen
 
     def look(self, daq: DAQ) -> Seen:
         """What is on the output once a message has had its time; without a witness by the loopback, which needs a block."""
-        seen = self.witnessed(daq, 0.0)
+        end = time.monotonic() + self.message_s
+        while (seen := self.witness(daq)) is not None and seen > STILL * self.amplitude_v and time.monotonic() < end:
+            time.sleep(LOOKS_S)
         if seen is not None:
             return Seen(seen, after_restart=False)
         was_running = daq.state is State.RUNNING
         return Seen(self.reading_before_new_output(daq), after_restart=not was_running)
-
-    def witnessed(self, daq: DAQ, expected_v: float) -> float | None:
-        """What the witness sees once it sees what is expected, or a message has had its time; None without a witness."""
-        end = time.monotonic() + self.message_s
-        while (seen := self.witness(daq)) is not None and time.monotonic() < end:
-            if abs(seen - expected_v) <= STILL * self.amplitude_v:
-                break
-            time.sleep(LOOKS_S)
-        return seen
 
     def require_still(self, seen: Seen, when: str, *taken_away: str) -> None:
         """Require 0 V. What a restart shows counts only if it shows an output left without the methods ``taken_away``."""

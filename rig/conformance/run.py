@@ -112,8 +112,8 @@ def unproven(findings: Iterable[Finding]) -> dict[str, list[str]]:
 
 
 def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
-    """Clear the watchdog that a test makes latch, or that a failure has left latched where nothing moves."""
-    if name != KILLING_TEST and found.outcome != "failed":
+    """Clear the watchdog that a test makes latch, or that a test that was not passed has left latched where nothing moves."""
+    if name != KILLING_TEST and found.outcome not in ("failed", "unproven"):
         return
     with suppress(DaqError), contract.make() as daq:
         if name == KILLING_TEST or daq.capabilities.virtual:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.conformance.subject import DriverUnderTest, has_clock
+from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
 from rig.daq import DAQ
 
 __all__ = ["SLOW_TESTS", "TimingTests"]
@@ -50,7 +50,7 @@ class TimingTests(DriverUnderTest):
 
     def test_a_block_takes_no_longer_than_it_lasts(self) -> None:
         """The median of some blocks: up to twice its own time where the device has a clock, ten times where it has none."""
-        with self.make() as daq:
+        with self.punctual(), self.make() as daq:
             block = min(daq.capabilities.largest_block, max(1, math.ceil(BLOCK_S * daq.sample_rate_hz)))
             daq.start(block)
             daq.exchange(np.zeros(block))  # what is compiled or filled at first takes no part
@@ -71,7 +71,7 @@ class TimingTests(DriverUnderTest):
                 return
             seen.append(max(stalls_s, default=0.0))
         if min(seen) == 0.0:
-            self.unproven("this machine was too busy to say who was late: try again when it is idle")
+            self.unproven(TOO_BUSY)
         raise AssertionError(
             f"a block took up to {max(seen):.3g} s, and the host was not late: allowed is {self.late_s:g} s longer than usual"
         )
@@ -110,7 +110,7 @@ class TimingTests(DriverUnderTest):
                 return
             seen.append(drift.share)
         if len(seen) < TRIES - 1:
-            self.unproven("this machine was too busy to compare the clocks: try again when it is idle")
+            self.unproven(TOO_BUSY)
         off = float(np.median(seen))
         raise AssertionError(
             f"the device measures {rate_hz * (1.0 + off):.6g} samples in a second, {100.0 * off:+.2f} % from the "

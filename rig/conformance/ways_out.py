@@ -16,14 +16,13 @@ class WaysOutTests(LookingAtTheOutput):
 
     def test_a_witness_sees_the_voltage_that_was_handed_over(self) -> None:
         """Held outputs of either sign and of half the amplitude, within 10 % of the amplitude."""
-        with self.make_visible() as daq:
+        with self.punctual(), self.make_visible() as daq:
             if self.witness(daq) is None:
                 self.unproven("no witness but the driver's own loopback: a gain of both cancels. Override witness")
             daq.start(min(10, daq.capabilities.largest_block))
             for level_v in (self.amplitude_v, -self.amplitude_v, 0.5 * self.amplitude_v):
-                self.drive(daq, level_v)
-                seen = self.witnessed(daq, abs(level_v))
-                assert seen is not None
+                seen = self.drive(daq, level_v)
+                assert seen is not None, "the witness has seen the output at first, and does not any more"
                 assert abs(seen - abs(level_v)) <= STILL * self.amplitude_v, (
                     f"{level_v:g} V were handed over for {daq.queue_blocks + 2} blocks, and {seen:.3g} V are on the output"
                 )
