@@ -96,7 +96,10 @@ class HearingTheOutput(DriverUnderTest):
         return daq
 
     def allowed_blocks(self, daq: DAQ) -> list[int]:
-        """The block sizes that are tried, up to the largest that the driver allows; by a clock none that Python is too slow for."""
+        """The block sizes that are tried, up to the largest that the driver allows.
+
+        By a clock none is shorter than a millisecond, which Python is too slow for.
+        """
         shortest = math.ceil(SHORTEST_BLOCK_S * daq.sample_rate_hz) if has_clock(daq) else 1
         return sorted({min(max(block, shortest), daq.capabilities.largest_block) for block in self.blocks})
 
@@ -132,7 +135,11 @@ class HearingTheOutput(DriverUnderTest):
         block, columns = daq.block, [index for index, channel in enumerate(daq.channels) if channel.loopback]
         names = flag_names(daq.counters)
         held_bit = 1 << names.index(HELD) if HELD in names else 0
-        voltages, read, flags = np.zeros(block), np.full((outputs.size, len(columns)), np.nan), np.zeros(outputs.size, int)
+        voltages, read, flags = (
+            np.zeros(block),
+            np.full((outputs.size, len(columns)), np.nan),
+            np.zeros(outputs.size, int),
+        )
         began, end = time.monotonic(), outputs.size
         for first in range(0, outputs.size, block):
             if pauses and first // block in pauses:

@@ -106,7 +106,7 @@ class LookingAtTheOutput(DriverUnderTest):
                 return self.reading_before_new_output(daq) > 0.5 * self.amplitude_v
             finally:
                 if daq.state is State.CLOSED:  # a restart that failed: let go of the device all the same
-                    daq._close()  # noqa: SLF001 (was taken away)
+                    daq._close()
         return False
 
 

@@ -39,7 +39,7 @@ class SamplesTests(DriverUnderTest):
                 voltages = np.zeros(daq.block)
                 for before in (np.nan, 1e30):
                     inputs = np.full((daq.block, len(daq.channels)), before)
-                    daq._exchange(voltages, inputs)  # noqa: SLF001 (the base class hands it an array of its own)
+                    daq._exchange(voltages, inputs)
                     there = (daq.flags & LOST) == 0
                     forgotten = np.isnan(inputs[there]) | (inputs[there] == before)
                     assert not forgotten.any(), (
@@ -144,7 +144,8 @@ class SamplesTests(DriverUnderTest):
             rows = min(len(answer), len(runs[0][0]))
             differ = int((answer[:rows] != runs[0][0][:rows]).sum())
             assert not differ, (
-                f"in blocks of {block} samples {differ} of {answer.size} readings differ from those in blocks of {self.blocks[0]}"
+                f"in blocks of {block} samples {differ} of {answer.size} readings differ from those in blocks of "
+                f"{self.blocks[0]}"
             )
 
     def test_every_channel_reads_what_is_known_of_it(self) -> None:
@@ -179,14 +180,18 @@ class SamplesTests(DriverUnderTest):
         """Driven, stopped at its largest output and started again with 0 V, the inputs come to rest."""
         with self.running(10) as daq:
             block = daq.block
-            blocks = round(8.25 * daq.sample_rate_hz / 20.0) // block  # to the top of the ninth period: what is kept shows
+            blocks = (
+                round(8.25 * daq.sample_rate_hz / 20.0) // block
+            )  # to the top of the ninth period: what is kept shows
             for voltages in self.sine(block * blocks, daq.sample_rate_hz).reshape(-1, block):
                 daq.exchange(voltages.copy())
             daq.stop()
             daq.start(block)
             inputs = np.vstack([daq.exchange(np.zeros(block)) for _ in range(-(-5000 // block))])
             rest_v = float(np.std(inputs[-1000:], axis=0).max())
-            assert rest_v < self.tolerance_v, f"at 0 V the inputs are at {rest_v:.3g} V RMS: allowed is {self.tolerance_v:g} V"
+            assert rest_v < self.tolerance_v, (
+                f"at 0 V the inputs are at {rest_v:.3g} V RMS: allowed is {self.tolerance_v:g} V"
+            )
 
     def test_lost_samples_are_rows_of_nan_with_their_flag_and_nothing_else_is(self) -> None:
         """Flags uint16[n]; a row is either lost, all NaN, flagged and counted, or there."""

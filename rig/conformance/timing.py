@@ -120,8 +120,8 @@ class TimingTests(DriverUnderTest):
     def _drift(self) -> Drift:
         """Compare the device's count of samples with the time.
 
-        A block may come late, never early. The earliest in each of some parts of the run lie on a line whose slope is the clock's
-        error; the median of the slopes from part to part leaves out where somebody was late for long.
+        A block may come late, never early. The earliest of each of some parts of the run lie on a line whose slope is the
+        clock's error; the median of the slopes from part to part leaves out where somebody was late for long.
         """
         with self.running(max(self.blocks)) as daq, _without_collector():
             voltages, block_s = np.zeros(daq.block), daq.block / daq.sample_rate_hz
@@ -148,9 +148,7 @@ class TimingTests(DriverUnderTest):
                 taken_s["stop"].append(self.seconds(daq, daq.stop))
                 taken_s["close"].append(self.seconds(daq, daq.close))
         for name, seconds in taken_s.items():
-            assert min(seconds) <= self.prompt_s, (
-                f"{name} takes {min(seconds):.3g} s: allowed is {self.prompt_s:g} s"
-            )
+            assert min(seconds) <= self.prompt_s, f"{name} takes {min(seconds):.3g} s: allowed is {self.prompt_s:g} s"
 
     def seconds(self, daq: DAQ, action: Callable[[], object]) -> float:
         """Time that an action takes by the clock of `now_s`, s."""

@@ -13,9 +13,7 @@ from rig.conformance.looking import LOOKS_S, STILL, LookingAtTheOutput, Seen, lo
 __all__ = ["KILLING_TEST", "WithoutHostTests", "last_output_v"]
 
 KILLING_TEST = "test_the_output_comes_to_0_v_without_the_host"
-NOTHING_TO_LOOK_AT = (
-    "nothing is left to look at once the process is dead: no witness (override witness), no loopback"
-)
+NOTHING_TO_LOOK_AT = "nothing is left to look at once the process is dead: no witness (override witness), no loopback"
 
 REOPENED = (
     "the loopback reads 0 V once the device is opened again, which may itself have brought it there. Override witness "

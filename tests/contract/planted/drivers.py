@@ -103,4 +103,38 @@ class QueuedUnseenDAQ(UnseenDAQ):
         super().__init__(bench.model_copy(update={"driver": driver}), seed)
 
 
+class LateHost(PacedDAQ):
+    """A good device with a clock on a machine that is late by up to 20 ms at one block in ten, and once by half a second."""
+
+    def __init__(self, bench, seed=0):
+        super().__init__(bench, seed)
+        self._draw = np.random.default_rng(seed)
+
+    def _exchange(self, voltages, inputs):
+        super()._exchange(voltages, inputs)
+        self.now_s += 0.02 * self._draw.random() * (self._draw.random() < 0.1) + 0.5 * (self._blocks == 700)
+
+
+class StopUnseen(UnseenDAQ):
+    """A device without latency or filters, whose stop does nothing, and whose start brings its output to 0 V."""
+
+    def __init__(self, bench, seed=0):
+        options = {**bench.driver.options, "converter": {}}
+        driver = bench.driver.model_copy(update={"options": options})
+        super().__init__(bench.model_copy(update={"driver": driver}), seed)
+
+    def _start(self):
+        VirtualDAQ._start(self)
+
+    def _stop(self):
+        pass
+
+
+class CloseUnseen(StopUnseen):
+    """The same with a close that does nothing."""
+
+    def _close(self):
+        pass
+
+
 GOOD = (VirtualDAQ, TimedDAQ, PacedDAQ, UnseenDAQ, QueuedUnseenDAQ)

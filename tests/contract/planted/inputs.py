@@ -24,7 +24,7 @@ class Answers(VirtualDAQ):
 
 @planted(ROWS)
 class AnswersInSingles(Answers):
-    """inputs are float32"""
+    """Inputs are float32."""
 
     def _answer(self, inputs):
         return inputs.astype(np.float32)
@@ -32,7 +32,7 @@ class AnswersInSingles(Answers):
 
 @planted(ROWS)
 class AnswersInColumns(Answers):
-    """inputs are [channels, n]"""
+    """Inputs are [channels, n]."""
 
     def _answer(self, inputs):
         return inputs.T
@@ -40,7 +40,7 @@ class AnswersInColumns(Answers):
 
 @planted(ROWS)
 class AnswersOneRowLess(Answers):
-    """the last row is missing"""
+    """The last row is missing."""
 
     def _answer(self, inputs):
         return inputs[:-1]
@@ -48,7 +48,7 @@ class AnswersOneRowLess(Answers):
 
 @planted(ROWS)
 class AnswersNothing(VirtualDAQ):
-    """all inputs are not a number"""
+    """All inputs are not a number."""
 
     def _exchange(self, voltages, inputs):
         inputs[:] = np.nan
@@ -56,7 +56,7 @@ class AnswersNothing(VirtualDAQ):
 
 @planted("the_voltages_handed_over_are_not_kept")
 class LendsItsInputs(VirtualDAQ):
-    """every call returns the same array"""
+    """Every call returns the same array."""
 
     lent = None
 
@@ -70,7 +70,7 @@ class LendsItsInputs(VirtualDAQ):
 
 @planted("the_inputs_handed_out_are_not_written_to_again")
 class LendsItsInputsInTurn(VirtualDAQ):
-    """returns views of a ring of eight buffers"""
+    """Returns views of a ring of eight buffers."""
 
     calls, ring = 0, None
 
@@ -85,7 +85,7 @@ class LendsItsInputsInTurn(VirtualDAQ):
 
 @planted("the_inputs_handed_out_are_not_written_to_again")
 class WritesItsInputsLater(VirtualDAQ):
-    """writes into the inputs of the call before"""
+    """Writes into the inputs of the call before."""
 
     kept = None
 
@@ -98,7 +98,7 @@ class WritesItsInputsLater(VirtualDAQ):
 
 @planted("every_input_is_filled")
 class ForgetsAChannel(VirtualDAQ):
-    """the last channel is never filled"""
+    """The last channel is never filled."""
 
     def _exchange(self, voltages, inputs):
         measured = np.empty_like(inputs)
@@ -108,7 +108,7 @@ class ForgetsAChannel(VirtualDAQ):
 
 @planted(GAIN)
 class ReadsATenth(VirtualDAQ):
-    """input gain 0.1"""
+    """Input gain 0.1."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -117,7 +117,7 @@ class ReadsATenth(VirtualDAQ):
 
 @planted(GAIN)
 class SwapsLoopbackAndDrive(VirtualDAQ):
-    """the columns of loopback and drive are swapped"""
+    """The columns of loopback and drive are swapped."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -126,7 +126,7 @@ class SwapsLoopbackAndDrive(VirtualDAQ):
 
 @planted(KNOWN)
 class SwapsForceAndDrive(VirtualDAQ):
-    """the columns of force and drive are swapped"""
+    """The columns of force and drive are swapped."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -135,7 +135,7 @@ class SwapsForceAndDrive(VirtualDAQ):
 
 @planted(KNOWN)
 class ForceIsATenth(VirtualDAQ):
-    """the force alone reads a tenth"""
+    """The force alone reads a tenth."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -144,7 +144,7 @@ class ForceIsATenth(VirtualDAQ):
 
 @planted(KNOWN)
 class AChannelStandsStill(VirtualDAQ):
-    """one channel is constant"""
+    """One channel is constant."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -153,7 +153,7 @@ class AChannelStandsStill(VirtualDAQ):
 
 @planted("every_block_size_gives_the_same_samples")
 class ReadsTheLastOutput(VirtualDAQ):
-    """every input is the last output of the block"""
+    """Every input is the last output of the block."""
 
     def _exchange(self, voltages, inputs):
         inputs[:] = voltages[-1]
@@ -161,7 +161,7 @@ class ReadsTheLastOutput(VirtualDAQ):
 
 @planted("a_repeatable_device_repeats_itself")
 class SaysItRepeatsItself(VirtualDAQ):
-    """says that it is repeatable, and is not"""
+    """Says that it is repeatable, and is not."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -170,7 +170,7 @@ class SaysItRepeatsItself(VirtualDAQ):
 
 @planted(LOST_ROWS)
 class MakesUpLostSamples(VirtualDAQ):
-    """rows are not a number, without the flag of lost samples"""
+    """Rows are not a number, without the flag of lost samples."""
 
     run_fused = None
 
@@ -181,7 +181,7 @@ class MakesUpLostSamples(VirtualDAQ):
 
 @planted(LOST_ROWS)
 class FillsLostSamples(VirtualDAQ):
-    """lost samples are flagged, and filled with zeros"""
+    """Lost samples are flagged, and filled with zeros."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -190,7 +190,7 @@ class FillsLostSamples(VirtualDAQ):
 
 @planted(LOST_ROWS)
 class DoesNotCountLostSamples(VirtualDAQ):
-    """lost samples are flagged, and not counted"""
+    """Lost samples are flagged, and not counted."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -199,7 +199,7 @@ class DoesNotCountLostSamples(VirtualDAQ):
 
 @planted("every_output_shows_in_the_loopback_once_and_in_its_order")
 class SeldomNotANumber(VirtualDAQ):
-    """one row in 5000 is not a number, without a flag"""
+    """One row in 5000 is not a number, without a flag."""
 
     rows = 0
 
@@ -212,7 +212,7 @@ class SeldomNotANumber(VirtualDAQ):
 
 @planted("a_restart_begins_with_0_v_in_the_loopback")
 class BeginsWithOldInputs(VirtualDAQ):
-    """the first block after a restart is the last one before it"""
+    """The first block after a restart is the last one before it."""
 
     last = None
 

@@ -1,5 +1,6 @@
 """Faults of the life cycle: opening, starting, closing, refusing."""
 
+import os
 import threading
 
 import numpy as np
@@ -12,7 +13,7 @@ from tests.contract.planted.table import planted
 
 @planted("nothing_is_opened_by_the_constructor")
 class OpensItself(VirtualDAQ):
-    """opened by its constructor"""
+    """Opened by its constructor."""
 
     def __init__(self, bench, seed=0):
         super().__init__(bench, seed)
@@ -25,7 +26,7 @@ class OpensItself(VirtualDAQ):
 
 @planted("the_life_cycle_is_open_start_stop_close")
 class DoesNotStart(VirtualDAQ):
-    """start does nothing"""
+    """Start does nothing."""
 
     def start(self, block=1):
         pass
@@ -33,7 +34,7 @@ class DoesNotStart(VirtualDAQ):
 
 @planted("close_may_be_called_at_any_time_and_again")
 class FailsWhereGone(VirtualDAQ):
-    """close fails if the device is not open"""
+    """Close fails if the device is not open."""
 
     def close(self):
         if self.state is State.CLOSED:
@@ -43,7 +44,7 @@ class FailsWhereGone(VirtualDAQ):
 
 @planted("close_may_be_called_at_any_time_and_again")
 class FailsToClose(VirtualDAQ):
-    """close fails always"""
+    """Close fails always."""
 
     def _close(self):
         raise RuntimeError("cannot close twice")
@@ -51,7 +52,7 @@ class FailsToClose(VirtualDAQ):
 
 @planted("a_driver_may_be_opened_again")
 class CannotStartAgain(VirtualDAQ):
-    """the same driver cannot be opened a second time"""
+    """The same driver cannot be opened a second time."""
 
     opened = 0
 
@@ -64,7 +65,7 @@ class CannotStartAgain(VirtualDAQ):
 
 @planted("another_driver_may_open_what_one_has_closed")
 class KeepsTheDevice(VirtualDAQ):
-    """close does not let go of the device: the next driver finds it in use"""
+    """Close does not let go of the device: the next driver finds it in use."""
 
     holder = None
 
@@ -77,7 +78,7 @@ class KeepsTheDevice(VirtualDAQ):
 
 @planted("an_error_inside_the_context_closes")
 class StaysOpenAfterAnError(VirtualDAQ):
-    """the context does not close after an error"""
+    """The context does not close after an error."""
 
     def __exit__(self, kind, error, trace):
         if kind is None:
@@ -86,7 +87,7 @@ class StaysOpenAfterAnError(VirtualDAQ):
 
 @planted("steps_out_of_order_are_refused")
 class ExchangesBeforeStart(VirtualDAQ):
-    """exchange before start returns zeros"""
+    """Exchange before start returns zeros."""
 
     def exchange(self, voltages):
         if self.state is State.OPEN and not self.block:
@@ -96,7 +97,7 @@ class ExchangesBeforeStart(VirtualDAQ):
 
 @planted("steps_out_of_order_are_refused")
 class ExchangesAfterClose(VirtualDAQ):
-    """exchange after stop or close returns zeros"""
+    """Exchange after stop or close returns zeros."""
 
     def exchange(self, voltages):
         if self.block and self.state is not State.RUNNING:
@@ -106,7 +107,7 @@ class ExchangesAfterClose(VirtualDAQ):
 
 @planted("blocks_beyond_the_device_are_refused_with_what_is_allowed")
 class TakesAnyBlock(VirtualDAQ):
-    """a block of any size is accepted and clipped"""
+    """A block of any size is accepted and clipped."""
 
     def start(self, block=1):
         super().start(max(1, min(block, self.capabilities.largest_block)))
@@ -114,7 +115,7 @@ class TakesAnyBlock(VirtualDAQ):
 
 @planted("voltages_beyond_the_range_or_not_a_number_are_refused")
 class ClipsInSilence(VirtualDAQ):
-    """outputs beyond the range are clipped, not refused"""
+    """Outputs beyond the range are clipped, not refused."""
 
     def exchange(self, voltages):
         return super().exchange(np.clip(np.nan_to_num(voltages), -self.output_range_v, self.output_range_v))
@@ -122,7 +123,7 @@ class ClipsInSilence(VirtualDAQ):
 
 @planted("voltages_beyond_the_range_or_not_a_number_are_refused")
 class TakesAnyVoltage(VirtualDAQ):
-    """any voltage is accepted, and nothing is answered"""
+    """Any voltage is accepted, and nothing is answered."""
 
     def exchange(self, voltages):
         return np.zeros((self.block, len(self.channels)))
@@ -130,7 +131,7 @@ class TakesAnyVoltage(VirtualDAQ):
 
 @planted("a_block_of_another_size_is_refused")
 class TakesAnyShape(VirtualDAQ):
-    """a block of another size is accepted"""
+    """A block of another size is accepted."""
 
     def exchange(self, voltages):
         return super().exchange(np.resize(voltages, self.block))
@@ -138,7 +139,7 @@ class TakesAnyShape(VirtualDAQ):
 
 @planted("closed_after_a_refusal_a_driver_can_be_used_again")
 class SulksAfterARefusal(VirtualDAQ):
-    """does not open any more after it has refused something"""
+    """Does not open any more after it has refused something."""
 
     refused = False
 
@@ -157,7 +158,7 @@ class SulksAfterARefusal(VirtualDAQ):
 
 @planted("close_leaves_nothing_behind")
 class LeavesAThread(VirtualDAQ):
-    """a reader thread goes on after close"""
+    """A reader thread goes on after close."""
 
     def _start(self):
         super()._start()
@@ -167,18 +168,22 @@ class LeavesAThread(VirtualDAQ):
 
 @planted("close_leaves_nothing_behind")
 class LeavesAFile(VirtualDAQ):
-    """the port stays open after close"""
+    """The port stays open after close."""
 
-    ports = ()
+    port = None
 
     def _open(self):
         super()._open()
-        self.ports = (*self.ports, open("/dev/null"))  # noqa: SIM115 (is left open)
+        self.port = os.open(os.devnull, os.O_RDONLY)
+
+    def __del__(self):
+        if self.port is not None:
+            os.close(self.port)
 
 
 @planted("capabilities_are_the_same_before_and_while_running")
 class ChangesItsMind(VirtualDAQ):
-    """says that something moves only once it is running"""
+    """Says that something moves only once it is running."""
 
     @property
     def capabilities(self):
@@ -187,7 +192,7 @@ class ChangesItsMind(VirtualDAQ):
 
 @planted("the_device_says_who_it_is_in_words")
 class IdentifiesItselfByNumber(VirtualDAQ):
-    """identity is a number"""
+    """Identity is a number."""
 
     @property
     def identity(self):
@@ -196,7 +201,7 @@ class IdentifiesItselfByNumber(VirtualDAQ):
 
 @planted("counters_are_whole_numbers_that_only_grow")
 class CountsDown(VirtualDAQ):
-    """a counter counts down"""
+    """A counter counts down."""
 
     calls = 0
 
@@ -211,7 +216,7 @@ class CountsDown(VirtualDAQ):
 
 @planted("rate_range_and_channels_are_those_of_the_bench")
 class SaysAnotherRate(VirtualDAQ):
-    """the sample rate is declared wrong"""
+    """The sample rate is declared wrong."""
 
     def __init__(self, bench, seed=0):
         super().__init__(bench, seed)
@@ -220,7 +225,7 @@ class SaysAnotherRate(VirtualDAQ):
 
 @planted("rate_range_and_channels_are_those_of_the_bench")
 class SaysAnotherRange(VirtualDAQ):
-    """the output range is declared wrong"""
+    """The output range is declared wrong."""
 
     def _start(self):
         super()._start()

@@ -21,35 +21,35 @@ class ScalesItsOutput(VirtualDAQ):
 
 @planted(GAIN)
 class DoublesItsOutput(ScalesItsOutput):
-    """output times 2"""
+    """Output times 2."""
 
     gain = 2.0
 
 
 @planted(GAIN)
 class HalvesItsOutput(ScalesItsOutput):
-    """output times 0.5"""
+    """Output times 0.5."""
 
     gain = 0.5
 
 
 @planted(GAIN)
 class InvertsItsOutput(ScalesItsOutput):
-    """output times -1"""
+    """Output times -1."""
 
     gain = -1.0
 
 
 @planted(GAIN)
 class OutputIsSomeTooLarge(ScalesItsOutput):
-    """output times 1.1"""
+    """Output times 1.1."""
 
     gain = 1.1
 
 
 @planted("a_witness_sees_the_voltage_that_was_handed_over")
 class HidesItsGain(ScalesItsOutput):
-    """output times 2, and inputs times 0.5: the loopback looks right"""
+    """Output times 2, and inputs times 0.5: the loopback looks right."""
 
     gain = 2.0
 
@@ -60,7 +60,7 @@ class HidesItsGain(ScalesItsOutput):
 
 @planted(GAIN)
 class AddsToItsOutput(VirtualDAQ):
-    """0.04 V are added to every output"""
+    """0.04 V are added to every output."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages + 0.04, inputs)
@@ -68,7 +68,7 @@ class AddsToItsOutput(VirtualDAQ):
 
 @planted(ORDER)
 class AddsALot(VirtualDAQ):
-    """every output is rounded to 0.1 V"""
+    """Every output is rounded to 0.1 V."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(np.round(voltages + 1e-9, 1), inputs)
@@ -76,7 +76,7 @@ class AddsALot(VirtualDAQ):
 
 @planted("voltages_up_to_the_range_are_put_out")
 class ClipsAtHalfTheRange(VirtualDAQ):
-    """outputs are clipped at half the range, without a word"""
+    """Outputs are clipped at half the range, without a word."""
 
     def _exchange(self, voltages, inputs):
         half = 0.5 * self.output_range_v
@@ -85,7 +85,7 @@ class ClipsAtHalfTheRange(VirtualDAQ):
 
 @planted(LATENCY)
 class ShiftsItsOutputs(VirtualDAQ):
-    """outputs are late by a sample, across the blocks"""
+    """Outputs are late by a sample, across the blocks."""
 
     last_v = 0.0
 
@@ -97,7 +97,7 @@ class ShiftsItsOutputs(VirtualDAQ):
 
 @planted(LATENCY)
 class IsABlockLate(PacedDAQ):
-    """outputs are put out a block later than the latency says"""
+    """Outputs are put out a block later than the latency says."""
 
     def _start(self):
         super()._start()
@@ -110,7 +110,7 @@ class IsABlockLate(PacedDAQ):
 
 @planted(LATENCY)
 class SaysNoLatency(VirtualDAQ):
-    """says that it has no latency"""
+    """Says that it has no latency."""
 
     latency_samples = 0.0
     filter_delay_samples = 0.0
@@ -118,7 +118,7 @@ class SaysNoLatency(VirtualDAQ):
 
 @planted("the_latency_is_known_and_not_negative")
 class ChangesItsLatency(VirtualDAQ):
-    """the latency changes while it runs"""
+    """The latency changes while it runs."""
 
     @property
     def latency_samples(self):
@@ -127,7 +127,7 @@ class ChangesItsLatency(VirtualDAQ):
 
 @planted("an_output_shows_once_its_latency_is_over")
 class SaysNoQueue(VirtualDAQ):
-    """says that it has no queue; no loopback is needed"""
+    """Says that it has no queue; no loopback is needed."""
 
     def __init__(self, bench, seed=0):
         options = {**bench.driver.options, "queue_blocks": 1}
@@ -145,26 +145,26 @@ class Boastful(VirtualDAQ):
 
 @planted("an_output_does_not_show_before_its_latency")
 class SaysMoreLatency(Boastful):
-    """says a latency of 8.5 samples and has half a sample; no loopback is needed"""
+    """Says a latency of 8.5 samples and has half a sample; no loopback is needed."""
 
 
 @planted("an_output_does_not_show_before_its_latency")
 class SaysMoreLatencyWithFilters(Boastful):
-    """the same, and puts a part of it down to filters"""
+    """The same, and puts a part of it down to filters."""
 
     filter_delay_samples = 5.0
 
 
 @planted("the_latency_is_known_and_not_negative")
 class SaysTooMuchFilter(Boastful):
-    """says that its filters are later than the whole device"""
+    """Says that its filters are later than the whole device."""
 
     filter_delay_samples = 9.0
 
 
 @planted(ORDER)
 class LosesABlock(VirtualDAQ):
-    """one block of outputs in 30 is lost"""
+    """One block of outputs in 30 is lost."""
 
     calls = 0
 
@@ -195,7 +195,7 @@ class SeldomWrong(VirtualDAQ):
 
 @planted(ORDER)
 class DoublesABlockOfOutputs(SeldomWrong):
-    """one block of outputs in 1000 is the block before it"""
+    """One block of outputs in 1000 is the block before it."""
 
     def _go_wrong(self, voltages, inputs):
         super(SeldomWrong, self)._exchange(self.last_v, inputs)
@@ -203,7 +203,7 @@ class DoublesABlockOfOutputs(SeldomWrong):
 
 @planted(ORDER)
 class DoublesABlockOfInputs(SeldomWrong):
-    """one block of inputs in 1000 is the block before it"""
+    """One block of inputs in 1000 is the block before it."""
 
     def _go_wrong(self, voltages, inputs):
         super(SeldomWrong, self)._exchange(voltages, inputs)
@@ -212,7 +212,7 @@ class DoublesABlockOfInputs(SeldomWrong):
 
 @planted(ORDER)
 class SwapsTwoOutputs(SeldomWrong):
-    """the outputs of one block in 1000 are in the wrong order"""
+    """The outputs of one block in 1000 are in the wrong order."""
 
     def _go_wrong(self, voltages, inputs):
         super(SeldomWrong, self)._exchange(voltages[::-1].copy(), inputs)
@@ -220,7 +220,7 @@ class SwapsTwoOutputs(SeldomWrong):
 
 @planted(ORDER)
 class LosesASample(SeldomWrong):
-    """one sample in 2000 is lost without a flag"""
+    """One sample in 2000 is lost without a flag."""
 
     @property
     def every(self):
@@ -237,7 +237,7 @@ class LosesASample(SeldomWrong):
 
 @planted("the_voltages_handed_over_are_left_as_they_are")
 class WritesIntoTheVoltages(VirtualDAQ):
-    """writes into the caller's voltages"""
+    """Writes into the caller's voltages."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages, inputs)
@@ -263,7 +263,7 @@ class Lingers(PacedDAQ):
 
 @planted("after_an_underrun_every_output_has_its_place_again")
 class IsABlockLateAfterAnUnderrun(Lingers):
-    """outputs are off by a block after an underrun"""
+    """Outputs are off by a block after an underrun."""
 
     def _linger(self, voltages, inputs, late):
         PacedDAQ._take(self, self.before, inputs, late)
@@ -271,7 +271,7 @@ class IsABlockLateAfterAnUnderrun(Lingers):
 
 @planted("after_an_underrun_every_output_has_its_place_again")
 class ReadsABlockLateAfterAnUnderrun(Lingers):
-    """inputs are off by a block after an underrun"""
+    """Inputs are off by a block after an underrun."""
 
     def _linger(self, voltages, inputs, late):
         fresh = np.empty_like(inputs)
@@ -281,7 +281,7 @@ class ReadsABlockLateAfterAnUnderrun(Lingers):
 
 @planted("after_an_underrun_every_output_has_its_place_again")
 class HoldsWithoutAFlag(PacedDAQ):
-    """outputs that come too late are replaced by the one before them, without a flag"""
+    """Outputs that come too late are replaced by the one before them, without a flag."""
 
     def _take(self, voltages, inputs, late):
         super()._take(voltages, inputs, late)

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from rig.daq import DAQ
 
+BEGIN, END = "<!-- planted faults -->", "<!-- end of planted faults -->"
 Driver = TypeVar("Driver", bound=type[DAQ])
 
 PLANTED: list["Planted"] = []
@@ -23,7 +24,7 @@ class Planted:
     @property
     def words(self) -> str:
         """The fault in words: the docstring of the driver, in one line."""
-        return " ".join(inspect.getdoc(self.driver).split())
+        return " ".join(inspect.getdoc(self.driver).split()).rstrip(".")
 
 
 def planted(test: str) -> Callable[[Driver], Driver]:
@@ -34,3 +35,19 @@ def planted(test: str) -> Callable[[Driver], Driver]:
         return driver
 
     return enter
+
+
+def table() -> str:
+    """The table in Markdown, by the test that names the fault."""
+    tests = dict.fromkeys(one.test for one in PLANTED)
+    lines = ["| planted in a good driver | fails |", "|---|---|"]
+    for test in sorted(tests):
+        words = "; ".join(one.words[0].lower() + one.words[1:] for one in PLANTED if one.test == test)
+        lines.append(f"| {words} | {test.replace('_', ' ')} |")
+    return "\n".join(lines)
+
+
+def written(page: str) -> str:
+    """A page with the table between its two marks."""
+    before, _, rest = page.partition(f"{BEGIN}\n")
+    return f"{before}{BEGIN}\n{table()}\n{END}{rest.partition(END)[2]}"

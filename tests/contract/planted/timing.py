@@ -12,28 +12,28 @@ PROMPT = "stop_and_close_are_prompt"
 
 @planted(CLOCK)
 class IsFast(PacedDAQ):
-    """a clock 1 % fast"""
+    """A clock 1 % fast."""
 
     rate_share = 1.01
 
 
 @planted(CLOCK)
 class IsSlow(PacedDAQ):
-    """a clock 1 % slow"""
+    """A clock 1 % slow."""
 
     rate_share = 0.99
 
 
 @planted(CLOCK)
 class HasAnotherRate(PacedDAQ):
-    """samples at 4096 Hz where 5000 Hz are declared"""
+    """Samples at 4096 Hz where 5000 Hz are declared."""
 
     rate_share = 0.8192
 
 
 @planted(CLOCK)
 class HasNoClock(TimedDAQ):
-    """says that it has a clock, and returns at once"""
+    """Says that it has a clock, and returns at once."""
 
     @property
     def capabilities(self):
@@ -51,21 +51,21 @@ class Stalls(TimedDAQ):
 
 @planted("a_block_takes_no_longer_than_it_lasts")
 class SleepsForASecond(Stalls):
-    """sleeps for a second in every block"""
+    """Sleeps for a second in every block."""
 
     stall_s, every = 1.0, 1
 
 
 @planted(STALL)
 class StallsFor50Ms(Stalls):
-    """stalls of 50 ms, one in 500 blocks"""
+    """Stalls of 50 ms, one in 500 blocks."""
 
     every = 500
 
 
 @planted(STALL)
 class StallsFor50MsByTheClock(PacedDAQ):
-    """stalls of 50 ms, one in 500 blocks, of a device with a clock"""
+    """Stalls of 50 ms, one in 500 blocks, of a device with a clock."""
 
     calls = 0
 
@@ -77,14 +77,14 @@ class StallsFor50MsByTheClock(PacedDAQ):
 
 @planted(STALL)
 class SleepsEvery20Blocks(Stalls):
-    """one second of sleep every 20 blocks"""
+    """One second of sleep every 20 blocks."""
 
     stall_s, every = 1.0, 20
 
 
 @planted(GONE)
 class HangsWhenGone(TimedDAQ):
-    """a hang of 2 s when unplugged"""
+    """A hang of 2 s when unplugged."""
 
     def _exchange(self, voltages, inputs):
         self.now_s += 0.0 if self.plugged else 2.0
@@ -93,7 +93,7 @@ class HangsWhenGone(TimedDAQ):
 
 @planted(GONE)
 class HangsInCloseWhenGone(TimedDAQ):
-    """close hangs for 2 s when unplugged"""
+    """Close hangs for 2 s when unplugged."""
 
     def _close(self):
         self.now_s += 0.0 if self.plugged else 2.0
@@ -102,7 +102,7 @@ class HangsInCloseWhenGone(TimedDAQ):
 
 @planted(GONE)
 class GoesOnWhenGone(TimedDAQ):
-    """goes on with zeros when unplugged"""
+    """Goes on with zeros when unplugged."""
 
     def _exchange(self, voltages, inputs):
         if not self.plugged:
@@ -113,7 +113,7 @@ class GoesOnWhenGone(TimedDAQ):
 
 @planted(GONE)
 class SaysNothingWhenGone(TimedDAQ):
-    """an error without a word when unplugged"""
+    """An error without a word when unplugged."""
 
     def _exchange(self, voltages, inputs):
         if not self.plugged:
@@ -123,7 +123,7 @@ class SaysNothingWhenGone(TimedDAQ):
 
 @planted(GONE)
 class CannotCloseWhenGone(TimedDAQ):
-    """close fails when unplugged"""
+    """Close fails when unplugged."""
 
     def _close(self):
         if not self.plugged:
@@ -133,7 +133,7 @@ class CannotCloseWhenGone(TimedDAQ):
 
 @planted(PROMPT)
 class StopsSlowly(TimedDAQ):
-    """a stop that takes 3 s"""
+    """A stop that takes 3 s."""
 
     def _stop(self):
         self.now_s += 3.0
@@ -142,7 +142,7 @@ class StopsSlowly(TimedDAQ):
 
 @planted(PROMPT)
 class ClosesSlowly(TimedDAQ):
-    """a close that takes 3 s"""
+    """A close that takes 3 s."""
 
     def _close(self):
         self.now_s += 3.0

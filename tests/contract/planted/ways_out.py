@@ -15,7 +15,7 @@ INTERRUPTED = "an_interruption_in_exchange_ends_at_0_v"
 
 @planted(STOP)
 class DoesNotStop(VirtualDAQ):
-    """stop does nothing"""
+    """Stop does nothing."""
 
     def _stop(self):
         pass
@@ -26,7 +26,7 @@ class DoesNotStop(VirtualDAQ):
 
 @planted(CLOSE)
 class DoesNotClose(VirtualDAQ):
-    """close does nothing"""
+    """Close does nothing."""
 
     def _close(self):
         pass
@@ -34,7 +34,7 @@ class DoesNotClose(VirtualDAQ):
 
 @planted(STOP)
 class DoesNotStopUnseen(QueuedUnseenDAQ):
-    """stop does nothing, and a loopback behind a queue is the only witness"""
+    """Stop does nothing, and a loopback behind a queue is the only witness."""
 
     def _stop(self):
         pass
@@ -45,7 +45,7 @@ class DoesNotStopUnseen(QueuedUnseenDAQ):
 
 @planted(CLOSE)
 class DoesNotCloseUnseen(QueuedUnseenDAQ):
-    """close does nothing, and a loopback behind a queue is the only witness"""
+    """Close does nothing, and a loopback behind a queue is the only witness."""
 
     def _close(self):
         pass
@@ -53,7 +53,7 @@ class DoesNotCloseUnseen(QueuedUnseenDAQ):
 
 @planted(STOP)
 class StopsHalfway(VirtualDAQ):
-    """stop leaves half of the output"""
+    """Stop leaves half of the output."""
 
     def _stop(self):
         left = 0.5 * self.output_v
@@ -66,7 +66,7 @@ class StopsHalfway(VirtualDAQ):
 
 @planted(BEGIN)
 class OpensAt1V(VirtualDAQ):
-    """1 V on the output after open"""
+    """1 V on the output after open."""
 
     def _open(self):
         super()._open()
@@ -75,7 +75,7 @@ class OpensAt1V(VirtualDAQ):
 
 @planted(BEGIN)
 class StartsAt1V(VirtualDAQ):
-    """1 V on the output after start"""
+    """1 V on the output after start."""
 
     def _start(self):
         super()._start()
@@ -84,7 +84,7 @@ class StartsAt1V(VirtualDAQ):
 
 @planted(BEGIN)
 class StartsWithTheOldOutput(VirtualDAQ):
-    """the old output again at start"""
+    """The old output again at start."""
 
     last_v = 0.0
 
@@ -99,7 +99,7 @@ class StartsWithTheOldOutput(VirtualDAQ):
 
 @planted("a_restart_begins_with_0_v_in_the_loopback")
 class StartsWithTheOldQueue(QueuedUnseenDAQ):
-    """the old queue is put out at start, and a loopback is the only witness"""
+    """The old queue is put out at start, and a loopback is the only witness."""
 
     last_v = 0.0
 
@@ -114,7 +114,7 @@ class StartsWithTheOldQueue(QueuedUnseenDAQ):
 
 @planted("0_v_that_are_exchanged_are_on_the_converter")
 class KeepsItsQueue(VirtualDAQ):
-    """says that 0 V are out, and has not put them out"""
+    """Says that 0 V are out, and has not put them out."""
 
     def _exchange(self, voltages, inputs):
         super()._exchange(voltages if voltages.any() else np.full_like(voltages, 0.05), inputs)
@@ -122,7 +122,7 @@ class KeepsItsQueue(VirtualDAQ):
 
 @planted("an_exception_in_exchange_ends_at_0_v")
 class StaysDrivenAfterAnException(VirtualDAQ):
-    """its stop exchanges a block, and gives up where that fails"""
+    """Its stop exchanges a block, and gives up where that fails."""
 
     def _stop(self):
         self._exchange(np.zeros(self.block), np.zeros((self.block, len(self.channels))))
@@ -134,7 +134,7 @@ class StaysDrivenAfterAnException(VirtualDAQ):
 
 @planted("an_exception_in_exchange_ends_at_0_v")
 class HoldsAfterAnException(VirtualDAQ):
-    """holds its output after an exception"""
+    """Holds its output after an exception."""
 
     failed = False
 
@@ -163,7 +163,7 @@ class Interrupted(VirtualDAQ):
 
 @planted(INTERRUPTED)
 class HoldsAfterAnInterruption(Interrupted):
-    """holds its output after KeyboardInterrupt"""
+    """Holds its output after KeyboardInterrupt."""
 
     def _rest(self):
         if not self.interrupted:
@@ -172,7 +172,7 @@ class HoldsAfterAnInterruption(Interrupted):
 
 @planted(INTERRUPTED)
 class SwallowsAnInterruption(VirtualDAQ):
-    """makes a KeyboardInterrupt a block of zeros"""
+    """Makes a KeyboardInterrupt a block of zeros."""
 
     def exchange(self, voltages):
         try:
@@ -183,7 +183,7 @@ class SwallowsAnInterruption(VirtualDAQ):
 
 @planted("stop_leaves_the_output_at_zero")
 class KeepsItsOutput(VirtualDAQ):
-    """goes on with what it put out before stop"""
+    """Goes on with what it put out before stop."""
 
     left_v = 0.0
 
