@@ -23,9 +23,11 @@ class HostWatch:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._nap, name="conformance-host-watch", daemon=True)
 
-    def was_late(self, began_s: float, ended_s: float) -> bool:
-        """Whether the host was late between two times, or shortly before or after."""
-        return any(began < ended_s + AROUND_S and ended > began_s - AROUND_S for began, ended in tuple(self._late))
+    def late_s(self, began_s: float, ended_s: float) -> float:
+        """Longest time by which the host was late between two times, or shortly before or after, s; 0 if it was punctual."""
+        first_s, last_s = began_s - AROUND_S, ended_s + AROUND_S
+        near_s = [ended - began - NAP_S for began, ended in tuple(self._late) if began < last_s and ended > first_s]
+        return max(near_s, default=0.0)
 
     def _nap(self) -> None:
         while not self._over.is_set():

@@ -108,7 +108,7 @@ class DriverUnderTest(ABC):
             try:
                 yield host
             except (DaqOverrun, DaqTimeout, DaqWatchdog) as error:
-                if not host.was_late(began, time.perf_counter()):
+                if not host.late_s(began, time.perf_counter()):
                     raise
                 self.unproven(f"{TOO_BUSY}: {error}")
 

@@ -12,7 +12,7 @@ import numpy as np
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
 from rig.daq import DAQ
 
-__all__ = ["SLOW_TESTS", "TimingTests"]
+__all__ = ["HOST_FACTOR", "SLOW_TESTS", "TimingTests"]
 
 SLOW_TESTS = ("test_a_block_takes_no_longer_than_it_lasts", "test_no_block_comes_late")
 """Tests without which the others would take hours; they go first."""
@@ -24,6 +24,7 @@ SHORTEST_S = 0.1  # that a busy machine may need for any block
 TRIES = 3  # what happens in all of them is the driver's
 FIRST_BLOCKS = 20  # in which compilers run and buffers fill
 ENOUGH_STALLS = 3
+HOST_FACTOR = 3.0  # a device in another process of this machine may be late by so much more than the host
 BINS = 20
 MEDIAN_TO_ERROR = 1.4826 * 1.2533  # median deviation to the standard error of a median, times the root of the count
 SURE = 3.0  # standard errors
@@ -73,7 +74,8 @@ class TimingTests(DriverUnderTest):
         if min(seen) == 0.0:
             self.unproven(TOO_BUSY)
         raise AssertionError(
-            f"a block took up to {max(seen):.3g} s, and the host was not late: allowed is {self.late_s:g} s longer than usual"
+            f"a block took up to {max(seen):.3g} s, for which the host was not late enough: allowed is {self.late_s:g} s "
+            "longer than usual"
         )
 
     def _stalls_s(self) -> tuple[list[float], bool]:
@@ -87,7 +89,7 @@ class TimingTests(DriverUnderTest):
                 taken_s = self.seconds(daq, lambda: daq.exchange(voltages))
                 if taken_s <= usual_s + self.late_s:
                     continue
-                if host.was_late(began, time.perf_counter()):
+                if taken_s <= usual_s + self.late_s + HOST_FACTOR * host.late_s(began, time.perf_counter()):
                     host_was_late = True
                 else:
                     stalls_s.append(taken_s)

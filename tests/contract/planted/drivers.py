@@ -7,7 +7,9 @@ from collections import deque
 
 import numpy as np
 
+from rig.daq import HELD
 from rig.drivers.virtual import VirtualDAQ
+from rig.drivers.virtual.driver import COUNTED
 from rig.drivers.virtual.faults import OUTPUT_HELD
 from rig.errors import DaqDisconnected
 
@@ -69,6 +71,7 @@ class PacedDAQ(TimedDAQ):
         self._held.append(late)
         if self._held.popleft():
             self.flags |= OUTPUT_HELD
+            self._counts[COUNTED.index(HELD)] += self.block
 
 
 class UnseenDAQ(VirtualDAQ):
