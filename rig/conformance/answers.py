@@ -15,7 +15,7 @@ from rig.daq import DAQ, HELD, LOST, Channel, flag_names
 __all__ = ["FILTER_SAMPLES", "Answer", "Heard", "HearingTheOutput", "with_loopback"]
 
 FILTER_SAMPLES = 32  # over which a filter spreads an output
-LONGEST_RUN_S = 60.0
+LONGEST_RUN_S = 30.0
 SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks
 NO_LOOPBACK = (
     "nothing shows the output itself: connect it to an input, by a cable or a tee, and declare that channel with "
@@ -130,7 +130,7 @@ class HearingTheOutput(DriverUnderTest):
     def hear(self, daq: DAQ, outputs: np.ndarray, pauses: dict[int, float] | None = None) -> Heard:
         """Hand over outputs, whole blocks, in one array; ``pauses``: seconds that are waited before a block.
 
-        A run that takes longer than a minute ends there.
+        A run that takes longer than half a minute ends there.
         """
         block, columns = daq.block, [index for index, channel in enumerate(daq.channels) if channel.loopback]
         names = flag_names(daq.counters)

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from rig.conformance.subject import TOO_BUSY
-from rig.conformance.timing import HOST_FACTOR, TimingTests
+from rig.conformance.timing import TimingTests
 from rig.daq import State
 from rig.errors import DaqError
 
@@ -43,7 +43,7 @@ class GoneTests(TimingTests):
             daq.close()
         assert daq.state is State.CLOSED, f"after close the driver is {daq.state.value}"
         for what, taken_s in (("exchange", closing_s - before_s), ("close", closed_s - closing_s)):
-            if self.prompt_s < taken_s <= self.prompt_s + HOST_FACTOR * host_late_s:
+            if self.prompt_s < taken_s <= self.prompt_s + host_late_s:
                 self.unproven(TOO_BUSY)
             assert taken_s <= self.prompt_s, (
                 f"{what} takes {taken_s:.3g} s once the device is gone: allowed is {self.prompt_s:g} s"

@@ -13,7 +13,7 @@ from rig.bench import Bench
 from rig.conformance.contract import DriverContract
 from rig.conformance.loopback import with_loopback
 from rig.conformance.subject import NotApplicable, Unproven
-from rig.conformance.timing import SLOW_TESTS
+from rig.conformance.timing import SLOW_TEST
 from rig.conformance.without_host import KILLING_TEST, last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
@@ -95,11 +95,11 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     contract = _OnBench(bench, output_log)
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
     slow = False
-    for name in sorted(names, key=lambda name: name not in SLOW_TESTS):
+    for name in sorted(names, key=lambda name: name != SLOW_TEST):
         found = _found(contract, name) if not slow else _left_out(contract, name)
         yield found
         _clear_after(found, name, contract)
-        slow = slow or (name in SLOW_TESTS and found.outcome == "failed")
+        slow = slow or (name == SLOW_TEST and found.outcome == "failed")
 
 
 def unproven(findings: Iterable[Finding]) -> dict[str, list[str]]:

@@ -205,8 +205,8 @@ class SamplesTests(DriverUnderTest):
                 for _ in range(20):
                     counted = sum(daq.counters.values())
                     inputs = daq.exchange(np.zeros(daq.block))
-                    said = daq.flags.dtype, daq.flags.shape
-                    assert said == (np.uint16, (daq.block,)), f"flags are {said}: allowed is uint16 [{daq.block}]"
+                    said = f"{daq.flags.dtype} {daq.flags.shape}"
+                    assert said == f"uint16 ({daq.block},)", f"flags are {said}: allowed is uint16 ({daq.block},)"
                     lost = (daq.flags & LOST) != 0
                     assert np.isnan(inputs[lost]).all(), "a row that is flagged as lost is not NaN"
                     assert np.isfinite(inputs[~lost]).all(), "a row that is not flagged as lost is not finite"
