@@ -17,6 +17,10 @@ __all__ = ["FILTER_SAMPLES", "Answer", "Heard", "HearingTheOutput", "with_loopba
 FILTER_SAMPLES = 32  # over which a filter spreads an output
 LONGEST_RUN_S = 30.0
 SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks
+TOO_LATE = (
+    HELD,
+    "watchdog",
+)  # flags of samples at which the converter had another output, for the next one came too late
 NO_LOOPBACK = (
     "nothing shows the output itself: connect it to an input, by a cable or a tee, and declare that channel with "
     "loopback = true"
@@ -134,7 +138,7 @@ class HearingTheOutput(DriverUnderTest):
         """
         block, columns = daq.block, [index for index, channel in enumerate(daq.channels) if channel.loopback]
         names = flag_names(daq.counters)
-        held_bit = 1 << names.index(HELD) if HELD in names else 0
+        late_bits = sum(1 << names.index(name) for name in TOO_LATE if name in names)
         voltages, read, flags = (
             np.zeros(block),
             np.full((outputs.size, len(columns)), np.nan),
@@ -152,5 +156,5 @@ class HearingTheOutput(DriverUnderTest):
                 break
         channels = tuple(daq.channels[column] for column in columns)
         read /= [channel.sensitivity_v_per_unit for channel in channels]
-        lost, held = (flags & LOST) != 0, (flags & held_bit) != 0
+        lost, held = (flags & LOST) != 0, (flags & late_bits) != 0
         return Heard(outputs[:end], read[:end], lost[:end], held[:end], block, daq.latency_samples, channels)

@@ -123,7 +123,8 @@ def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
 def _found(contract: DriverContract, name: str) -> Finding:
     words, duty = _words(contract, name)
     try:
-        getattr(contract, name)()
+        with contract.punctual():
+            getattr(contract, name)()
     except Unproven as reason:
         return Finding(words, duty, "unproven", str(reason))
     except NotApplicable as reason:

@@ -1,6 +1,5 @@
 """Every planted fault is failed by the kit, in the test that names it; the good drivers that it is planted in are not."""
 
-
 import numpy as np
 import pytest
 
