@@ -35,7 +35,7 @@ class TripsOnce(VirtualDAQ):
         super().start(block)
 
     def _exchange(self, voltages, inputs):
-        if TripsOnce.starts == 3:
+        if TripsOnce.starts == 2:
             TripsOnce.is_latched = True
             raise DaqWatchdog("no output came")
         super()._exchange(voltages, inputs)
