@@ -21,9 +21,9 @@ def conformance(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Test an installed driver against the contract that every driver keeps."""
+    """Test an installed driver against the contract that every driver keeps; say at the end what is unproven, and why."""
     from rig.bench import DriverChoice, load_bench
-    from rig.conformance.run import check_driver, require_arming
+    from rig.conformance.run import OUTCOMES, check_driver, require_arming, unproven
     from rig.text.console import print_json
 
     chosen = load_bench(bench)
@@ -41,9 +41,9 @@ def conformance(
     if json:
         print_json({"bench": chosen.name, "driver": chosen.driver.name, "tests": [asdict(f) for f in found]})
     else:
-        apart = sum(finding.outcome == "not applicable" for finding in found)
-        print(
-            f"driver {chosen.driver.name}: {len(found) - failed - apart} passed, {failed} failed, {apart} not applicable"
-        )
+        counts = [f"{sum(one.outcome == outcome for one in found)} {outcome}" for outcome in OUTCOMES]
+        print(f"driver {chosen.driver.name}: {', '.join(counts)}")
+        for reason, tests in unproven(found).items():
+            print(f"unproven: {', '.join(tests)}: {reason}")
     if failed:
         raise typer.Exit(1)

@@ -6,7 +6,7 @@ For a driver's own tests derive from `DriverContract`; for any installed driver 
 
 from rig.conformance.contract import DriverContract
 from rig.conformance.loopback import with_loopback
-from rig.conformance.subject import NotApplicable
-from rig.conformance.ways_out import last_output_v
+from rig.conformance.subject import NotApplicable, Unproven
+from rig.conformance.without_host import last_output_v
 
-__all__ = ["DriverContract", "NotApplicable", "last_output_v", "with_loopback"]
+__all__ = ["DriverContract", "NotApplicable", "Unproven", "last_output_v", "with_loopback"]

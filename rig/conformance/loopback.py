@@ -1,80 +1,131 @@
-"""The index equation and the latency, by a channel that the output itself is connected to."""
-
-import math
+"""The index equation, the latency and the gain, by channels that the output itself is connected to."""
 
 import numpy as np
 
-from rig.bench import Bench
-from rig.conformance.subject import DriverUnderTest
-from rig.daq import DAQ, Channel
+from rig.conformance.answers import FILTER_SAMPLES, Heard, HearingTheOutput, with_loopback
+from rig.conformance.subject import TOO_BUSY, has_clock
+from rig.errors import DaqOverrun, DaqTimeout, DaqWatchdog
 
 __all__ = ["LoopbackTests", "with_loopback"]
 
 LATE_SAMPLES = 0.25  # as `rig check` allows
-FILTER_SAMPLES = 32  # over which a filter spreads an output
 LEAST_TAP = 0.05  # of the largest: below it is noise
-NO_LOOPBACK = "no channel is declared with loopback = true: nothing shows the output itself"
+GAIN_SHARE = 0.05  # of one: what converters are off by, and far below a wrong range
+NOT_EXPLAINED = 0.5  # of the amplitude: an output that is missing leaves all of it
+RANGE_SHARE = 0.95  # of the range that is declared
+SURE = 3.0  # standard errors
+FARTHEST = 6.0  # times its RMS: beyond it there is no noise in any number of samples that is tried
+MEDIAN_TO_RMS = 1.4826  # of the magnitude of a normal variable
+FIT_SAMPLES = 4000
 
 
-def with_loopback(bench: Bench) -> Bench | None:
-    """A bench that has a loopback: itself, or that of a virtual rig with one; None where it takes a cable."""
-    if any(channel.loopback for channel in bench.channels):
-        return bench
-    if bench.driver.name != "virtual":
-        return None
-    loop = Channel(name="loopback", role="monitor", unit="V", sensitivity_v_per_unit=1.0, loopback=True)
-    return bench.model_copy(update={"channels": (*bench.channels, loop)})
-
-
-class LoopbackTests(DriverUnderTest):
+class LoopbackTests(HearingTheOutput):
     """Tests that see the output."""
 
+    long_run_blocks = 8000
+    """Blocks over which every output is looked for: what happens once in 1000 blocks happens eight times."""
+
     def test_every_output_shows_in_the_loopback_once_and_in_its_order(self) -> None:
-        """Of random outputs within ``amplitude_v``, none is left out, doubled, or in another's place."""
-        for block in self.blocks:
-            taps, left = self._loopback(block)
-            assert np.abs(left).max() < 0.5 * self.amplitude_v, (
-                f"block {block}: the loopback differs by up to {np.abs(left).max():.3g} V from what was handed over, "
-                f"whichever of {taps.size} delays it is given"
-            )
+        """Of thousands of random outputs none is left out, doubled, or in another's place, and every reading is a number."""
+        for heard in self.hear_each_block():
+            self._require_order(heard)
+        with self.loopback_running() as daq:
+            heard = self.hear(daq, self.signs(self.long_run_blocks * daq.block))
+        self._require_order(heard)
 
     def test_the_latency_is_that_of_the_loopback(self) -> None:
         """Outputs show neither earlier nor later than ``latency_samples``, and ``skew_samples`` of the channel, say."""
-        for block in self.blocks:
-            taps, _ = self._loopback(block)
-            taps = np.where(np.abs(taps) > LEAST_TAP * np.abs(taps).max(), taps, 0.0)
-            seen = float(np.arange(taps.size) @ taps / taps.sum())
-            assert abs(seen - self._said_samples) <= LATE_SAMPLES, (
-                f"block {block}: an output shows after {seen:.2f} samples, the driver says {self._said_samples:g}"
+        for heard in self.hear_each_block():
+            for column, channel in enumerate(heard.channels):
+                taps = self.answer(heard, column).taps
+                taps = np.where(np.abs(taps) > LEAST_TAP * np.abs(taps).max(), taps, 0.0)
+                seen = float(np.arange(taps.size) @ taps / taps.sum())
+                said = heard.latency_samples + channel.skew_samples
+                assert abs(seen - said) <= LATE_SAMPLES, (
+                    f"block {heard.block}: an output shows in {channel.name} after {seen:.2f} samples, "
+                    f"the driver says {said:g}"
+                )
+
+    def test_the_loopback_reads_the_voltage_that_was_handed_over(self) -> None:
+        """Gain one with its sign, within 5 %, and nothing beside: a wrong range, sign or column shows here."""
+        for heard in self.hear_each_block():
+            for column, channel in enumerate(heard.channels):
+                answer = self.answer(heard, column)
+                gain, allowed = float(answer.taps.sum()), GAIN_SHARE + SURE * answer.gain_error
+                assert abs(gain - 1.0) <= allowed, (
+                    f"block {heard.block}: channel {channel.name} reads {gain:.3g} times what was handed over: allowed is "
+                    f"{1.0 - allowed:.3g} to {1.0 + allowed:.3g}"
+                )
+                assert abs(answer.offset_v) <= self.tolerance_v, (
+                    f"block {heard.block}: channel {channel.name} reads {answer.offset_v:.3g} V beside what was handed over: "
+                    f"allowed is +-{self.tolerance_v:g} V"
+                )
+
+    def test_a_restart_begins_with_0_v_in_the_loopback(self) -> None:
+        """Driven, stopped and started with 0 V: neither old outputs of the queue nor old readings come back."""
+        with self.loopback_running() as daq:
+            self.hear(daq, np.full((daq.queue_blocks + 2) * daq.block, self.amplitude_v))
+            daq.stop()
+            daq.start(daq.block)
+            heard = self.hear(daq, np.zeros((daq.queue_blocks + 2) * daq.block))
+        for first in range(0, len(heard.read), daq.block):
+            read_v = float(np.sqrt(np.nanmean(heard.read[first : first + daq.block] ** 2, axis=0)).max())
+            assert read_v <= NOT_EXPLAINED * self.amplitude_v, (
+                f"the loopback reads {read_v:.3g} V RMS from sample {first} on, where nothing but 0 V was handed over"
             )
 
-    def _loopback(self, block: int) -> tuple[np.ndarray, np.ndarray]:
-        """Answer of the loopback to one output by its delay in samples, V/V, and what it leaves unexplained, V."""
-        daq = self.make_loopback()
-        if daq is None:
-            self.skip(NO_LOOPBACK)
-        assert daq is not None
-        with daq:
-            if block > daq.capabilities.largest_block:
-                self.skip(f"block {block}: the driver takes up to {daq.capabilities.largest_block}")
-            column = next(index for index, channel in enumerate(daq.channels) if channel.loopback)
-            daq.start(block)
-            self._said_samples = daq.latency_samples + daq.channels[column].skew_samples
-            delays = math.ceil(max(0.0, daq.latency_samples)) + 2 * block + FILTER_SAMPLES
-            outputs, seen = self._exchanged(daq, block, 4 * delays + 400, column)
-        shifted = np.column_stack(
-            [np.concatenate([np.zeros(lag), outputs[: outputs.size - lag]]) for lag in range(delays)]
-        )
-        there = np.isfinite(seen)
-        taps = np.linalg.lstsq(shifted[there], seen[there], rcond=None)[0]
-        return taps, seen[there] - shifted[there] @ taps
+    def test_voltages_up_to_the_range_are_put_out(self) -> None:
+        """Up to 95 % of ``output_range_v``, only where nothing moves: what is not refused is put out as it is."""
+        with self.loopback_running() as daq:
+            if not daq.capabilities.virtual:
+                self.unproven(f"something would move: nothing is driven at more than {self.amplitude_v:g} V")
+            ranges = [channel.range_v for channel in daq.channels if channel.loopback]
+            level_v = RANGE_SHARE * min(daq.output_range_v, *ranges)
+            hold = daq.block * -(-(int(daq.latency_samples) + 4 * FILTER_SAMPLES) // daq.block)
+            heard = self.hear(daq, np.repeat([level_v, -level_v], hold))
+        for side_v, half in ((level_v, slice(0, hold)), (-level_v, slice(hold, None))):
+            there = np.flatnonzero(heard.usable[half])
+            if not (there.size and there[-1] >= hold - FILTER_SAMPLES):
+                self.unproven(f"{TOO_BUSY}: outputs came too late")
+            read_v = heard.read[half][there[-1]]
+            off_v = np.abs(read_v - side_v)
+            assert off_v.max() <= GAIN_SHARE * level_v, (
+                f"{side_v:g} V were handed over and {read_v[off_v.argmax()]:.3g} V are put out, without a word: "
+                f"output_range_v is said to be {daq.output_range_v:g} V"
+            )
 
-    def _exchanged(self, daq: DAQ, block: int, samples: int, column: int) -> tuple[np.ndarray, np.ndarray]:
-        """Random outputs, handed over in one array, and what the loopback reads of them, V."""
-        blocks = -(-samples // block)
-        outputs = self.amplitude_v * np.random.default_rng(1).choice([-1.0, 1.0], blocks * block)
-        voltages, seen = np.zeros(block), np.empty(blocks * block)
-        for first in range(0, seen.size, block):
-            voltages[:] = outputs[first : first + block]
-            seen[first : first + block] = daq.exchange(voltages)[:, column]
-        return outputs, seen / daq.channels[column].sensitivity_v_per_unit
+    def test_after_an_underrun_every_output_has_its_place_again(self) -> None:
+        """A host that is late by more than the queue gets outputs that are flagged as held, or an error; then the old order."""
+        with self.loopback_running() as daq:
+            if not has_clock(daq):
+                self.skip("the device waits for the host: nothing comes too late")
+            block_s, queue = daq.block / daq.sample_rate_hz, daq.queue_blocks
+            before = FIT_SAMPLES // daq.block + 1
+            after = 4 * (queue + 4) + (int(daq.latency_samples) + 8 * FILTER_SAMPLES) // daq.block + 40
+            outputs = self.signs((before + after) * daq.block)
+            try:
+                heard = self.hear(daq, outputs, pauses={before: (queue + 4) * block_s})
+            except (DaqOverrun, DaqTimeout, DaqWatchdog):
+                heard = None  # the device says so, and ends the run
+        if heard is None:
+            with self.loopback() as daq:
+                daq.clear()  # what this test has made latch
+            return
+        if not heard.usable[-30 * heard.block :].any():
+            self.unproven("the host was late: outputs were held until the end")
+        self._require_order(heard)
+
+    def _require_order(self, heard: Heard) -> None:
+        usable = heard.usable
+        for column, channel in enumerate(heard.channels):
+            answer = self.answer(heard, column, FIT_SAMPLES)
+            left = np.abs(answer.left)
+            noise_v = MEDIAN_TO_RMS * float(np.nanmedian(left[usable]))
+            if FARTHEST * noise_v > self.amplitude_v:
+                self.unproven(f"channel {channel.name}: {noise_v:.3g} V RMS of noise hide {self.amplitude_v:g} V")
+            wrong = np.flatnonzero(usable & ~(left < max(NOT_EXPLAINED * self.amplitude_v, FARTHEST * noise_v)))
+            assert not wrong.size, (
+                f"block {heard.block}: channel {channel.name} differs by {left[wrong[0]]:.3g} V from what was handed over, "
+                f"whichever of {answer.taps.size} delays it is given, at {wrong.size} of {usable.sum()} samples, first at "
+                f"sample {wrong[0]}"
+            )

@@ -1,32 +1,39 @@
 """The contract without pytest: every test once over an installed driver, with what came out."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
+
+import numpy as np
 
 from rig.bench import Bench
 from rig.conformance.contract import DriverContract
 from rig.conformance.loopback import with_loopback
-from rig.conformance.subject import NotApplicable
+from rig.conformance.subject import NotApplicable, Unproven
 from rig.conformance.timing import SLOW_TEST
-from rig.conformance.ways_out import KILLING_TEST, last_output_v
+from rig.conformance.without_host import KILLING_TEST, last_output_v
 from rig.daq import DAQ
 from rig.drivers import make_daq
+from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqError, NotArmed
 
-__all__ = ["Finding", "check_driver", "require_arming"]
+__all__ = ["OUTCOMES", "Finding", "check_driver", "require_arming", "unproven"]
+
+Outcome = Literal["passed", "failed", "not applicable", "unproven"]
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
+"""In the order in which they are counted."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of one test of the contract; ``detail`` says why it failed or did not apply."""
+    """Result of one test of the contract; ``detail`` says why it failed, did not apply, or what would prove it."""
 
     test: str
     duty: str
-    outcome: Literal["passed", "failed", "not applicable"]
+    outcome: Outcome
     detail: str = ""
 
 
@@ -49,8 +56,19 @@ class _OnBench(DriverContract):
     def witness(self, daq: DAQ | None) -> float | None:
         return super().witness(daq) if self._output_log is None else last_output_v(self._output_log)
 
+    def known_inputs(self, outputs: np.ndarray, block: int) -> np.ndarray | None:
+        """Those of a virtual rig of the same bench."""
+        if self._bench.driver.name != "virtual":
+            return None
+        with VirtualDAQ(self._bench) as known:
+            known.start(block)
+            return np.vstack([known.exchange(part.copy()) for part in outputs.reshape(-1, block)])
+
     def skip(self, reason: str) -> None:
         raise NotApplicable(reason)
+
+    def unproven(self, reason: str) -> None:
+        raise Unproven(reason)
 
 
 def require_arming(bench: Bench, arm: bool) -> None:
@@ -84,9 +102,18 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
         slow = slow or (name == SLOW_TEST and found.outcome == "failed")
 
 
+def unproven(findings: Iterable[Finding]) -> dict[str, list[str]]:
+    """The tests that could not be judged, by the reason."""
+    out: dict[str, list[str]] = {}
+    for finding in findings:
+        if finding.outcome == "unproven":
+            out.setdefault(finding.detail, []).append(finding.test)
+    return out
+
+
 def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
-    """Clear the watchdog that a test makes latch, or that a failure has left latched where nothing moves."""
-    if name != KILLING_TEST and found.outcome != "failed":
+    """Clear the watchdog that a test makes latch, or that a test that was not passed has left latched where nothing moves."""
+    if name != KILLING_TEST and found.outcome not in ("failed", "unproven"):
         return
     with suppress(DaqError), contract.make() as daq:
         if name == KILLING_TEST or daq.capabilities.virtual:
@@ -96,7 +123,10 @@ def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
 def _found(contract: DriverContract, name: str) -> Finding:
     words, duty = _words(contract, name)
     try:
-        getattr(contract, name)()
+        with contract.punctual():
+            getattr(contract, name)()
+    except Unproven as reason:
+        return Finding(words, duty, "unproven", str(reason))
     except NotApplicable as reason:
         return Finding(words, duty, "not applicable", str(reason))
     except Exception as error:  # a driver may fail in any way: that is what is looked for

@@ -131,7 +131,7 @@ def _verified(bench: Bench, log: Path) -> Verified:
         utc=_utc(),
         passed=outcomes.count("passed"),
         failed=outcomes.count("failed"),
-        not_applicable=outcomes.count("not applicable"),
+        not_applicable=outcomes.count("not applicable") + outcomes.count("unproven"),
         failures=tuple(f"{one.test}: {one.detail}" for one in found if one.outcome == "failed"),
     )
 

@@ -11,32 +11,43 @@ from rig.bench import Bench
 from rig.conformance import DriverContract, last_output_v, with_loopback
 from rig.daq import DAQ
 from rig.drivers import make_daq
+from rig.drivers.virtual import VirtualDAQ
 from rig.drivers.wire import WireOptions
 from rig.emulator.emulated import emulated
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ
 
 
+def known_inputs(bench: Bench, outputs: np.ndarray, block: int) -> np.ndarray:
+    """What the rig behind an emulated device reads, without any wire."""
+    with VirtualDAQ(bench) as known:
+        known.start(block)
+        return np.vstack([known.exchange(part.copy()) for part in outputs.reshape(-1, block)])
+
+
 @dataclass
 class Reached:
-    """An emulated bench with a loopback, and what its device writes down."""
+    """An emulated bench with a loopback, what its device writes down, and the virtual bench behind it."""
 
     bench: Bench
     log: Path
+    virtual: Bench
 
 
 @pytest.fixture(scope="module")
 def serial_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reached]:
     log = tmp_path_factory.mktemp("serial") / "log"
-    with emulated(with_loopback(bench_with()), "serial", log_output=log) as bench:
-        yield Reached(bench, log)
+    virtual = with_loopback(bench_with())
+    with emulated(virtual, "serial", log_output=log) as bench:
+        yield Reached(bench, log, virtual)
 
 
 @pytest.fixture(scope="module")
 def can_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reached]:
     log = tmp_path_factory.mktemp("can") / "log"
-    with emulated(with_loopback(bench_with()), "can", log_output=log) as bench:
-        yield Reached(bench, log)
+    virtual = with_loopback(bench_with())
+    with emulated(virtual, "can", log_output=log) as bench:
+        yield Reached(bench, log, virtual)
 
 
 class InMemory(DriverContract):
@@ -51,6 +62,19 @@ class InMemory(DriverContract):
     def over(self, bench: Bench) -> DAQ:
         return MemoryDAQ(bench, simulated=2)
 
+    def known_inputs(self, outputs: np.ndarray, block: int) -> np.ndarray:
+        return known_inputs(bench_with(), outputs, block)
+
+    def now_s(self, daq: DAQ) -> float:
+        return float(daq.wire.now_s)
+
+    def pause(self, daq: DAQ, seconds: float) -> None:
+        daq.wire.pass_time(seconds)
+
+    def unplug(self, daq: DAQ) -> bool:
+        daq.wire.cut = True
+        return True
+
     def witness(self, daq: DAQ | None) -> float | None:
         if daq is None:
             return None
@@ -64,16 +88,20 @@ class TestLockstepInMemory(InMemory):
 
 class TestByTheClockInMemory(InMemory):
     def over(self, bench: Bench) -> DAQ:
-        return MemoryDAQ(bench, options=WireOptions(queue_blocks=2), lockstep=False, simulated=2)
+        return MemoryDAQ(bench, options=WireOptions(queue_blocks=2), lockstep=False, simulated=1)
 
 
 class OverAPort(DriverContract):
     """The device is in another process and writes down its output."""
 
     reached: Reached
+    long_run_blocks = 2000  # `rig conformance` looks at more
 
     def make(self) -> DAQ:
         return make_daq(self.reached.bench)
+
+    def known_inputs(self, outputs: np.ndarray, block: int) -> np.ndarray:
+        return known_inputs(self.reached.virtual, outputs, block)
 
     def witness(self, daq: DAQ | None) -> float | None:
         return last_output_v(self.reached.log)

@@ -84,8 +84,9 @@ class TestConformance(OverAPort):
     @classmethod
     def _reached(cls, image: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         log = tmp_path_factory.mktemp("arm") / "log"
-        with emulated(with_loopback(bench_with()), "serial", log_output=log, firmware=image) as bench:
-            cls.reached = Reached(bench, log)
+        virtual = with_loopback(bench_with())
+        with emulated(virtual, "serial", log_output=log, firmware=image) as bench:
+            cls.reached = Reached(bench, log, virtual)
             yield
 
 

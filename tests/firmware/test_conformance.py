@@ -25,7 +25,7 @@ class Wire(OverAPort):
         bench = with_loopback(bench_at(cls.rate))
         assert bench is not None
         with emulated(bench, cls.wire, log_output=log, firmware=built("host-sanitized"), fd=cls.fd) as far:
-            cls.reached = Reached(far, log)
+            cls.reached = Reached(far, log, bench)
             yield
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from vibrolock_box import BoxDAQ
 
-from rig.bench import load_bench
+from rig.bench import Bench, load_bench
 from rig.conformance import DriverContract
 from rig.daq import DAQ
 
@@ -22,8 +22,14 @@ class TestBox(DriverContract):
         return BoxDAQ(load_bench(BENCH))
 
     def witness(self, daq: DAQ | None) -> float | None:
-        """What is on the stand-in's output; with a real box, what a meter reads there."""
-        return abs(daq.device.output_v) if isinstance(daq, BoxDAQ) and daq.device is not None else None
+        """What is on the stand-in's output, also once the driver has let go; with a real box, what a meter reads there."""
+        if isinstance(daq, BoxDAQ) and daq.device is not None:
+            self._seen = daq.device
+        return None if daq is None else abs(self._seen.output_v)
+
+    def bench_for_another_process(self) -> Bench:
+        """The bench, to compare the driver with."""
+        return load_bench(BENCH)
 
     def unplug(self, daq: DAQ) -> bool:
         """Pull the stand-in's cable."""

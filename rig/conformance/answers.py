@@ -1,0 +1,160 @@
+"""What a loopback reads of random outputs, and the answer to one output that this amounts to."""
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.bench import Bench
+from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
+from rig.daq import DAQ, HELD, LOST, Channel, flag_names
+
+__all__ = ["FILTER_SAMPLES", "Answer", "Heard", "HearingTheOutput", "with_loopback"]
+
+FILTER_SAMPLES = 32  # over which a filter spreads an output
+LONGEST_RUN_S = 30.0
+SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks
+TOO_LATE = (
+    HELD,
+    "watchdog",
+)  # flags of samples at which the converter had another output, for the next one came too late
+NO_LOOPBACK = (
+    "nothing shows the output itself: connect it to an input, by a cable or a tee, and declare that channel with "
+    "loopback = true"
+)
+
+
+def with_loopback(bench: Bench) -> Bench | None:
+    """A bench that has a loopback: itself, or that of a virtual rig with one; None where it takes a cable."""
+    if any(channel.loopback for channel in bench.channels):
+        return bench
+    if bench.driver.name != "virtual":
+        return None
+    loop = Channel(name="loopback", role="monitor", unit="V", sensitivity_v_per_unit=1.0, loopback=True)
+    return bench.model_copy(update={"channels": (*bench.channels, loop)})
+
+
+class Heard(NamedTuple):
+    """Outputs and what the loopbacks read of them."""
+
+    outputs: np.ndarray
+    """float64[n], V."""
+    read: np.ndarray
+    """float64[n, loopbacks], V; NaN where it was lost or is none."""
+    lost: np.ndarray
+    """bool[n]: flagged as lost."""
+    held: np.ndarray
+    """bool[n]: flagged as held: another output than this one was on the converter."""
+    block: int
+    latency_samples: float
+    """As the driver says it."""
+    channels: tuple[Channel, ...]
+    """The loopbacks."""
+
+    @property
+    def usable(self) -> np.ndarray:
+        """bool[n]: samples that were neither lost nor can have been changed by an output that was held."""
+        near = np.convolve(self.held, np.ones(2 * FILTER_SAMPLES + 1))[FILTER_SAMPLES:-FILTER_SAMPLES] > 0.5
+        return ~self.lost & ~near
+
+
+class Answer(NamedTuple):
+    """Answer of a loopback to one output, by least squares."""
+
+    taps: np.ndarray
+    """float64[delays]: V/V by the delay in samples."""
+    offset_v: float
+    left: np.ndarray
+    """float64[n]: what the answer leaves unexplained, V."""
+    gain_error: float
+    """Standard error of the sum of the taps."""
+
+    @classmethod
+    def of(cls, heard: Heard, column: int, samples: int | None = None) -> "Answer":
+        """Least squares over the first ``samples``; what it leaves, over all."""
+        delays = math.ceil(max(0.0, heard.latency_samples)) + 2 * heard.block + FILTER_SAMPLES
+        outputs, read = heard.outputs, heard.read[:, column]
+        part = slice(0, None if samples is None else max(samples, 4 * delays))
+        columns = [np.concatenate([np.zeros(lag), outputs[: outputs.size - lag]])[part] for lag in range(delays)]
+        shifted = np.column_stack([*columns, np.ones(outputs[part].size)])
+        there = (heard.usable & np.isfinite(read))[part]
+        found = np.linalg.lstsq(shifted[there], read[part][there], rcond=None)[0]
+        taps, offset_v = found[:-1], float(found[-1])
+        left = read - offset_v - np.convolve(outputs, taps)[: outputs.size]
+        scatter = float(np.std(left[part][there])) / (float(np.std(outputs)) * math.sqrt(max(1, there.sum())))
+        return cls(taps, offset_v, left, scatter * math.sqrt(delays))
+
+
+class HearingTheOutput(DriverUnderTest):
+    """Steps of tests that use a loopback."""
+
+    def loopback(self) -> DAQ:
+        """A driver that is not open, with a loopback."""
+        daq = self.make_loopback()
+        if daq is None:
+            self.unproven(NO_LOOPBACK)
+        assert daq is not None
+        return daq
+
+    def allowed_blocks(self, daq: DAQ) -> list[int]:
+        """The block sizes that are tried, up to the largest that the driver allows.
+
+        By a clock none is shorter than a millisecond, which Python is too slow for.
+        """
+        shortest = math.ceil(SHORTEST_BLOCK_S * daq.sample_rate_hz) if has_clock(daq) else 1
+        return sorted({min(max(block, shortest), daq.capabilities.largest_block) for block in self.blocks})
+
+    def answer(self, heard: Heard, column: int, samples: int | None = None) -> Answer:
+        """The answer of a loopback, if enough of its readings are usable."""
+        if heard.usable[:samples].sum() < heard.usable[:samples].size // 2:
+            self.unproven(f"{TOO_BUSY}: outputs came too late for half of the samples")
+        return Answer.of(heard, column, samples)
+
+    def hear_each_block(self) -> list[Heard]:
+        """Random outputs in blocks of every size that is tried."""
+        with self.loopback() as daq:
+            blocks = self.allowed_blocks(daq)
+        return [self._heard_in(block) for block in blocks]
+
+    def _heard_in(self, block: int) -> Heard:
+        with self.loopback_running(block) as daq:
+            delays = math.ceil(max(0.0, daq.latency_samples)) + 2 * block + FILTER_SAMPLES
+            return self.hear(daq, self.signs(block * -(-(4 * delays + 400) // block)))
+
+    @contextmanager
+    def loopback_running(self, block: int | None = None) -> Iterator[DAQ]:
+        """A driver with a loopback that is running, in blocks of a size, or of the largest that is tried."""
+        with self.punctual(), self.loopback() as daq:
+            daq.start(min(block or max(self.blocks), daq.capabilities.largest_block))
+            yield daq
+
+    def hear(self, daq: DAQ, outputs: np.ndarray, pauses: dict[int, float] | None = None) -> Heard:
+        """Hand over outputs, whole blocks, in one array; ``pauses``: seconds that are waited before a block.
+
+        A run that takes longer than half a minute ends there.
+        """
+        block, columns = daq.block, [index for index, channel in enumerate(daq.channels) if channel.loopback]
+        names = flag_names(daq.counters)
+        late_bits = sum(1 << names.index(name) for name in TOO_LATE if name in names)
+        voltages, read, flags = (
+            np.zeros(block),
+            np.full((outputs.size, len(columns)), np.nan),
+            np.zeros(outputs.size, int),
+        )
+        began, end = time.monotonic(), outputs.size
+        for first in range(0, outputs.size, block):
+            if pauses and first // block in pauses:
+                self.pause(daq, pauses[first // block])
+            voltages[:] = outputs[first : first + block]
+            read[first : first + block] = daq.exchange(voltages)[:, columns]
+            flags[first : first + block] = daq.flags
+            if time.monotonic() - began > LONGEST_RUN_S:
+                end = first + block
+                break
+        channels = tuple(daq.channels[column] for column in columns)
+        read /= [channel.sensitivity_v_per_unit for channel in channels]
+        lost, held = (flags & LOST) != 0, (flags & late_bits) != 0
+        return Heard(outputs[:end], read[:end], lost[:end], held[:end], block, daq.latency_samples, channels)
