@@ -52,13 +52,14 @@ class Spoilt(VirtualDAQ):
         super().__init__(bench, 0)
         self.from_sample, self.readings, self.output = from_sample, readings, output
         self.voltages, self.forces = [], []
+        self._volts_per_newton = bench.channels[bench.index_of("force")].sensitivity_v_per_unit
 
     def _exchange(self, voltages, inputs):
         spoilt = self._first >= self.from_sample
         sent = voltages if self.output is None or not spoilt else self.output(voltages)
         super()._exchange(sent, inputs)
         self.voltages.append(float(np.abs(voltages).max()))
-        self.forces.append(float(np.abs(inputs[:, FORCE_CHANNEL]).max() / 0.1124))
+        self.forces.append(float(np.abs(inputs[:, FORCE_CHANNEL]).max() / self._volts_per_newton))
         if spoilt and self.readings is not None:
             self.readings(inputs)
 
@@ -120,8 +121,9 @@ def test_a_load_cell_that_dies_under_force_control_trips_before_the_output_has_d
     daq, tick, bench = _run(plan, 20.0 if plan.startswith("magnet") else 4.0, readings=fault)
     before_v, peak_v = daq.peaks_v()
     reason = EndReason(int(tick.guard["reason"][0]))
-    # noise instead of a force has no phase either: the friction beam's lock may be lost before the level is missed
-    assert reason in (EndReason.LEVEL_NOT_FOLLOWED, EndReason.LOST_LOCK)
+    # noise instead of a force has no phase either: the friction beam's lock may be lost before the level is missed, and its
+    # filter is so slow that the output over the force has changed before the output has risen
+    assert reason in (EndReason.LEVEL_NOT_FOLLOWED, EndReason.GAIN_CHANGED, EndReason.LOST_LOCK)
     assert peak_v <= LARGEST_RISE * CREEP**3 * before_v
     assert _periods_to_the_trip(daq, tick, bench) < 60.0
     if reason is EndReason.LEVEL_NOT_FOLLOWED:
