@@ -32,6 +32,10 @@ class SoundRun(NamedTuple):
     reason: EndReason
     astray_periods: int
     unlike_periods: float
+    highest: float = 0.0
+    """Largest ratio of what is held to its level, under a lock."""
+    gain_changed: float = 0.0
+    """Largest factor by which the output over what is held has changed beyond what is explained."""
 
 
 def held_level_plans() -> list[str]:
@@ -66,6 +70,8 @@ def sound_run(name: str, seed: int, noise: float) -> SoundRun:
         EndReason(int(loop.tick.guard["reason"][0])),
         int(seen["most_periods"]),
         float(seen["most_unlike_s"]) * bench.specimen.linear_frequency_hz,
+        float(seen["kept"]["highest"]),
+        float(seen["kept"]["most_changed"]),
     )
 
 

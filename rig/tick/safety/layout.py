@@ -78,7 +78,7 @@ TEXT = {
     EndReason.EMERGENCY_STOP: "emergency stop",
     EndReason.LEVEL_NOT_FOLLOWED: "the output rose and what it should hold did not follow",
     EndReason.PLANT_CONTRADICTED: "force and motion are not those that the known plant gives for this output",
-    EndReason.OVER_LEVEL: "far above its level",
+    EndReason.OVER_LEVEL: "force or motion far above its level",
     EndReason.GAIN_CHANGED: "the output that the level takes has changed by more than the rig explains",
 }
 """One line for each reason."""
