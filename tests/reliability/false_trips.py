@@ -34,8 +34,8 @@ class SoundRun(NamedTuple):
     unlike_periods: float
     highest: float = 0.0
     """Largest ratio of what is held to its level, under a lock."""
-    gain_changed: float = 0.0
-    """Largest factor by which the output over what is held has changed beyond what is explained."""
+    changed_periods: int = 0
+    """Most periods in a row in which the output over what is held had changed beyond what is explained."""
 
 
 def held_level_plans() -> list[str]:
@@ -71,7 +71,7 @@ def sound_run(name: str, seed: int, noise: float) -> SoundRun:
         int(seen["most_periods"]),
         float(seen["most_unlike_s"]) * bench.specimen.linear_frequency_hz,
         float(seen["kept"]["highest"]),
-        float(seen["kept"]["most_changed"]),
+        int(seen["kept"]["most_changed_periods"]),
     )
 
 

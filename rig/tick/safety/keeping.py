@@ -53,7 +53,7 @@ KEPT = np.dtype(
         ("first_needed", "f8"),
         ("factor", "f8"),
         ("changed_periods", "i8"),
-        ("most_changed", "f8"),
+        ("most_changed_periods", "i8"),
     ]
 )
 """State of both checks (one record).
@@ -63,7 +63,7 @@ level that counts; ``far_periods``: periods in a row far above it; ``highest``: 
 ``in_order_periods``: periods in a row in which what is held was near its level. ``gain``: output over what is held at the
 beginning of this level, 0 until it is known; ``first_``: at the first level of this law, with what the known exciter needs of
 it, 0 if unknown. ``factor``: by which the gain has changed beyond what is explained; ``changed_periods``: periods in a row
-beyond `LARGEST_CHANGE`; ``most_changed``: the largest factor so far."""
+beyond `LARGEST_CHANGE`; ``most_changed_periods``: the most so far."""
 
 
 @kernel
@@ -148,6 +148,6 @@ def gain_has_changed(
         lowest, highest = explained(kept, held, needed)
         ratio = gain / kept.first_gain
         kept.factor = max(kept.factor, ratio / highest, lowest / ratio)
-    kept.most_changed = max(kept.most_changed, kept.factor)
     kept.changed_periods = kept.changed_periods + 1 if kept.factor > LARGEST_CHANGE else 0
+    kept.most_changed_periods = max(kept.most_changed_periods, kept.changed_periods)
     return bool(kept.changed_periods >= CHANGED_PERIODS)
