@@ -24,6 +24,7 @@ __all__ = ["KEPT"]
 
 FAR = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
 FAR_PERIODS = 2
+ARRIVED = 1.5  # times a lower level; what is held has reached it below
 SHAKEN_PERIODS = (
     10  # after a lock in which a level still counts: an amplifier that jumps in a ramp shakes the lock off at once
 )
@@ -85,7 +86,7 @@ def is_far_above(kept: Record, seen: float, level: float, locked: bool) -> bool:
     A level counts under a lock, and for `SHAKEN_PERIODS` after it.
     """
     kept.trusted_periods = SHAKEN_PERIODS if locked else max(kept.trusted_periods - 1, 0)
-    if level >= kept.bound or seen <= FAR * level:
+    if level >= kept.bound or seen <= ARRIVED * level:
         kept.bound = level
     if kept.trusted_periods == 0 or kept.bound == 0.0:
         kept.far_periods = 0
