@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["PlantModel"]
 
 Complex = NDArray[np.complex128]
-STANDARD_ERRORS = ("frequency_std_rad_s", "damping_ratio_std", "drive_shape_std")
+STANDARD_ERRORS = ("frequency_std_rad_s", "damping_ratio_std", "drive_shape_std", "force_v_n_std")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +58,9 @@ class PlantModel:
     """Standard error of the damping ratio; None if unknown."""
     drive_shape_std: float | None = None
     """Standard error of the mode shape at the drive point, kg^-1/2; None if unknown."""
+    force_v_n_std: float | None = None
+    """Standard error of alpha at the mode, V/N; None if unknown. What is measured is the sum ``alpha + beta Y``, which
+    ``alpha + x`` and ``beta - x/Y`` give as well."""
 
     def __post_init__(self) -> None:
         for name in ("frequency_rad_s", "damping_ratio", "drive_shape", "centre_rad_s", "sample_rate_hz"):

@@ -12,14 +12,14 @@ line; where it varies slowly over the band, the errors are larger. The fits to s
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["parameter_std"]
+__all__ = ["parameter_covariance"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def parameter_std(jacobian: Real, residuals: Real, weights: Real, covariance: Complex | None) -> Real:
-    """Return the standard errors of the parameters, float[p].
+def parameter_covariance(jacobian: Real, residuals: Real, weights: Real, covariance: Complex | None) -> Real:
+    """Return the covariance of the parameters' errors, float[p, p]; infinite if the lines do not determine them.
 
     ``residuals`` float[4 n + m] are the weighted errors of n lines, real parts of both responses, then imaginary parts, and
     those of m priors, which are no measurement. ``jacobian`` float[4 n + m, p] is their derivative, ``weights`` float[2, n] the
@@ -29,7 +29,7 @@ def parameter_std(jacobian: Real, residuals: Real, weights: Real, covariance: Co
     lines = weights.shape[1]
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.all(scale > 0.0):  # the fit has left what the lines can tell
-        return np.full(jacobian.shape[1], np.inf)
+        return np.full((jacobian.shape[1],) * 2, np.inf)
     left, size, right = np.linalg.svd(jacobian / scale, full_matrices=False)
     inverse = ((right.T / size) @ left.T / scale[:, None])[:, : 4 * lines]
     left, residuals = left[: 4 * lines], residuals[: 4 * lines]
@@ -45,7 +45,7 @@ def parameter_std(jacobian: Real, residuals: Real, weights: Real, covariance: Co
     spread = _quadratic(inverse.reshape(-1, 4, lines), noise)
     expected = np.einsum("iin->", noise) - np.trace(_quadratic(left.T.reshape(-1, 4, lines), noise))
     misfit = float(residuals @ residuals) / expected if expected > 0.0 else 1.0
-    return np.asarray(np.sqrt(np.diag(spread) * max(1.0, misfit)))
+    return np.asarray(spread * max(1.0, misfit))
 
 
 def _real_covariance(covariance: Complex) -> Real:

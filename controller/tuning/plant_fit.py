@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from controller.tuning.plant_errors import parameter_std
+from controller.tuning.plant_errors import parameter_covariance
 
 __all__ = ["fitted"]
 
@@ -76,16 +76,25 @@ def fitted(
             np.array([spring, jerk]) / (exciter_prior * max(abs(mass), 1e-3 * float(np.max(np.abs(start[9:])))))
         )
 
-    found = least_squares(
-        residuals,
-        start,
-        method="lm",
-        x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
-        max_nfev=4000,
-    )
+    starts = [start] if exciter_prior is None else [start, _light(start)]
+    fits = [
+        least_squares(
+            residuals,
+            begin,
+            method="lm",
+            x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
+            max_nfev=4000,
+        )
+        for begin in starts
+    ]
+    found = min(fits, key=lambda fit: float(fit.cost))
     x = found.x
-    deviations = parameter_std(np.asarray(found.jac), found.fun, np.stack([weight_f, weight_a]), errors)
-    frequency_std, damping_std, shape_std = deviations[:3]
+    weights, jacobian = np.stack([weight_f, weight_a]), np.asarray(found.jac)
+    frequency_std, damping_std, shape_std = np.sqrt(
+        np.diag(parameter_covariance(jacobian, found.fun, weights, errors))[:3]
+    )
+    lines = 4 * frequency.size  # a prior says nothing of what was measured
+    alone = parameter_covariance(jacobian[:lines], found.fun[:lines], weights, errors)
     model_f, model_a = _model(x, s, centre)
     return {
         "frequency_rad_s": centre * math.exp(x[0]),
@@ -95,6 +104,7 @@ def fitted(
         "frequency_std_rad_s": _finite(centre * math.exp(x[0]) * float(frequency_std)),
         "damping_ratio_std": _finite(math.exp(x[1]) * float(damping_std)),
         "drive_shape_std": _finite(0.5 * math.exp(0.5 * x[2]) * float(shape_std)),
+        "force_v_n_std": _finite(_alpha_std(alone[5:9, 5:9], math.exp(x[0]))),
         "residual_per_kg": (float(x[3]), float(x[4])),
         "force_v_n": tuple(map(float, x[5:9])),
         "acceleration_v_s2_m": tuple(map(float, x[9:13])),
@@ -102,6 +112,12 @@ def fitted(
         "band_hz": (float(frequency.min()), float(frequency.max())),
         "fit_error": max(_rms(model_f - h_f) / _rms(h_f), _rms(model_a - h_a) / _rms(h_a)),
     }
+
+
+def _alpha_std(covariance: Real, z: float) -> float:
+    """Standard error of ``|alpha|`` at ``s = i z`` (relative to the centre), from the covariance [4, 4] of its coefficients."""
+    parts = np.array([[1.0, 0.0, -(z**2), 0.0], [0.0, z, 0.0, -(z**3)]])
+    return math.sqrt(float(np.trace(parts @ covariance @ parts.T)))
 
 
 def _finite(std: float) -> float | None:
@@ -179,6 +195,21 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
     exciter = _real_least_squares(columns, np.ones_like(z))
     mode = [0.5 * math.log(k), math.log(0.5 * c / math.sqrt(k)), math.log(shape_squared), lower, upper]
     return centre, np.concatenate([mode, exciter])
+
+
+def _light(start: Real) -> Real:
+    """Return start values of the same responses whose exciter has neither spring nor jerk term.
+
+    The prior is relative to the moving mass. From a spring and a mass that together tune an attached mass to the mode, a fit
+    does not find its way to an exciter that has neither: their ratio, and so the prior, stays as it is on that way.
+    """
+    out = start.copy()
+    w, damping, shape_squared = math.exp(start[0]), math.exp(start[1]), math.exp(start[2])
+    constant, rising = start[9] / w**2, start[12]
+    for power, part in ((0, constant), (1, rising)):
+        out[5 + power] += part * shape_squared
+        out[9 + power : 12 + power] -= part * np.array([w**2, 2.0 * damping * w, 1.0])
+    return out
 
 
 def _real_least_squares(columns: Complex, target: Complex) -> Real:

@@ -6,9 +6,11 @@ from controller.amplitude import RESPONSE, VOLTAGE
 from controller.harmonics.periods import end_harmonics_period, left_alone
 from controller.lock import LOCKED, next_lock_state
 from controller.period import end_period
+from controller.primitives import size
 from rig.tick.layout import TickArrays
 from rig.tick.safety.following import follow_level, see_frequency, silent_side
-from rig.tick.safety.kernels import LEVEL_NOT_FOLLOWED, SENSOR_STUCK, shut_down
+from rig.tick.safety.keeping import begin_level, foretold_level, gain_has_changed, is_far_above
+from rig.tick.safety.kernels import GAIN_CHANGED, LEVEL_NOT_FOLLOWED, OVER_LEVEL, SENSOR_STUCK, shut_down
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.judgement import judge_period
 from rig.tick.sequencer.layout import LOOP_DRIVE, RECORD, SILENT, TONE, WAVEFORM
@@ -36,6 +38,28 @@ def judge_following(t: TickArrays) -> None:
         channel = loop.drive_channel if law == RESPONSE else loop.force_channel
         value = response if law == RESPONSE else control.period.held
         shut_down(guard, LEVEL_NOT_FOLLOWED, channel, value, loop.sample, False)
+
+
+@kernel
+def judge_keeping(t: TickArrays) -> None:
+    """Trip if a level is far exceeded under a phase lock, or if it takes another output than before."""
+    loop, control, guard, following = t.loop[0], t.control[0], t.guard[0], t.following[0]
+    if guard.mode != ARMED or loop.drive != LOOP_DRIVE:
+        return
+    kept, period, law, lag = following.kept, control.period, control.amplitude.law, t.progress[0].lag
+    locked, volts = control.lock.state == LOCKED, law == VOLTAGE
+    level = period.output_v if volts else t.progress[0].level
+    channel = loop.drive_channel if volts or law == RESPONSE else loop.force_channel
+    begin_level(kept, law, level, lag)
+    seen = foretold_level(t.expected[0], kept, period) if volts else period.held
+    if is_far_above(kept, seen, level, locked):
+        value = period.drive_m_s2 if volts or law == RESPONSE else period.held
+        shut_down(guard, OVER_LEVEL, channel, value, loop.sample, False)
+    if volts:
+        return
+    needed_v = size(following.needed) if following.told == 1 else 0.0
+    if gain_has_changed(kept, period.held, period.output_v, needed_v, locked, loop.held == 1):
+        shut_down(guard, GAIN_CHANGED, channel, kept.factor, loop.sample, False)
 
 
 @kernel
@@ -78,3 +102,4 @@ def close_period(t: TickArrays) -> None:
     distortion = end_harmonics(t)
     judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE, distortion)
     judge_following(t)
+    judge_keeping(t)

@@ -30,7 +30,8 @@ class Tick:
 
     ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
     latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
-    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. A record
+    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. ``per_volt``:
+    force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts. A record
     that is refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the output at
     0 V. With ``start_judged`` a start segment lasts until `release_start`, so that a caller can judge the vibration there.
 
@@ -48,6 +49,7 @@ class Tick:
         *,
         waveforms: np.ndarray | None = None,
         exciter: PlantModel | None = None,
+        per_volt: tuple[float, float] | None = None,
         retries: int = 0,
         armed: bool = True,
         start_judged: bool = False,
@@ -96,7 +98,8 @@ class Tick:
         progress["segments"] = len(segments)
         progress["retries"], progress["point"] = retries, -1
         progress["held_back"] = int(start_judged and any(one.kind is SegmentKind.START for one in segments))
-        expected, following = expected_record(bench, smallest[force], smallest[drive], exciter), np.zeros(1, FOLLOWING)
+        expected = expected_record(bench, smallest[force], smallest[drive], exciter, per_volt)
+        following = np.zeros(1, FOLLOWING)
         following["reference_v"] = expected["floor_v"]
         see_frequency(expected[0], following[0], omega)
         self.bench = bench
@@ -199,6 +202,7 @@ class TickSettings:
     retries: int = 0
     armed: bool = True
     start_judged: bool = False
+    per_volt: tuple[float, float] | None = None
 
     def build(self, latency_samples: float) -> Tick:
         """Build the tick for a device of this latency; its outputs show one block later in addition."""
@@ -211,6 +215,7 @@ class TickSettings:
             self.bench.block + latency_samples,
             waveforms=self.waveforms,
             exciter=self.exciter,
+            per_volt=self.per_volt,
             retries=self.retries,
             armed=self.armed,
             start_judged=self.start_judged,

@@ -43,6 +43,7 @@ NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences
 MODEL_ERROR = (
     0.02  # of a response: error of the model that weighs in the fit beside the noise, so that small responses count
 )
+UNBOUNDED = 1e3  # times alpha: its standard error where the lines do not tell it
 EXCITER_PRIOR = 0.3  # an exciter's spring in the band, relative to its moving mass, where one mode does not show it
 
 
@@ -121,6 +122,7 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: flo
         frequency_std_rad_s=_with_spread("frequency_rad_s", plant.frequency_std_rad_s, plant, others),
         damping_ratio_std=_with_spread("damping_ratio", plant.damping_ratio_std, plant, others),
         drive_shape_std=_with_spread("drive_shape", plant.drive_shape_std, plant, others),
+        force_v_n_std=_alpha_std(plant, others),
     )
 
 
@@ -151,6 +153,15 @@ def _with_spread(name: str, std: float | None, plant: PlantModel, others: Sequen
     """Return the standard error of a property of the mode together with its largest difference to other fits."""
     apart = [abs(getattr(other, name) - getattr(plant, name)) for other in others]
     return math.hypot(std or 0.0, max(apart, default=0.0))
+
+
+def _alpha_std(plant: PlantModel, others: Sequence[PlantModel]) -> float:
+    """Return the standard error of alpha at the mode, V/N, together with its largest difference to other fits."""
+    s = 1j * plant.frequency_rad_s
+    found = complex(plant.exciter(s)[0])
+    apart = max((abs(complex(other.exciter(s)[0]) - found) for other in others), default=0.0)
+    std = UNBOUNDED * abs(found) if plant.force_v_n_std is None else plant.force_v_n_std
+    return math.hypot(std, apart)
 
 
 def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:

@@ -32,6 +32,10 @@ class SoundRun(NamedTuple):
     reason: EndReason
     astray_periods: int
     unlike_periods: float
+    highest: float = 0.0
+    """Largest ratio of what is held to its level, under a lock."""
+    changed_periods: int = 0
+    """Most periods in a row in which the output over what is held had changed beyond what is explained."""
 
 
 def held_level_plans() -> list[str]:
@@ -66,6 +70,8 @@ def sound_run(name: str, seed: int, noise: float) -> SoundRun:
         EndReason(int(loop.tick.guard["reason"][0])),
         int(seen["most_periods"]),
         float(seen["most_unlike_s"]) * bench.specimen.linear_frequency_hz,
+        float(seen["kept"]["highest"]),
+        int(seen["kept"]["most_changed_periods"]),
     )
 
 

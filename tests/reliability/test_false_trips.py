@@ -3,6 +3,7 @@
 import pytest
 
 from rig.tick.safety.following import ASTRAY_PERIODS
+from rig.tick.safety.keeping import CHANGED_PERIODS, FAR
 from rig.tick.safety.layout import EndReason
 from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run, table_of
 
@@ -13,6 +14,8 @@ def test_a_sound_rig_with_ten_times_the_noise_never_comes_near_a_trip(plan):
     assert run.reason is EndReason.COMPLETED
     assert run.astray_periods <= ASTRAY_PERIODS // 2
     assert run.unlike_periods < 0.5
+    assert run.highest < FAR  # the paper's gains hunt on the friction beam with such noise
+    assert run.changed_periods <= CHANGED_PERIODS // 2
 
 
 def test_a_run_that_ended_early_is_counted():

@@ -62,6 +62,8 @@ class PlantFacts(Configured):
     """Standard error of the damping ratio; left out if unknown."""
     drive_shape_std: float | None = Field(None, ge=0)
     """Standard error of the mode shape, kg^-1/2, which is in that of every damping of the test; left out if unknown."""
+    force_v_n_std: float | None = Field(None, ge=0)
+    """Standard error of alpha at the mode, V/N: how well the exciter was told apart from the structure. Left out if unknown."""
     response_ratios: dict[str, PositiveFloat] = Field(default_factory=dict)
     """Motion of each response channel per metre at the drive point, at resonance, by channel name. These ratios replace the
     bench's mode shapes when levels and channels are checked."""

@@ -75,7 +75,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
                 started=datetime.now(UTC).isoformat(timespec="seconds"),
                 seed=seed,
             )
-            settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz))
+            settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz), _checked(facts))
             _refuse_stopped(live)
             with (
                 set_aside(output),
@@ -137,7 +137,7 @@ def take_up(
                 live.line("point", stored(point))
             with open_session(bench, drawn, realtime=options.realtime) as session:
                 facts = _facts(plan, bench, session, options)
-                settings = tick_settings(plan, bench, segments)
+                settings = tick_settings(plan, bench, segments, _checked(facts))
                 _refuse_stopped(live)
                 begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
                 execution = _further_part(output, session, settings, begin, {**information, "about": facts})
@@ -213,7 +213,8 @@ def _with_further_attempts(
             progress.remark(f"measured again, for what was in the way may have passed: point {names}")
             about = {**facts, "device": session.identity}
             information = {"first_sample": first_sample, "seed": seed, "about": about}
-            settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, before.done | before.given_up))
+            segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
+            settings = tick_settings(plan, bench, segments, _checked(facts))
             begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
             execution = _further_part(output, session, settings, begin, information)
         recording = _whole(output, progress)
@@ -341,8 +342,10 @@ def _remember_end(bench: Bench, loop: RunningLoop, output: Path) -> None:
         remember(bench, trip=None)
 
 
-def tick_settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> TickSettings:
-    """Return what a tick is built from to measure some segments of a plan."""
+def tick_settings(
+    plan: Plan, bench: Bench, segments: tuple[Segment, ...], checked: CheckedScale | None = None
+) -> TickSettings:
+    """Return what a tick is built from to measure some segments of a plan; ``checked`` is the scale of the last check."""
     return TickSettings(
         bench,
         plan.law,
@@ -353,4 +356,5 @@ def tick_settings(plan: Plan, bench: Bench, segments: tuple[Segment, ...]) -> Ti
         plan.known_plant,
         plan.retries,
         start_judged=True,
+        per_volt=None if checked is None else (checked.newtons_per_volt, checked.acceleration_per_volt),
     )

@@ -79,6 +79,18 @@ def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before
             f"sensor or cable of channel {_name(bench, trip)} has failed, or the amplifier does not put out what it is told",
             "look at both, then `rig check`",
         )
+    if trip.reason is EndReason.OVER_LEVEL:
+        return Advice(
+            "the amplifier's gain has risen, or the rig is not the one that was checked; or channel "
+            f"{_name(bench, trip)} reads too much",
+            "look at the amplifier's gain and at the channel, then `rig check`",
+        )
+    if trip.reason is EndReason.GAIN_CHANGED:
+        return Advice(
+            f"sensor or cable of channel {_name(bench, trip)} loses sensitivity, or the amplifier's gain drifts; else the "
+            "damping has changed this much",
+            "look at both, then `rig check`; if they are sound, measure from this level on in a run of its own",
+        )
     if isinstance(plan, LockedPlan) and not (before.locked or before.points):
         return Advice(
             f"no lock was ever gained in this run: {POLARITY_HINT}",

@@ -18,12 +18,17 @@ FLOOR_PART = 0.025  # of the largest voltage: an output that is always allowed
 
 
 def expected_record(
-    bench: Bench, smallest_n: float, smallest_m_s2: float, exciter: PlantModel | None = None
+    bench: Bench,
+    smallest_n: float,
+    smallest_m_s2: float,
+    exciter: PlantModel | None = None,
+    per_volt: tuple[float, float] | None = None,
 ) -> np.ndarray:
     """Return one record of `rig.tick.safety.following.EXPECTED`.
 
-    ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes whose phase can be read. Only the exciter's part of the
-    plant model ``exciter`` is used, because a nonlinear structure does not change it.
+    ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes whose phase can be read. Of the plant model ``exciter`` the
+    exciter's part is used, because a nonlinear structure does not change it, and the structure's as far as a test cannot tell
+    the two apart. ``per_volt``: force (N/V) and motion (m/s^2/V) at resonance in the last check of the bench.
     """
     force, drive = (bench.channels[bench.index_of(role)] for role in ("force", "drive"))
     out = np.zeros(1, EXPECTED)
@@ -33,10 +38,15 @@ def expected_record(
     out["floor_v"] = FLOOR_PART * bench.limits.voltage_v
     out["force_skew_s"] = force.skew_samples / bench.sample_rate_hz
     out["drive_skew_s"] = drive.skew_samples / bench.sample_rate_hz
+    if per_volt is not None:
+        out["checked_n_v"], out["checked_m_s2_v"] = per_volt
     if exciter is not None:
         out["known"] = 1
         out["force_v_n"], out["acceleration_v_s2_m"] = exciter.force_v_n, exciter.acceleration_v_s2_m
         out["centre_rad_s"] = exciter.centre_rad_s
+        out["force_v_n_std"] = exciter.force_v_n_std or 0.0
+        out["mode"] = exciter.frequency_rad_s, exciter.damping_ratio, exciter.drive_shape**2
+        out["residual_per_kg"] = exciter.residual_per_kg
         out["lowest_rad_s"], out["highest_rad_s"] = known_band_rad_s(exciter)
     return out
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from controller.amplitude import RESPONSE
 from controller.primitives import TWO_PI, size
+from rig.tick.safety.keeping import FAR, KEPT
 from vibrolock.compiled import Record, kernel
 
 __all__ = ["EXPECTED", "FOLLOWING"]
@@ -25,7 +26,6 @@ RISEN = 1.2  # rise from which the output counts as risen; a force that sags dur
 IN_ORDER = 0.9  # of its level; a held quantity above it follows
 SAGGED = 0.75  # of its level; a force may sag to it while the vibration builds up
 TOO_MUCH = 1.5  # times its level; a law that raises its output above it does not hold the quantity that it reads
-FAR_TOO_MUCH = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
 GROWN = 1.1  # times its reference; a quantity that has grown so much follows, even if far from its level
 JUMPED = (
     1.3  # growth of the vibration over the rise of the output from which a force may fall: a jump past a turning point
@@ -38,6 +38,7 @@ UNLIKE = (
 )
 TOO_STRONG = 4.0  # needed over sent output; shows an amplifier of another gain, even while the vibration grows
 WIDE = 3.0  # times its band; within it the known exciter can still show an amplifier of another gain
+DOUBTED = 3.0  # standard errors of the exciter that are left to it
 UNLIKE_PERIODS = 1.0  # duration of a contradiction that trips, in periods at the centre frequency of the known exciter
 
 EXPECTED = np.dtype(
@@ -46,6 +47,9 @@ EXPECTED = np.dtype(
         ("force_v_n", "f8", (4,)),
         ("acceleration_v_s2_m", "f8", (4,)),
         ("centre_rad_s", "f8"),
+        ("force_v_n_std", "f8"),
+        ("mode", "f8", (3,)),
+        ("residual_per_kg", "f8", (2,)),
         ("lowest_rad_s", "f8"),
         ("highest_rad_s", "f8"),
         ("noise_n", "f8"),
@@ -55,12 +59,18 @@ EXPECTED = np.dtype(
         ("floor_v", "f8"),
         ("force_skew_s", "f8"),
         ("drive_skew_s", "f8"),
+        ("checked_n_v", "f8"),
+        ("checked_m_s2_v", "f8"),
     ]
 )
-"""Knowledge before the run (one record). ``known``: whether the exciter ``u = alpha F + beta A`` is known; its coefficients are
-as in `controller.tuning.PlantModel`, and ``lowest_rad_s``, ``highest_rad_s`` are the band in which they hold. ``noise_``:
+"""Knowledge before the run (one record).
+
+``known``: whether the exciter ``u = alpha F + beta A`` is known; its coefficients are as in `controller.tuning.PlantModel`, and
+``lowest_rad_s``, ``highest_rad_s`` are the band in which they hold. ``force_v_n_std``: standard error of alpha; ``mode``
+(frequency in rad/s, damping ratio, squared mode shape) and ``residual_per_kg``: the structure's accelerance. ``noise_``:
 amplitudes below which the exciter is not judged. ``visible_``: amplitudes above which a force or acceleration is distinguished
-from noise. ``floor_v``: output that is always allowed. ``_skew_s``: delays of the two channels."""
+from noise. ``floor_v``: output that is always allowed. ``_skew_s``: delays of the two channels. ``checked_``: force (N) and
+motion (m/s^2) per volt at resonance in the last check, 0 if unknown."""
 
 FOLLOWING = np.dtype(
     [
@@ -68,6 +78,8 @@ FOLLOWING = np.dtype(
         ("beta", "c16"),
         ("alpha_rate", "c16"),
         ("beta_rate", "c16"),
+        ("force_doubt", "c16"),
+        ("drive_doubt", "c16"),
         ("sent", "c16"),
         ("late_sent", "c16"),
         ("late_force", "c16"),
@@ -83,18 +95,20 @@ FOLLOWING = np.dtype(
         ("astray_periods", "i8"),
         ("largest_rise", "f8"),
         ("most_periods", "i8"),
+        ("kept", KEPT),
     ]
 )
 """State of the supervision (one record).
 
 ``alpha``, ``beta``: exciter at this period's frequency; ``_rate``: their derivatives by s; ``told``: whether alpha and beta are
-individually known at this frequency. ``sent``: complex output after the detector's low-pass; ``late_``: quantities after the
+individually known at this frequency. ``force_doubt``, ``drive_doubt``: standard error of the output that the exciter needs, per
+force and per motion. ``sent``: complex output after the detector's low-pass; ``late_``: quantities after the
 same low-pass once more; ``needed``: output that the known exciter needs for force and motion. ``unlike_s``: present
 uninterrupted time in which ``late_sent`` and ``needed`` contradict each other; ``most_unlike_s``: the longest such time.
 ``silent_periods``: periods in a row in which either force or motion showed nothing while the other was large. ``reference_``:
 output (V), held quantity, and the other of force and motion, when the held quantity last followed. ``astray_periods``: count of
 periods since then in which the held quantity did not follow; ``most_periods``: the highest count so far; ``largest_rise``: the
-largest ratio of output to reference output in these periods."""
+largest ratio of output to reference output in these periods. ``kept``: state of `rig.tick.safety.keeping`."""
 
 
 @kernel
@@ -113,6 +127,7 @@ def see_frequency(expected: Record, following: Record, omega: float) -> None:
     polynomial of beta is divided by z^2.
     """
     following.alpha = following.beta = following.alpha_rate = following.beta_rate = 0.0
+    following.force_doubt = following.drive_doubt = 0.0
     following.told = 1 if expected.lowest_rad_s <= omega <= expected.highest_rad_s else 0
     middle, half = (
         0.5 * (expected.lowest_rad_s + expected.highest_rad_s),
@@ -130,6 +145,17 @@ def see_frequency(expected: Record, following: Record, omega: float) -> None:
     following.beta = beta / (z * z) * of_drive
     following.alpha_rate = alpha_slope / expected.centre_rad_s * of_force
     following.beta_rate = (beta_slope - 2.0 * beta / z) / (z * z) / expected.centre_rad_s * of_drive
+    following.force_doubt = expected.force_v_n_std * of_force
+    following.drive_doubt = expected.force_v_n_std * of_drive / accelerance(expected, omega)
+
+
+@kernel
+def accelerance(expected: Record, omega: float) -> complex:
+    """Return the accelerance (1/kg) of the linear structure at a frequency (rad/s), as `controller.tuning.PlantModel` does."""
+    s, z = complex(0.0, omega), complex(0.0, omega / expected.centre_rad_s)
+    frequency, damping, shape_squared = expected.mode[0], expected.mode[1], expected.mode[2]
+    mode = shape_squared * s * s / (s * s + 2.0 * damping * frequency * s + frequency * frequency)
+    return complex(mode + expected.residual_per_kg[0] + expected.residual_per_kg[1] * z * z)
 
 
 @kernel
@@ -141,6 +167,10 @@ def contradicts_exciter(
     ``sent`` is the complex output (V) whose effect ``force`` (N) and ``drive`` (m/s^2) show. ``sent`` passes the detector's
     low-pass of step ``gain``. Then all three pass one more low-pass, which gives the derivatives for changing amplitudes:
     ``U = alpha F + alpha' dF/dt + beta A + beta' dA/dt``. Amplitudes below the noise are not judged.
+
+    A linear test measures ``alpha + beta Y``, so that ``alpha + x`` with ``beta - x/Y`` fits as well. The output is compared
+    with all these exciters, for x up to `DOUBTED` standard errors of alpha: what was not identified contradicts nothing. On the
+    linear structure, where ``A = Y F``, they all need the same output.
     """
     following.sent += gain * (sent - following.sent)
     following.late_sent += gain * (following.sent - following.late_sent)
@@ -152,8 +182,10 @@ def contradicts_exciter(
     following.needed = for_force + for_motion + for_change
     most = max(size(following.late_sent), size(for_force), size(for_motion), size(for_change))
     noise = size(following.alpha) * expected.noise_n + size(following.beta) * expected.noise_m_s2
-    too_strong = size(following.needed) > max(TOO_STRONG * size(following.late_sent), noise)
-    unlike = following.told == 1 and most > noise and size(following.late_sent - following.needed) > UNLIKE * most
+    doubt = DOUBTED * size(following.drive_doubt * following.late_drive - following.force_doubt * following.late_force)
+    too_strong = size(following.needed) - doubt > max(TOO_STRONG * size(following.late_sent), noise)
+    apart = size(following.late_sent - following.needed) - doubt
+    unlike = following.told == 1 and most > noise and apart > UNLIKE * most
     unlike = noise > 0.0 and (unlike or too_strong)
     following.unlike_s = following.unlike_s + dt_s if unlike else 0.0
     following.most_unlike_s = max(following.most_unlike_s, following.unlike_s)
@@ -218,7 +250,7 @@ def follow_level(
     moves_more = law != RESPONSE and other > JUMPED * following.reference_other * max(rise, 1.0)
     if visible and not slipping:
         jumped = may_jump and moves_more and held >= VANISHED * wanted
-        building_up = law != RESPONSE and too_much and held < FAR_TOO_MUCH * wanted
+        building_up = law != RESPONSE and too_much and held < FAR * wanted
         building_up = building_up and other >= GROWN * following.reference_other
         if jumped or building_up or GROWN * following.reference_level <= held <= GROWN * wanted:
             begin_to_follow(expected, following, amplitude_v, min(held, wanted), other)

@@ -44,6 +44,8 @@ class EndReason(IntEnum):
     EMERGENCY_STOP = 22
     LEVEL_NOT_FOLLOWED = 23
     PLANT_CONTRADICTED = 24
+    OVER_LEVEL = 25
+    GAIN_CHANGED = 26
 
     @property
     def is_trip(self) -> bool:
@@ -76,6 +78,8 @@ TEXT = {
     EndReason.EMERGENCY_STOP: "emergency stop",
     EndReason.LEVEL_NOT_FOLLOWED: "the output rose and what it should hold did not follow",
     EndReason.PLANT_CONTRADICTED: "force and motion are not those that the known plant gives for this output",
+    EndReason.OVER_LEVEL: "force or motion far above its level",
+    EndReason.GAIN_CHANGED: "the output that the level takes has changed by more than the rig explains",
 }
 """One line for each reason."""
 

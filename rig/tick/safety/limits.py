@@ -92,7 +92,9 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
     channel = int(guard["channel"][0])
     sample = int(guard["sample"][0])
     where = ""
-    if channel >= 0:
+    if reason is EndReason.GAIN_CHANGED:
+        where = f" on channel {bench.channels[channel].name} (by a factor of {float(guard['value'][0]):.3g})"
+    elif channel >= 0:
         unit = "m" if reason in (EndReason.DISPLACEMENT_LIMIT, EndReason.OVERTRAVEL) else bench.channels[channel].unit
         where = f" on channel {bench.channels[channel].name} ({float(guard['value'][0]):.4g} {unit})"
     elif reason is EndReason.FREQUENCY_LIMIT:

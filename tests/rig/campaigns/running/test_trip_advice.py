@@ -89,3 +89,11 @@ def test_a_lock_that_broke_at_an_end_of_its_window_is_told_from_one_that_broke_w
 
 def test_a_start_that_trips_lowers_the_start_voltage():
     assert "lower start_v" in said(EndReason.FORCE_LIMIT, 0, at=TrippedAt(0.4, "V", start=True)).what_to_do
+
+
+@pytest.mark.parametrize("reason", [EndReason.OVER_LEVEL, EndReason.GAIN_CHANGED])
+def test_what_is_held_and_its_output_do_not_fit_blames_the_channel_and_the_amplifier(reason):
+    cause, remedy = said(reason, 0)
+    assert "channel force" in cause
+    assert "amplifier" in cause
+    assert "`rig check`" in remedy
