@@ -17,6 +17,8 @@ from tests.reliability.faults.table import Fault
 __all__ = ["Bound", "bound_for", "objections"]
 
 OUTPUT_RATIO, OUTPUT_EXTRA_V = 2.0, 0.1
+FADED = {"middle": 3.5, "start": 5.5}
+"""Of what is held: the run ends at three times the output of a level, and what fades from the start has faded by its first level."""
 LIMIT_RATIO = 1.25  # beyond it the guard drops what it began to ramp
 TO_ZERO_SAMPLES = 50  # beside the ramp: a block and the queue
 FIRST_LEVEL = 1.01  # what is broken from the start ends at the first level in volts, before the first rise
@@ -57,7 +59,8 @@ def held_role(levels: str) -> str:
 def bound_for(case: Case, bench: Bench, healthy_output_v: float) -> Bound:
     """The bounds of a case."""
     fault, held = case.fault, held_role(case.levels)
-    output_v = OUTPUT_RATIO * healthy_output_v + OUTPUT_EXTRA_V
+    ratio = FADED[fault.onset] if fault.kind == "fading" and held == fault.part else OUTPUT_RATIO
+    output_v = ratio * healthy_output_v + OUTPUT_EXTRA_V
     within_s = trip_s(fault, held, 1.0 / bench.specimen.linear_frequency_hz)
     if fault.onset == "start" and within_s is not None and not held:
         output_v = FIRST_LEVEL * plan_for(case.levels).levels[0]
