@@ -76,8 +76,8 @@ class Trial:
     """How the plan ended on one rig."""
 
     end: str
-    """Name of the `rig.tick.safety.layout.EndReason`, ``REFUSED`` if the bench refuses the plan, or ``NOT_COMPUTED`` if the twin
-    could not be built or simulated."""
+    """Name of the `rig.tick.safety.layout.EndReason`, ``REFUSED`` if the bench refuses the plan, or ``NOT_COMPUTED`` if the
+    twin could not be built or simulated."""
     text: str
     """The same in a sentence."""
     tripped: bool

@@ -156,5 +156,5 @@ def test_a_fit_never_leaves_what_a_rig_can_be(monkeypatch):
     known_rig(("tip",), START, {}, Responses(right.frequency_hz, reversed_force, 1e-5 * np.abs(right.value), RATE_HZ))
     for name in seen[0]:
         values = [one[name] for one in seen]
-        assert 0.0 < min(values), name
+        assert min(values) > 0.0, name
         assert max(values) < np.exp(2.0 * POSSIBLE) * (1.0 + 1e-9) * min(values), name
