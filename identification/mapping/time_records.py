@@ -14,6 +14,7 @@ from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
 from identification.signals.decimation import EDGE_SAMPLES, decimated
 from identification.time_data.experiments import resampled_periods
+from identification.time_data.periodicity import check_periods, period_remark
 from identification.time_data.records import TimeRecord, TimeRecords
 
 __all__ = ["map_time_data"]
@@ -46,7 +47,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     ------
     IdentificationError
         If a path does not exist, dimensions or lengths do not fit the axes, sample rates disagree, sampling is uneven, values
-        are NaN, or no whole period or sample is left.
+        are NaN, no whole period or sample is left, or periods of the input differ.
     """
     every = {"": data, **(files or {})}
     entries = {name: _entries(one, mapping) for name, one in every.items()}
@@ -76,7 +77,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     if mapping.levels is None and not mapping.stretches and force and len(set(told)) > 1:
         sizes = f"{min(told):.4g} to {max(told):.4g} {unit}"
         notes = (*notes, f"{len(set(told))} levels by the RMS of the force, {sizes}; the key `levels` tells others")
-    return TimeRecords(
+    found = TimeRecords(
         channels=channels,
         sample_rate_hz=new_rate,
         records=records,
@@ -89,6 +90,9 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         source=mapping.source,
         notes=notes,
     )
+    check_periods(found)
+    remark = period_remark(found)
+    return replace(found, notes=(*found.notes, remark)) if remark else found
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,6 +60,18 @@ def test_a_structure_for_each_record_gives_a_record_each():
     assert len(found.levels()[5.0].records) == 2
 
 
+def test_what_is_said_to_be_periodic_and_is_not_is_refused_and_a_doubtful_period_remarked_on():
+    u, y = RANDOM.normal(size=(2, 4 * SIZE))
+    with pytest.raises(
+        IdentificationError, match=r"period_samples: is 64, but in record '.*realisation 1' such periods of"
+    ):
+        map_time_data({"u": u, "y": y}, told(period_samples=SIZE))
+    settling = np.tile(u[:SIZE], 4) * (1.0 - 0.5 * np.exp(-np.arange(4 * SIZE) / SIZE))
+    (note,) = map_time_data({"u": settling, "y": y}, told(period_samples=SIZE)).notes
+    assert note.startswith("periods of channel 'force' differ by up to 1")
+    assert map_time_data({"u": settling, "y": y}, told(period_samples=SIZE, transient_periods=3)).notes == ()
+
+
 def runs_of(*sizes):
     """A list of structures, as MATLAB's struct arrays are read, with a force of each size."""
     made = [(size * RANDOM.choice([-1.0, 1.0], SIZE), RANDOM.normal(size=SIZE)) for size in sizes]
