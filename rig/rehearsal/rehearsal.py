@@ -87,6 +87,8 @@ class RehearsalRequest:
             twin = self.twin(number)
             unknowns = twin.unknowns
             trial = run_trial(self.plan, twin.bench, twin.number)
+        except (OSError, MemoryError):  # of the machine, not of the twin
+            raise
         except Exception as error:  # whatever a drawn rig does to the numbers
             return Draw(number=number, unknowns=unknowns, trial=not_computed(error), truth=NOT_BALANCED)
         truth = (

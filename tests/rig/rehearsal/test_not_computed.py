@@ -14,6 +14,7 @@ from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.report import lines, summary, verdict_in_one_line
 from rig.rehearsal.truth import NOT_BALANCED
 from rig.rehearsal.verdict import Share, verdict_of
+from simulators.ensemble import VariantError
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
 from tests.rig.rehearsal.plans import SHORT, magnet_beam
 
@@ -67,6 +68,17 @@ def test_a_twin_that_cannot_be_computed_counts_as_a_trip_when_a_bench_asks_for_a
     found = rehearse(request_of(4))
     assert verdict_of(found).trips == Share(0, 3)
     assert rehearsed_in(found, "r.h5").trips_at_most == pytest.approx(Share(1, 4).interval[1])
+
+
+@pytest.mark.parametrize("kind", [OSError, MemoryError])
+def test_what_fails_because_of_the_machine_is_no_property_of_a_twin(kind):
+    class NoRoom(_SomeFail):
+        def twin(self, number):
+            raise kind("no space left")
+
+    request = NoRoom(plan=SHORT, bench=magnet_beam(), knowledge=knowledge_of_the_magnet_beam(), draws=2)
+    with pytest.raises(VariantError, match="no space left"):
+        rehearse(request)
 
 
 def test_too_many_of_them_are_said_and_none_at_all_is_refused():
