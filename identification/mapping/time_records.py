@@ -73,10 +73,10 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     size = _period(cut, mapping, new_rate / rate) if mapping.is_periodic else 0
     bottom, top = mapping.lowest_hz, mapping.highest_hz
     records = _named(cut, mapping, force, unit)
-    told = [one.level for one in records]
-    if mapping.levels is None and not mapping.stretches and force and len(set(told)) > 1:
-        sizes = f"{min(told):.4g} to {max(told):.4g} {unit}"
-        notes = (*notes, f"{len(set(told))} levels by the RMS of the force, {sizes}; the key `levels` tells others")
+    levels = {one.level for one in records}
+    if mapping.levels is None and not mapping.stretches and force and len(levels) > 1:
+        sizes = f"{min(levels):.4g} to {max(levels):.4g} {unit}"
+        notes = (*notes, f"{len(levels)} levels by the RMS of the force, {sizes}; the key `levels` tells others")
     found = TimeRecords(
         channels=channels,
         sample_rate_hz=new_rate,
