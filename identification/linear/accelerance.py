@@ -36,7 +36,8 @@ _NEIGHBOURS = 4
 _MOST_ALIKE = 50
 _FLOOR = 1e-9
 """Least eigenvalue of a covariance relative to its largest, so that a nearly exact line cannot outweigh all others."""
-
+_CANCELLED = 1e-13
+"""Least variance relative to the largest of the same response: below it, differences of running sums are rounding errors."""
 _TIMES_OVER = 4
 """Least number of samples per direction of a covariance that weights need."""
 _ROUNDING = 1e-13
@@ -195,7 +196,7 @@ def pooled(covariance: Complex, alike: int = 1) -> Complex:
     others = np.maximum(last - first, 1)[:, None, None]
     smooth = (total - covariance if lines > 1 else total) / others
     largest = np.einsum("kii->ki", smooth).real
-    floor = _FLOOR * np.maximum(largest, np.max(largest, axis=0) * 1e-12 + 1e-300)
+    floor = np.maximum(_FLOOR * largest, _CANCELLED * np.max(largest, axis=0) + 1e-300)
     return np.asarray(0.5 * (smooth + np.conj(np.swapaxes(smooth, 1, 2))) + floor[:, :, None] * np.eye(count))
 
 

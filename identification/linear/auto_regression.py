@@ -30,8 +30,13 @@ _COLUMNS = 160
 """Most coefficients of one output: the time of the factorisation grows with their square."""
 _ROWS_PER_COLUMN = 4
 _BLOCK = 8192
-_EXCITED = 1e-2
-"""A frequency counts as excited above this share of the strongest amplitude of the same input."""
+_EXCITED = 0.1
+"""A frequency counts as excited above this share of the strongest amplitude of the same input: 20 dB below it. Further down the
+flank of a filter, noise of the outputs is as large as the response, and biases a regression beyond its standard errors."""
+_SEGMENTS = 8
+"""Fewest segments over which spectra of inputs are averaged: those of a single one scatter by their own size."""
+_SMOOTHED = 5
+"""Lines over which they are averaged as well."""
 _LINES = 800
 
 
@@ -177,7 +182,7 @@ def regressed_responses(
     inputs, outputs
         Channels of the rows.
     band_hz
-        Band of the 800 lines; None for the band in which every input has a hundredth of its largest amplitude.
+        Band of the 800 lines; None for the band in which every input has a tenth of its largest amplitude.
     weights
         Weight of each record; 1 if empty.
     specimen
@@ -205,6 +210,7 @@ def regressed_responses(
         frequency_hz=frequency,
         value=value,
         noise_covariance=covariance,
+        total_covariance=covariance,
         estimator="ARX",
         input_rms=tuple(float(one) for one in rms),
         specimen=specimen,
@@ -213,11 +219,18 @@ def regressed_responses(
 
 
 def _excited_band(records: Sequence[tuple[Float, Float]], sample_rate_hz: float) -> tuple[float, float]:
-    """Return the lowest and highest frequency that every input excites, from spectra averaged over segments."""
-    longest = max((u for u, _ in records), key=lambda u: u.shape[1])
-    segment = int(min(2048, longest.shape[1]))
+    """Return the lowest and highest frequency that every input excites, from spectra averaged over segments of all records."""
+    longest = max(u.shape[1] for u, _ in records)
+    segment = max(min(2048, longest // _SEGMENTS), min(longest, 64))
     signal: Any = scipy.signal
-    frequency, power = signal.welch(longest, sample_rate_hz, nperseg=segment, detrend="constant")
+    found = [
+        (u.shape[1], signal.welch(u, sample_rate_hz, nperseg=segment, detrend="constant"))
+        for u, _ in records
+        if u.shape[1] >= segment
+    ]
+    frequency = found[0][1][0]
+    power = np.average([one[1] for _, one in found], axis=0, weights=[size for size, _ in found])
+    power = scipy.ndimage.uniform_filter1d(power, _SMOOTHED, axis=1, mode="nearest")
     inside = np.all(power >= _EXCITED**2 * power.max(axis=1, keepdims=True), axis=0) & (frequency > 0.0)
     if np.count_nonzero(inside) < 2:
         raise IdentificationError("inputs: no band is excited at all of them; excite them at the same frequencies")

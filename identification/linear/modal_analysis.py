@@ -14,6 +14,7 @@ from identification.linear.errors_in_variables import DrivenResponses, driven_re
 from identification.linear.modal_parameters import accepted, as_linear_modes, modal_notes
 from identification.linear.model_errors import (
     is_mostly_distortion,
+    systematic_misfit,
     with_common_distortion,
     with_line_scatter,
     with_model_error,
@@ -164,6 +165,7 @@ def linear_modes(
     if is_mostly_distortion(data, _noise(selected, joint, fit, normal=normal), fit):
         fit, data, moved = with_model_error(data, fit, normal=normal, free=free)
         fit, notes = with_common_distortion(fit), notes + moved
+    notes = [*notes, *systematic_misfit(data, fit, normal=normal)]
     result = as_linear_modes(fit, band, data, normal=normal)
     return replace(result, notes=(*band.notes, *notes, *modal_notes(result, data, fit.converged)))
 

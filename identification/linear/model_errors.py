@@ -20,6 +20,7 @@ from identification.linear.rational_fractions import ModalFit, fit_modes, modal_
 __all__ = [
     "is_mostly_distortion",
     "line_scatter",
+    "systematic_misfit",
     "with_common_distortion",
     "with_line_scatter",
     "with_model_error",
@@ -32,6 +33,10 @@ _WINDOW = 9
 """Lines over which the misfit is taken as smooth, that is as a parabola; 6 degrees of freedom are left for its scatter."""
 _DISTORTED = 0.05
 """Error of a response within the half-power bandwidth, relative to the response, from which model errors are looked for."""
+_ALIKE = 0.5
+"""Correlation of the misfit at neighbouring lines above which it is an error of the model; noise gives 0."""
+_MISFIT = 0.01
+"""Relative misfit below which an error of the model is not remarked on."""
 _NOISE = 0.25
 """Largest share of noise in a total variance that is called distortion."""
 _COMMON = 2.0
@@ -54,6 +59,32 @@ def line_scatter(misfit: Complex) -> Complex | None:
     first = np.clip(np.arange(lines) - _WINDOW // 2, 0, lines - _WINDOW)
     scatter = np.einsum("ij,kjm->kim", project, misfit[first[:, None] + np.arange(_WINDOW)])
     return np.asarray(np.einsum("kim,kin->kmn", scatter, np.conj(scatter)) / (_WINDOW - powers.shape[1]))
+
+
+def systematic_misfit(data: WeightedResponses, fit: ModalFit, *, normal: bool) -> list[str]:
+    """Return a note on each mode at which a fit without known errors leaves a misfit that neighbouring lines have in common.
+
+    Noise differs from line to line; what a further mode close by adds does not.
+    """
+    if data.covariance is not None:
+        return []
+    notes = []
+    misfit = data.value[:, :, 0] - modal_basis(data.s, fit.poles, normal) @ fit.terms.T
+    misfit = misfit / data.std[:, :, 0]
+    for omega, zeta in zip(fit.omega, fit.zeta, strict=True):
+        near = misfit[np.abs(2.0 * np.pi * data.frequency_hz - omega) <= 2.0 * abs(zeta) * omega]
+        size = np.sum(np.abs(near) ** 2, axis=0)
+        if len(near) < _WINDOW or not np.all(size > 0.0):
+            continue
+        alike = np.sum((near[1:] * np.conj(near[:-1])).real, axis=0) / size
+        share = np.sqrt(size / len(near))
+        if np.any((alike > _ALIKE) & (share > _MISFIT)):
+            worst = 100.0 * float(np.max(share[alike > _ALIKE]))
+            notes.append(
+                f"mode at {omega / (2.0 * np.pi):.5g} Hz: the misfit is {worst:.2g} % of the response and no noise, for "
+                "neighbouring lines have it in common: another mode close by, or not linear; the intervals do not hold it"
+            )
+    return notes
 
 
 def is_mostly_distortion(data: WeightedResponses, noise: WeightedResponses | None, fit: ModalFit) -> bool:

@@ -95,8 +95,9 @@ class TimeDataMapping(MappingTable):
     """Dimensions of the arrays, in their order: ``sample``, ``channel``, ``period``, ``realisation``, ``level``. Of vectors the
     first name counts alone."""
     levels: Annotated[tuple[Finite, ...], Field(min_length=1)] | None = None
-    """Levels: one number for each along the axis ``level``, or else one for each record. If left out, the RMS of the force over
-    the records that are alike along that axis; all records are one level without it."""
+    """Levels: one number for each along the axis ``level``, or else one for each record, or one for all. Without that axis also
+    one for each size of the force. If left out, the RMS of the force over the records of one level: those that are alike along
+    that axis or, without it, those whose RMS differs by less than 15 % from the next."""
     stretches: tuple[Stretch, ...] = ()
     """Parts of each record; the whole if left out."""
     period_samples: Annotated[int, Field(ge=3)] | None = None

@@ -1,7 +1,7 @@
 """Time data of somebody else as records, as a mapping describes them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
 from identification.signals.decimation import EDGE_SAMPLES, decimated
 from identification.time_data.experiments import resampled_periods
+from identification.time_data.periodicity import check_periods, period_remark
 from identification.time_data.records import TimeRecord, TimeRecords
 
 __all__ = ["map_time_data"]
@@ -22,6 +23,8 @@ Float = NDArray[np.float64]
 
 _WHOLE = 0.05
 """Largest part of a sample by which the beginnings of two channels may miss the common grid."""
+_ONE_LEVEL = 1.15
+"""Largest ratio of the force's RMS of a record to the next smaller one of the same level: realisations scatter by less."""
 
 
 def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] | None = None) -> TimeRecords:
@@ -44,7 +47,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     ------
     IdentificationError
         If a path does not exist, dimensions or lengths do not fit the axes, sample rates disagree, sampling is uneven, values
-        are NaN, or no whole period or sample is left.
+        are NaN, no whole period or sample is left, or periods of the input differ.
     """
     every = {"": data, **(files or {})}
     entries = {name: _entries(one, mapping) for name, one in every.items()}
@@ -62,14 +65,22 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
     cut, notes = _cut(raw, mapping, rate)
     channels, _ = in_si(mapping.channels)
     forces = [row for row, channel in enumerate(channels) if channel.role == "force"]
+    force, unit = forces[:1], channels[forces[0]].unit if forces else ""
+    if force and not any("level" in mapping.axes_of(channel) for channel in mapping.channels):
+        cut = _grouped(cut, force[0], mapping.levels)
     ahead = max(mapping.transient_periods, 1) if mapping.ahead_periods is None else mapping.ahead_periods
     new_rate = rate if mapping.new_rate_hz is None else mapping.new_rate_hz
     size = _period(cut, mapping, new_rate / rate) if mapping.is_periodic else 0
     bottom, top = mapping.lowest_hz, mapping.highest_hz
-    return TimeRecords(
+    records = _named(cut, mapping, force, unit)
+    levels = {one.level for one in records}
+    if mapping.levels is None and not mapping.stretches and force and len(levels) > 1:
+        sizes = f"{min(levels):.4g} to {max(levels):.4g} {unit}"
+        notes = (*notes, f"{len(levels)} levels by the RMS of the force, {sizes}; the key `levels` tells others")
+    found = TimeRecords(
         channels=channels,
         sample_rate_hz=new_rate,
-        records=_named(cut, mapping, forces[:1], channels[forces[0]].unit if forces else ""),
+        records=records,
         period_samples=size,
         ahead_periods=ahead,
         at_rest=mapping.at_rest,
@@ -79,6 +90,9 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         source=mapping.source,
         notes=notes,
     )
+    check_periods(found)
+    remark = period_remark(found)
+    return replace(found, notes=(*found.notes, remark)) if remark else found
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,6 +266,30 @@ def _resampled(part: Float, size: int, rate_hz: float, new_hz: float) -> Float:
 def _period(cut: Sequence[_Raw], mapping: TimeDataMapping, ratio: float) -> int:
     """Return the samples in a period at the new rate."""
     return round(cut[0].period_samples * ratio)
+
+
+def _grouped(cut: Sequence[_Raw], force: int, levels: Sequence[float] | None) -> list[_Raw]:
+    """Return the records in groups of one level each, by the RMS of the force, unless ``levels`` are those of all records.
+
+    Groups are numbered in the order of the given levels: the smallest level is that of the smallest force. A stretch with a
+    level of its own keeps its group.
+    """
+    free = [index for index, one in enumerate(cut) if one.level is None]
+    if len(free) < 2 or (
+        levels is not None and len(levels) in (1, len(cut))
+    ):  # which tell the level of each by themselves
+        return list(cut)
+    rms = np.array([np.sqrt(np.mean(cut[index].samples[force] ** 2)) for index in free])
+    order = np.argsort(rms, kind="stable")
+    rises = rms[order][1:] > _ONE_LEVEL * rms[order][:-1]
+    rank = np.empty(len(free), np.int64)
+    rank[order] = np.concatenate([[0], np.cumsum(rises)])
+    if levels is not None and len(levels) == rank.max() + 1:
+        rank = np.argsort(levels, kind="stable")[rank]
+    out = list(cut)
+    for index, group in zip(free, rank.tolist(), strict=True):
+        out[index] = replace(cut[index], group=group - len(free))  # none of those of a stretch, which are 0 or above
+    return out
 
 
 def _named(cut: Sequence[_Raw], mapping: TimeDataMapping, force: Sequence[int], unit: str) -> tuple[TimeRecord, ...]:

@@ -38,12 +38,12 @@ class ForceDropOut:
         Smallest force, and its time and frequency.
     overshoot_n, overshoot_time_s, overshoot_frequency_hz
         Largest force after the minimum, and its time and frequency.
-    peak, peak_channel, peak_unit
-        Largest fundamental of the response channel; name and unit of this channel.
     peak_m
-        Largest fundamental of the response channel as a displacement, m.
+        Largest displacement of the response channel, m: its fundamental, integrated where it is a velocity or an acceleration.
     peak_time_s, peak_frequency_hz
-        Time and frequency of that peak.
+        Time and frequency of the largest displacement. The largest acceleration is elsewhere, at a higher frequency.
+    peak, peak_channel, peak_unit
+        Fundamental of the response channel at that time, in its unit; name and unit of this channel.
     window_periods
         Window over which the fundamentals were smoothed; a wider window gives a shallower minimum in a fast sweep.
     """
@@ -89,7 +89,7 @@ def force_drop_out(
     sweep
         Fundamentals of the sweep.
     response
-        Channel whose largest fundamental is evaluated; the channel of role ``drive`` if None.
+        Channel whose largest displacement is evaluated; the channel of role ``drive`` if None.
     off_resonance_hz
         Bands of the instantaneous frequency that count as off resonance. If None: the first 15 % of the sweep's range, which
         is before the resonance.
@@ -115,8 +115,8 @@ def force_drop_out(
     row = sweep.index(response) if response is not None else find_role(sweep.channels, "drive")
     channel = sweep.channels[row]
     amplitude = np.abs(sweep.fundamentals[row])
-    top = int(near[np.argmax(amplitude[near])])
-    peak = float(amplitude[top])
+    displacement_m = amplitude / (2.0 * np.pi * frequency) ** MOTION_ORDER[channel.motion]
+    top = int(near[np.argmax(displacement_m[near])])
     return ForceDropOut(
         off_resonance_n=off,
         off_resonance_hz=bands,
@@ -126,8 +126,8 @@ def force_drop_out(
         overshoot_n=float(force[largest]),
         overshoot_time_s=float(sweep.time_s[largest]),
         overshoot_frequency_hz=float(frequency[largest]),
-        peak=peak,
-        peak_m=peak / float(2.0 * np.pi * frequency[top]) ** MOTION_ORDER[channel.motion],
+        peak=float(amplitude[top]),
+        peak_m=float(displacement_m[top]),
         peak_time_s=float(sweep.time_s[top]),
         peak_frequency_hz=float(frequency[top]),
         peak_channel=channel.name,

@@ -15,6 +15,7 @@ from identification.channels import chosen_rows
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.signals.decimation import EDGE_SAMPLES, decimated
+from identification.time_data.periodicity import check_periods
 from identification.time_data.records import TimeRecord, TimeRecords
 from identification.validation import positive
 
@@ -74,9 +75,10 @@ def time_experiments(
     Raises
     ------
     IdentificationError
-        If a channel does not exist, the rate does not fit, or a record is too short for it.
+        If a channel does not exist, the rate does not fit, a record is too short for it, or has no such periods.
     """
     into, out = chosen_rows(records.channels, inputs, outputs)
+    check_periods(records)
     rate = suitable_rate_hz(records) if rate_hz is None else positive("rate_hz", rate_hz, "Hz")
     if rate > records.sample_rate_hz * (1.0 + _SAME):
         raise IdentificationError(

@@ -12,6 +12,7 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.estimators import Estimator
 from identification.multisine.spectra import PeriodicSpectra
+from identification.time_data.periodicity import check_periods
 from identification.time_data.records import TimeRecords
 
 __all__ = ["time_responses", "time_spectra"]
@@ -64,12 +65,13 @@ def _periodic(records: TimeRecords, estimator: Estimator) -> FrequencyResponseMa
 def time_spectra(records: TimeRecords) -> PeriodicSpectra:
     """Return the spectra of periodic records, every period of every record, in the excited band.
 
-    Records with more periods than others lose the first ones. Raises `IdentificationError` if the records are not periodic or
-    no line is excited.
+    Records with more periods than others lose the first ones. Raises `IdentificationError` if the records are not periodic,
+    their periods differ, or no line is excited.
     """
     size = records.period_samples
     if not size:
         raise IdentificationError("period_samples: is 0, the records are not periodic and have no spectra by periods")
+    check_periods(records)
     periods = min(record.samples.shape[1] for record in records.records) // size
     lines = np.array([_lines(record.samples[:, -periods * size :], size) for record in records.records])
     frequency = np.arange(lines.shape[-1]) * records.sample_rate_hz / size

@@ -117,8 +117,9 @@ def _closest(verdict: Verdict) -> str:
 
 
 def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
-    times = np.array([draw.trial.duration_s for draw in rehearsal.draws])
-    done = np.array([draw.trial.completed for draw in rehearsal.draws])
+    trials = [draw.trial for draw in rehearsal.draws if draw.trial.computed]
+    times = np.array([trial.duration_s for trial in trials])
+    done = np.array([trial.completed for trial in trials])
     edges = np.linspace(0.0, max(float(times.max()), 1e-9) * 1.001, 25).tolist()
     axis.hist([times[done], times[~done]], edges, stacked=True, color=[MAIN, SECOND], label=["ends well", "does not"])
     axis.set(xlabel="test time, s", ylabel="draws")

@@ -29,7 +29,7 @@ def foreseen_by(rehearsal: Rehearsal) -> dict[str, Any]:
         }
     return {
         "trips": verdict.trips.value,
-        "duration_s": _quantiles(np.sort([d.trial.duration_s for d in rehearsal.draws])),
+        "duration_s": _quantiles(np.sort([d.trial.duration_s for d in rehearsal.draws if d.trial.computed])),
         "points": points,
     }
 
@@ -50,6 +50,6 @@ def rehearsed_in(rehearsal: Rehearsal, file: str) -> Rehearsed:
         draws=len(rehearsal.draws),
         ends_well=verdict.ends_well.value,
         trips=verdict.trips.value,
-        trips_at_most=verdict.trips.interval[1],
+        trips_at_most=verdict.trips_at_most,
         foreseen=foreseen_by(rehearsal),
     )

@@ -9,7 +9,9 @@ The voltage is the number given to a converter that holds it, the inputs pass an
 `identification.prediction.exciter.VoltagePath`. Suspension damping c and back-EMF b are told apart by the coil alone, so they
 are one parameter here, half of it each.
 
-Every parameter has a prior, wide for what nobody knows; it bounds the directions that the data do not determine. With the
+Every parameter has a prior, wide for what nobody knows; it bounds the directions that the data do not determine. Masses,
+stiffnesses and all else that is positive are fitted and drawn by their logarithms, within `POSSIBLE` of the prior: no step of a
+fit leads to a stiffness of 0 or an infinite mass. With the
 Jacobian J of the residuals over their standard deviations, prior included, the covariance is ``s^2 (J^T J)^-1`` (Tarantola,
 Inverse Problem Theory, SIAM 2005, section 3.2), where s^2 is the misfit over its expectation if that is above 1.
 """
@@ -44,6 +46,7 @@ EXCITER = (
 )
 MODE = ("frequency_hz", "damping_ratio", "drive_shape")
 COUPLING_HZ = 0.3  # AC coupling of common conditioners
+POSSIBLE = 12.0  # distance of a logarithm from its prior that a fit never leaves: a factor of 160 000 either way
 WIDE = 0.7  # standard deviation of the logarithm of what nobody has measured: a factor of two either way
 
 
@@ -129,6 +132,8 @@ class _Linearisation:
     """Slope of the weighted residuals, real parts above imaginary ones [2 n outputs, p]."""
     prior_std: Real
     """Standard deviations of the priors [p]."""
+    bounds: tuple[Real, Real]
+    """Least and largest possible values of the parameters [p]."""
 
     def weighted(self, rig: LinearRig) -> Real:
         """Weighted model of a rig [2 n outputs]."""
@@ -176,6 +181,8 @@ class LinearKnowledge:
         Along directions that the data leave wide the responses are no longer linear in the parameters. So a drawn vector is
         moved, as little as its prior allows, until its responses are those that the linearisation gives it: randomised maximum
         likelihood (Oliver, Reynolds and Liu, Inverse Theory for Petroleum Reservoir Characterization, 2008, section 10.7).
+
+        Raises `ConfigurationError` for a vector that cannot be moved there: it belongs to no rig, and another is to be drawn.
         """
         values, vectors = np.linalg.eigh(self.covariance)
         spread = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -190,10 +197,14 @@ class LinearKnowledge:
         def misses(x: Real) -> Real:
             return np.concatenate([near.weighted(self.rig(x)) - wanted, (x - drawn) / near.prior_std])
 
-        if float(np.sum(misses(drawn) ** 2)) < self.mean.size:  # less than the noise does
+        noise = float(self.mean.size)  # what the noise does, in the mean
+        drawn = np.clip(drawn, *near.bounds)
+        if float(np.sum(misses(drawn) ** 2)) < noise:
             return drawn
         with np.errstate(over="ignore", invalid="ignore"):
-            found = least_squares(misses, drawn, x_scale=near.prior_std, max_nfev=MOST_CORRECTIONS)
+            found = least_squares(misses, drawn, bounds=near.bounds, x_scale=near.prior_std, max_nfev=MOST_CORRECTIONS)
+        if not 2.0 * float(found.cost) < noise:
+            raise ConfigurationError("no rig has the responses that were drawn")
         return np.asarray(found.x)
 
 
@@ -207,6 +218,13 @@ class _Parameters:
         self.centre: list[float] = []
         self.std: list[float] = []
         self.lowest: dict[str, float] = {}
+
+    @property
+    def bounds(self) -> tuple[Real, Real]:
+        """Least and largest possible values [p]; without bounds for a parameter of any sign."""
+        wide = np.where(self.positive, POSSIBLE, np.inf)
+        least = [self.lowest.get(name, -np.inf) for name in self.names]
+        return np.maximum(self.centre - wide, least), self.centre + wide
 
     def log(self, name: str, value: float, log_std: float = WIDE) -> None:
         """Add a positive parameter."""
@@ -344,14 +362,12 @@ def _fitted(
         error = (misses(x) / sigma).ravel()
         return np.concatenate([error.real, error.imag, (x - centre) / std])
 
-    lowest = [parameters.lowest.get(name, -np.inf) for name in names]
+    bounds = parameters.bounds
     fits = []
     with np.errstate(over="ignore", invalid="ignore"):
         for start in starts:
-            x = _as_strong(parameters.vector(start), names, knowledge, responses)
-            fits.append(
-                least_squares(residuals, x, bounds=(lowest, np.inf), x_scale=std, max_nfev=100, ftol=1e-7, xtol=1e-7)
-            )
+            x = np.clip(_as_strong(parameters.vector(start), names, knowledge, responses), *bounds)
+            fits.append(least_squares(residuals, x, bounds=bounds, x_scale=std, max_nfev=100, ftol=1e-7, xtol=1e-7))
     found = min(fits, key=lambda fit: float(fit.cost))
     if not np.all(np.isfinite(found.fun)):
         raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
@@ -365,7 +381,7 @@ def _fitted(
     relative = np.abs(error) / scale
     worst = responses.frequency_hz[int(np.argmax(relative[:, 1]))]
     misfit = float(np.sqrt(np.mean(relative**2)))
-    near = _Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), data, std)
+    near = _Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), data, std, bounds)
     return replace(knowledge(found.x, covariance, misfit, inflation, determined), near=near), float(worst)
 
 

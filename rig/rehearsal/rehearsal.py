@@ -16,7 +16,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
-from rig.rehearsal.trial import Trial, TrialPoint, run_trial
+from rig.rehearsal.trial import Trial, TrialPoint, not_computed, run_trial
 from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
@@ -81,9 +81,16 @@ class RehearsalRequest:
         return draw_twin(self.bench, self.drawn_for or self.plan, self.knowledge, self.hypotheses, self.seed, number)
 
     def __call__(self, number: int) -> Draw:
-        """Draw a twin and run the plan on it."""
-        twin = self.twin(number)
-        trial = run_trial(self.plan, twin.bench, twin.number)
+        """Draw a twin and run the plan on it. A twin that cannot be computed is a result too: the others go on."""
+        unknowns: Mapping[str, float] = {}
+        try:
+            twin = self.twin(number)
+            unknowns = twin.unknowns
+            trial = run_trial(self.plan, twin.bench, twin.number)
+        except (OSError, MemoryError):  # of the machine, not of the twin
+            raise
+        except Exception as error:  # whatever a drawn rig does to the numbers
+            return Draw(number=number, unknowns=unknowns, trial=not_computed(error), truth=NOT_BALANCED)
         truth = (
             true_backbone(twin.bench, trial, twin.number, self.plan.law.harmonics) if self.balanced else NOT_BALANCED
         )
@@ -169,7 +176,8 @@ def rehearse(
     With a ``journal`` every draw is written to it as it is done; a journal of the same rehearsal is taken up again, and it
     stays until the caller removes it. That of another rehearsal is refused, or replaced to ``begin_anew``. ``progress`` is told
     of each draw and of the number done. ``jobs`` is as in joblib: None follows `joblib.parallel_config`, so that a cluster is
-    one line of the caller. Raises `RecordingError` for a journal of another rehearsal, or one that cannot be written.
+    one line of the caller. Raises `RecordingError` for a journal of another rehearsal, or one that cannot be written, and
+    `ConfigurationError` if not a single twin could be computed.
     """
     done = {} if journal is None else _begun(journal, request, begin_anew)
     for count, draw in enumerate(done.values(), 1):
@@ -181,6 +189,8 @@ def rehearse(
             _append(journal, asdict(draw))
         progress(draw, len(done))
     draws = tuple(done[number] for number in range(request.draws))
+    if not any(draw.trial.computed for draw in draws):
+        raise ConfigurationError(f"none of {len(draws)} twins could be computed: {draws[0].trial.text}")
     return Rehearsal(facts=request.facts, draws=draws, finished=datetime.now(UTC).isoformat(timespec="seconds"))
 
 

@@ -165,7 +165,7 @@ def improve(
     more than 0.02; of remedies that help equally the quickest is taken. The improved plan deserves a rehearsal of its own with
     other draws, for it was chosen by these.
     """
-    failed = [draw for draw in rehearsal.draws if not draw.trial.completed]
+    failed = [draw for draw in rehearsal.draws if draw.trial.computed and not draw.trial.completed]
     well = [draw for draw in rehearsal.draws if draw.trial.completed]
     sample = [*_spread(failed), *_spread(well)]
     weights = {d.number: len(failed) / max(len(_spread(failed)), 1) for d in failed}
@@ -237,7 +237,7 @@ def _rates(draws: Sequence[Draw], weights: Mapping[int, float], asked: int) -> t
 
 def _duration_s(draws: Sequence[Draw]) -> float:
     """Median test time; of remedies that help equally, the quickest is taken."""
-    return float(np.median([draw.trial.duration_s for draw in draws]))
+    return float(np.nanmedian([draw.trial.duration_s for draw in draws]))
 
 
 def _score(rates: tuple[float, float, float]) -> float:

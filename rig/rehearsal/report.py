@@ -11,6 +11,7 @@ __all__ = ["lines", "summary", "verdict_in_one_line"]
 CLOSE = 5  # limits that are shown
 MOST_REASONS = 3
 MOST_INFLUENCES = 6
+FEW_MISSING = 0.05  # share of twins that could not be computed above which the verdict is not to be relied on
 ENOUGH = 0.9  # share of twins on which a plan ends well without further advice
 
 
@@ -47,8 +48,22 @@ def verdict_in_one_line(found: dict[str, Any]) -> str:
         f"on {found['draws']} twins of what was measured, by the default hypotheses, it ends well in {_share(well)} and "
         f"trips in {_share(trips)}"
     )
+    if missing := not_computed_in_one_line(verdict):
+        out += f"; {missing}"
     if well["value"] < ENOUGH or trips["count"]:
         out += "; rig rehearse --improve tries what would help"
+    return out
+
+
+def not_computed_in_one_line(verdict: dict[str, Any]) -> str:
+    """Return how many twins could not be computed, why, and what that means for the verdict; empty for none."""
+    missing = verdict["not_computed"]
+    if not missing["count"]:
+        return ""
+    why = "; ".join(f"{count} x {text}" for text, count in list(verdict["why_not_computed"].items())[:MOST_REASONS])
+    out = f"{missing['count']} of {missing['of']} twins could not be computed ({why}), all shares are of the others"
+    if missing["value"] > FEW_MISSING:
+        out += "; these are too many to rely on the verdict: tell more of the rig (--from), or narrower hypotheses"
     return out
 
 
@@ -64,6 +79,7 @@ def lines(found: dict[str, Any]) -> list[str]:
     out = [
         f"{found['specimen']} (bench {found['bench']}): {found['plan']}, rehearsed on {found['draws']} {twins}",
         *(f"known from      {source}" for source in found["sources"]),
+        *(f"not computed    {text}" for text in (not_computed_in_one_line(verdict),) if text),
         f"ends well       {_share(verdict['ends_well'])}",
         f"trips           {_share(verdict['trips'])}",
     ]

@@ -21,11 +21,13 @@ from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
 
-__all__ = ["Trial", "TrialPoint", "run_trial"]
+__all__ = ["NOT_COMPUTED", "Trial", "TrialPoint", "not_computed", "run_trial"]
 
 FURTHER_PART = 1 << 32  # between the seeds of the parts of a run: other noise in each
 REFUSED = "REFUSED"
 """End of a trial whose plan the bench refuses before anything moves."""
+NOT_COMPUTED = "NOT_COMPUTED"
+"""End of a trial whose twin could not be built or simulated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +76,8 @@ class Trial:
     """How the plan ended on one rig."""
 
     end: str
-    """Name of the `rig.tick.safety.layout.EndReason`, or ``REFUSED`` if the bench refuses the plan."""
+    """Name of the `rig.tick.safety.layout.EndReason`, ``REFUSED`` if the bench refuses the plan, or ``NOT_COMPUTED`` if the
+    twin could not be built or simulated."""
     text: str
     """The same in a sentence."""
     tripped: bool
@@ -91,6 +94,11 @@ class Trial:
     """Largest value over its limit, by limit: ``voltage``, and force or acceleration, displacement and range of channels."""
     points: tuple[TrialPoint, ...]
     """Points that were measured or failed, in the order of measurement."""
+
+    @property
+    def computed(self) -> bool:
+        """Whether the twin could be built and simulated; otherwise ``text`` says why not, and nothing else is known."""
+        return self.end != NOT_COMPUTED
 
     @property
     def lost_lock(self) -> bool:
@@ -176,7 +184,7 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
     try:
         plan.check(bench)
     except RigError as error:
-        return _refused(str(error))
+        return _without_rows(REFUSED, str(error), 0.0)
     notes = _Notebook()
     execution, samples = _part(plan, bench, seed, notes, None)
     for number in count(1):
@@ -226,16 +234,22 @@ def _trial(bench: Bench, execution: Execution, samples: int, notes: "_Notebook")
     )
 
 
-def _refused(text: str) -> Trial:
+def not_computed(error: Exception) -> Trial:
+    """Return the trial of a twin whose computation failed."""
+    text = str(error) if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
+    return _without_rows(NOT_COMPUTED, text, float("nan"))
+
+
+def _without_rows(end: str, text: str, duration_s: float) -> Trial:
     nothing: dict[str, float] = {}
     return Trial(
-        end=REFUSED,
+        end=end,
         text=text,
         tripped=False,
         completed=False,
         channel="",
         level=float("nan"),
-        duration_s=0.0,
+        duration_s=duration_s,
         shares=nothing,
         points=(),
     )

@@ -36,7 +36,7 @@ def true_backbone(bench: Bench, trial: Trial, seed: int = 0, loop: HarmonicsSett
     """Balance the rig at the amplitudes of up to four accepted points, the lowest and the highest included.
 
     ``loop``: the harmonics loop of the plan, by which the force's harmonics are what it wants. Empty if no point has modal
-    properties or none converges.
+    properties, or none can be balanced.
     """
     measured = [p for p in trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
     measured.sort(key=lambda point: point.amplitude_m)
@@ -58,6 +58,8 @@ def true_backbone(bench: Bench, trial: Trial, seed: int = 0, loop: HarmonicsSett
         if error.found is None:
             return NOT_BALANCED
         found = error.found
+    except (ValueError, ArithmeticError):  # it could be simulated, and no more
+        return NOT_BALANCED
     n = found.frequency_hz.size
     return TrueBackbone(
         numbers=tuple(p.number for p in points[:n]),

@@ -51,8 +51,8 @@ def draw_twin(bench: Bench, plan: Plan, knowledge: Knowledge, hypotheses: Hypoth
     generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(number,))))
     problem = ""
     for _ in range(MOST_TRIES):
-        drawing = _Drawing(bench, plan, knowledge, hypotheses, generator)
         try:
+            drawing = _Drawing(bench, plan, knowledge, hypotheses, generator)
             twin = Twin(number, drawing.bench_of_it(number), drawing.unknowns)
             VirtualDAQ(twin.bench, number)
         except RigError as error:

@@ -138,8 +138,12 @@ class Influence:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """The verdict."""
+    """The verdict on the twins that could be computed; all shares are of these."""
 
+    not_computed: Share
+    """Share of all draws whose twin could not be built or simulated."""
+    why_not_computed: dict[str, int]
+    """Why not, without numbers, and how often; the most frequent first."""
     ends_well: Share
     """Every point accepted."""
     trips: Share
@@ -161,9 +165,17 @@ class Verdict:
     influences: tuple[Influence, ...]
     """What matters most, the strongest first."""
 
+    @property
+    def trips_at_most(self) -> float:
+        """Upper end of the 95 % interval of a trip's probability, if each twin that could not be computed trips."""
+        missing = self.not_computed.count
+        return Share(self.trips.count + missing, self.trips.n + missing).interval[1]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain data."""
         return {
+            "not_computed": self.not_computed.to_dict(),
+            "why_not_computed": self.why_not_computed,
             "ends_well": self.ends_well.to_dict(),
             "trips": self.trips.to_dict(),
             "lost_lock": self.lost_lock.to_dict(),
@@ -197,10 +209,13 @@ class Verdict:
 
 def verdict_of(rehearsal: Rehearsal) -> Verdict:
     """Evaluate the draws of a rehearsal."""
-    draws = rehearsal.draws
+    draws = [draw for draw in rehearsal.draws if draw.trial.computed]
+    missing = [draw.trial.text for draw in rehearsal.draws if not draw.trial.computed]
     n = len(draws)
     errors = [_errors(draw) for draw in draws]
     return Verdict(
+        not_computed=Share(len(missing), len(rehearsal.draws)),
+        why_not_computed=dict(Counter(map(without_numbers, missing)).most_common()),
         ends_well=Share(sum(d.trial.completed for d in draws), n),
         trips=Share(sum(d.trial.tripped for d in draws), n),
         lost_lock=Share(sum(d.trial.lost_lock for d in draws), n),

@@ -94,11 +94,10 @@ class BackbonePlan(SettledPlan):
         """
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))
         targets = self.targets()
-        out = self.start_segments()
+        left = [target for target in targets if target.number not in done]
+        out = self.start_segments() if left else []
         at: float | None = None
-        for target in targets:
-            if target.number in done:
-                continue
+        for target in left:
             before = self._approach(targets, target)
             if before is not None and before != at:
                 out.append(Segment(SegmentKind.RAMP, -1, before, self.ramp_periods, on_lost_lock=lost))

@@ -13,6 +13,7 @@ from rig.arming.checked_scale import CheckedScale
 from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
+from rig.campaigns.evaluation.heavy_damping import with_heavy_damping
 from rig.campaigns.evaluation.measured_together import round_at
 from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
@@ -310,6 +311,7 @@ class Execution:
         if not self.in_one_go:
             left_alone = int(told[0]["left_alone"])
             points = [with_force_harmonics(self.bench, self.plan, target, point, left_alone) for point in points]
+        points = [with_heavy_damping(point) for point in points]
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
         for point in points:

@@ -101,8 +101,8 @@ def take_up(
     """Finish an interrupted run: keep the accepted points and measure the remaining ones in a new part of the file.
 
     Points that failed are tried again. A ``change`` of the plan, read from ``source``, replaces the current plan from this part
-    on; its points that were accepted before are not measured again. A complete recording without a change of plan is returned
-    unchanged.
+    on; its points that were accepted before are not measured again. If none is missing, nothing is driven, and it is said. A
+    complete recording without a change of plan is returned unchanged.
 
     Raises the same errors as `carry_out`. Also raises `ConfigurationError` for a plan that cannot follow the previous one; for
     a level that tripped or a higher one, unless ``retry_tripped``; and for a bench with functions of the user, unless
@@ -129,7 +129,8 @@ def take_up(
             refuse_tripped(recording, left.plan, left.to_measure)
         options = _still_checked(recording, left.bench, _still_rehearsed(recording, options))
     plan, bench = left.plan, left.bench
-    if segments := plan.segments(bench.sample_rate_hz, left.done):
+    if left.to_measure:
+        segments = plan.segments(bench.sample_rate_hz, left.done)
         if not trust_code:
             refuse_code(bench, output.name)
         with _published(plan, bench, output, options) as live:
@@ -142,6 +143,9 @@ def take_up(
                 begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
                 execution = _further_part(output, session, settings, begin, {**information, "about": facts})
             return _with_further_attempts(_whole(output, progress), execution, options, facts, live)
+    count = "the one point" if len(left.done) == 1 else f"all {len(left.done)} points"
+    end = "" if finished else "; its end is written to the file"
+    progress.remark(f"nothing is missing: {count} of the plan accepted, nothing is driven{end}")
     if not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})

@@ -147,6 +147,5 @@ def _mark_drop_out(force: "Axes", response: "Axes", drop_out: ForceDropOut) -> N
     for seconds, newtons, ratio, frequency_hz, marker in marks:
         label = f"{100 * ratio:.3g} % of {drop_out.off_resonance_n:.3g} N at {frequency_hz:.4g} Hz"
         force.plot(seconds, newtons, marker, color="black", label=label)
-    unit = unit_text(drop_out.peak_unit)
-    label = f"{drop_out.peak:.4g} {unit} at {drop_out.peak_frequency_hz:.4g} Hz"
+    label = f"largest displacement, {1e3 * drop_out.peak_m:.4g} mm at {drop_out.peak_frequency_hz:.4g} Hz"
     response.plot(drop_out.peak_time_s, drop_out.peak, "o", color="black", label=label)

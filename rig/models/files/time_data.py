@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import TimeRecords
+from identification.time_data.periodicity import period_remark
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -43,7 +44,7 @@ def _summarise(data: TimeRecords) -> dict[str, Any]:
             }
             for one in data.records
         ],
-        "notes": list(data.notes),
+        "notes": list(dict.fromkeys([*data.notes, *filter(None, [period_remark(data)])])),
     }
 
 

@@ -11,7 +11,8 @@ from identification import IdentificationError, TimeDataMapping, TimeRecords, ma
 RATE = 512.0
 SIZE, PERIODS, REALISATIONS, LEVELS = 64, 4, 3, 2
 RANDOM = np.random.default_rng(11)
-FORCE = RANDOM.normal(size=(LEVELS, REALISATIONS, PERIODS, SIZE)) * np.array([1.0, 3.0])[:, None, None, None]
+NEARLY_ONE = 1.0 + 1e-3 * np.arange(PERIODS)[:, None]  # every period of the force can be told from the others
+FORCE = RANDOM.normal(size=(LEVELS, REALISATIONS, 1, SIZE)) * NEARLY_ONE * np.array([1.0, 3.0])[:, None, None, None]
 MOTION = RANDOM.normal(size=(LEVELS, REALISATIONS, PERIODS, SIZE))
 AXES = ("level", "realisation", "period", "sample")
 
@@ -57,6 +58,56 @@ def test_a_structure_for_each_record_gives_a_record_each():
     assert [record.level for record in found.records] == [5.0, 6.0, 5.0]
     assert list(found.levels()) == [5.0, 6.0]
     assert len(found.levels()[5.0].records) == 2
+
+
+def test_what_is_said_to_be_periodic_and_is_not_is_refused_and_a_doubtful_period_remarked_on():
+    u, y = RANDOM.normal(size=(2, 4 * SIZE))
+    with pytest.raises(
+        IdentificationError, match=r"period_samples: is 64, but in record '.*realisation 1' such periods of"
+    ):
+        map_time_data({"u": u, "y": y}, told(period_samples=SIZE))
+    settling = np.tile(u[:SIZE], 4) * (1.0 - 0.5 * np.exp(-np.arange(4 * SIZE) / SIZE))
+    (note,) = map_time_data({"u": settling, "y": y}, told(period_samples=SIZE)).notes
+    assert note.startswith("periods of channel 'force' differ by up to 1")
+    assert map_time_data({"u": settling, "y": y}, told(period_samples=SIZE, transient_periods=3)).notes == ()
+
+
+def runs_of(*sizes):
+    """A list of structures, as MATLAB's struct arrays are read, with a force of each size."""
+    made = [(size * RANDOM.choice([-1.0, 1.0], SIZE), RANDOM.normal(size=SIZE)) for size in sizes]
+    return {"runs": [{"u": force, "y": motion} for force, motion in made]}
+
+
+@pytest.mark.parametrize("periodic", [SIZE, None])
+def test_records_of_one_list_at_two_levels_are_two_levels(periodic):
+    found = map_time_data(runs_of(2.0, 8.0, 2.1, 7.9), told(records="runs", period_samples=periodic))
+    what = "realisation" if periodic else "record"
+    assert [record.name for record in found.records] == [
+        f"2.051 N RMS, {what} 1",
+        f"7.95 N RMS, {what} 1",
+        f"2.051 N RMS, {what} 2",
+        f"7.95 N RMS, {what} 2",
+    ]
+    assert [len(one.records) for one in found.levels().values()] == [2, 2]
+    assert found.notes == ("2 levels by the RMS of the force, 2.051 to 7.95 N; the key `levels` tells others",)
+
+
+def test_columns_at_two_levels_are_two_levels_and_realisations_stay_together():
+    u = np.array([size * RANDOM.choice([-1.0, 1.0], SIZE) for size in (1.0, 1.05, 0.95, 4.0)]).T
+    found = map_time_data({"u": u, "y": RANDOM.normal(size=u.shape)}, told(period_samples=SIZE))
+    assert [len(one.records) for one in found.levels().values()] == [3, 1]
+
+
+@pytest.mark.parametrize("levels", [[2.0, 8.0], [8.0, 2.0], [2.0, 8.0, 2.0, 8.0]])
+def test_levels_of_a_list_are_named_by_their_size_or_one_by_one(levels):
+    found = map_time_data(runs_of(1.9, 7.7, 1.8, 7.9), told(records="runs", period_samples=SIZE, levels=levels))
+    assert [record.level for record in found.records] == [2.0, 8.0, 2.0, 8.0]
+    each = map_time_data(runs_of(1.0, 3.0), told(records="runs", period_samples=SIZE, levels=[7.0, 6.0]))
+    assert [record.level for record in each.records] == [7.0, 6.0]  # one for each record: in their order
+    one = map_time_data(runs_of(1.9, 7.7), told(records="runs", period_samples=SIZE, levels=[5.0]))
+    assert [record.level for record in one.records] == [5.0, 5.0]
+    with pytest.raises(IdentificationError, match=r"levels: has 3 numbers, the data has 2 levels and 4 records"):
+        map_time_data(runs_of(1.9, 7.7, 1.8, 7.9), told(records="runs", period_samples=SIZE, levels=[1.0, 2.0, 3.0]))
 
 
 def test_stretches_of_a_long_record_become_records():

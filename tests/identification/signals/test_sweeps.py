@@ -18,7 +18,7 @@ def written_down() -> Transient:
     """Ten newtons, a notch down to one at 20 Hz, 12 N at 24 Hz; a response that peaks at 21 Hz."""
     frequency = np.linspace(10.0, 30.0, 2001)
     force = 10.0 - 9.0 * np.exp(-((frequency - 20.0) ** 2)) + 2.0 * np.exp(-((frequency - 24.0) ** 2))
-    response = 5.0 * np.exp(-((frequency - 21.0) ** 2))
+    response = 5.0 * np.exp(-((frequency - 21.0) ** 2)) * (frequency / 21.0) ** 2  # a displacement largest at 21 Hz
     turn = np.exp(1j * frequency)
     return Transient(CHANNELS, 2.0 * frequency - 20.0, frequency, np.array([turn, turn * force, turn * response]), 2)
 
@@ -34,6 +34,24 @@ def test_minimum_overshoot_and_peak_are_found_where_they_are() -> None:
     assert result.peak == pytest.approx(5.0)
     assert result.peak_m == pytest.approx(5.0 / (2 * np.pi * 21.0) ** 2)
     assert (result.peak_frequency_hz, result.peak_channel, result.peak_unit) == (pytest.approx(21.0), "drive", "m/s2")
+
+
+@pytest.mark.parametrize("unit", ["m", "m/s", "m/s^2"])
+def test_the_largest_displacement_is_not_where_the_acceleration_is_largest(unit: str) -> None:
+    sweep = written_down()
+    omega = 2.0 * np.pi * sweep.frequency_hz
+    displacement_m = 1e-3 / np.sqrt(
+        (1.0 - (sweep.frequency_hz / 20.0) ** 2) ** 2 + (0.1 * sweep.frequency_hz / 20.0) ** 2
+    )
+    order = {"m": 0, "m/s": 1, "m/s^2": 2}[unit]
+    channels = (*CHANNELS[:2], Channel("drive", "drive", unit))
+    values = np.array([*sweep.fundamentals[:2], displacement_m * omega**order])
+    result = force_drop_out(replace(sweep, channels=channels, fundamentals=values))
+    resonance_hz = 20.0 * np.sqrt(1.0 - 2.0 * 0.05**2)  # of a damped oscillator's displacement
+    assert result.peak_frequency_hz == pytest.approx(resonance_hz, abs=0.006)
+    assert result.peak_m == pytest.approx(displacement_m.max(), rel=1e-12)
+    assert result.peak == pytest.approx(result.peak_m * (2.0 * np.pi * result.peak_frequency_hz) ** order)
+    assert np.interp(result.peak_time_s, sweep.time_s, sweep.frequency_hz) == pytest.approx(result.peak_frequency_hz)
 
 
 def test_a_sweep_downwards_overshoots_on_the_other_side() -> None:

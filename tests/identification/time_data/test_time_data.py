@@ -15,6 +15,7 @@ from identification import (
     time_experiments,
     time_responses,
 )
+from identification.time_data.periodicity import period_remark
 
 FORCE, DRIVE, VOLT = Channel("force", "force", "V"), Channel("out", "drive", "V"), Channel("gen", "monitor", "V")
 RATE_HZ, SIZE, F0, ZETA = 512.0, 512, 40.0, 0.02
@@ -78,6 +79,32 @@ def test_responses_of_periodic_records_are_those_of_the_mode_and_keep_the_volts(
     modes = linear_modes(time_responses(multisines(noise=0.01)))
     assert modes.frequency_hz == pytest.approx([F0], abs=4 * modes.frequency_std_hz[0])
     assert modes.damping_ratio == pytest.approx([ZETA], abs=4 * modes.damping_ratio_std[0])
+
+
+def with_force_noise(share, **changes):
+    """Records whose force has noise of a share of its RMS, and no instrument."""
+    return TimeRecords(**{**vars(multisines(noise=share, noisy=(0,))), "instrument": "", **changes})
+
+
+@pytest.mark.parametrize("evaluate", [time_responses, time_experiments])
+def test_data_without_periods_are_not_evaluated_as_periodic(evaluate):
+    random = np.random.default_rng(3)
+    records = tuple(TimeRecord(samples=random.normal(size=(3, 4 * SIZE)), name=f"noise {n}") for n in (1, 2))
+    told = r"period_samples: is 512, but in record 'noise 1' such periods of channel 'force' differ by (9\d|10\d) %, allowed"
+    with pytest.raises(IdentificationError, match=told):
+        evaluate(with_force_noise(0.0, records=records))
+    with pytest.raises(IdentificationError, match=r"period_samples: is 384, .* differ by \d+ %"):
+        evaluate(with_force_noise(0.0, period_samples=384))  # a wrong length of the period
+    evaluate(with_force_noise(0.3))
+    evaluate(with_force_noise(0.0, records=tuple(TimeRecord(samples=random.normal(size=(3, SIZE))) for _ in range(2))))
+
+
+def test_an_instrument_that_is_periodic_lets_the_force_be_noisy():
+    assert period_remark(multisines(noise=1.0, noisy=(0,))) == ""
+    assert period_remark(with_force_noise(0.01)) == ""
+    # Noise of a share n of the signal's RMS is n / sqrt(1 + n^2) of that of both.
+    remark = period_remark(with_force_noise(0.2))
+    assert float(remark.split("up to ")[1].split(" %")[0]) == pytest.approx(100.0 * 0.2 / np.sqrt(1.04), rel=0.06)
 
 
 def test_noise_in_the_force_biases_the_responses_only_without_an_instrument():

@@ -6,7 +6,7 @@ import pytest
 
 from identification import Backbone, FrequencyResponse
 from rig.campaigns.kinds import KINDS, kinds_that_yield
-from rig.campaigns.plans import load_plan, shipped_plans
+from rig.campaigns.plans import bench_of, load_plan, shipped_plans
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -26,3 +26,10 @@ def test_every_kind_has_a_shipped_plan():
 def test_kinds_are_found_by_what_they_yield():
     assert set(kinds_that_yield(FrequencyResponse)) == {"stepped-sine", "stepped-phase", "response-controlled"}
     assert set(kinds_that_yield(Backbone)) == {"backbone", "continuous-backbone", "decay"}
+
+
+@pytest.mark.parametrize("name", shipped_plans())
+def test_a_plan_whose_points_are_all_done_has_no_segments_left(name):
+    plan = load_plan(name)
+    done = frozenset(target.number for target in plan.targets())
+    assert plan.segments(bench_of(plan, name).sample_rate_hz, done) == ()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.rehearsal.linear_rig import LinearRig, Prior, Responses, known_rig
+from rig.rehearsal.linear_rig import POSSIBLE, LinearRig, Prior, Responses, known_rig
 from simulators.analysis import frequency_response
 from simulators.virtual_rig import VirtualRig
 from tests.rig.rehearsal.known import EXCITER, MODE, RATIOS
@@ -140,3 +140,21 @@ def test_the_model_is_that_of_the_simulators():
     model = LinearRig(values, ("tip",)).responses(LINES, RATE_HZ)
     exact = responses_of(rig_of(TRUE), LINES, 0.0).value
     assert np.max(np.abs(model / exact - 1.0)) < 2e-3  # the stinger's damping is left out of the model
+
+
+def test_a_fit_never_leaves_what_a_rig_can_be(monkeypatch):
+    seen = []
+    computed = LinearRig.responses
+
+    def noted(rig, *arguments):
+        seen.append({name: value for name, value in rig.values.items() if not name.startswith(("ratio", "delay"))})
+        return computed(rig, *arguments)
+
+    monkeypatch.setattr(LinearRig, "responses", noted)
+    right = responses_of(rig_of(TRUE), LINES[::10], 1e-3)
+    reversed_force = right.value * np.array([-1.0, 1.0, 1.0])  # no rig answers so: the fit goes astray
+    known_rig(("tip",), START, {}, Responses(right.frequency_hz, reversed_force, 1e-5 * np.abs(right.value), RATE_HZ))
+    for name in seen[0]:
+        values = [one[name] for one in seen]
+        assert min(values) > 0.0, name
+        assert max(values) < np.exp(2.0 * POSSIBLE) * (1.0 + 1e-9) * min(values), name

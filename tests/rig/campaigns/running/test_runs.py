@@ -416,6 +416,28 @@ def test_a_complete_recording_is_resumed_to_itself(tmp_path):
     assert output.read_bytes() == before
 
 
+@pytest.mark.parametrize("evaluation", ["settled", "slow-flow"])
+def test_to_resume_a_complete_recording_opens_no_device_and_says_that_nothing_is_missing(
+    tmp_path, monkeypatch, evaluation
+):
+    output, told = tmp_path / "run.h5", []
+    plan = plan_with(levels_v=(0.4,), evaluation=evaluation)
+    rig.run(plan, output=output).close()
+    before = output.read_bytes()
+
+    def opened(*_, **__):
+        raise AssertionError("a device was opened")
+
+    progress = Silent()
+    monkeypatch.setattr(progress, "remark", told.append, raising=False)
+    monkeypatch.setattr("rig.campaigns.running.runner.open_session", opened)
+    for change in (None, plan):
+        with rig.resume(output, plan=change, progress=progress) as run:
+            assert run.complete
+    assert output.read_bytes() == before
+    assert told == ["nothing is missing: the one point of the plan accepted, nothing is driven"] * 2
+
+
 def test_the_same_seed_gives_the_same_recording_bit_for_bit(tmp_path):
     rows = []
     for name in ("a.h5", "b.h5"):

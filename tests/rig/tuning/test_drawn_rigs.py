@@ -1,0 +1,24 @@
+"""`rig tune` as typed, with its rehearsal, on rigs drawn at random that have once ended it without a word."""
+
+from pathlib import Path
+
+import pytest
+from joblib.externals.loky import get_reusable_executor
+
+RIGS = sorted((Path(__file__).parent / "drawn_rigs").glob("*.toml"))
+
+
+@pytest.fixture(autouse=True)
+def workers_of_this_folder(command):
+    """Worker processes are new, for those of another test stand in a folder that may be gone; none stays."""
+    get_reusable_executor().shutdown()
+    yield
+    get_reusable_executor().shutdown()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bench", RIGS, ids=lambda path: path.stem)
+def test_a_plan_and_its_rehearsal_come_of_a_rig_drawn_at_random(command, bench):
+    told = command("tune", "--bench", bench, "-o", "tuned.toml").succeeded()
+    assert "of 40) and trips in" in told.out
+    assert Path("tuned-rehearsal.h5").exists()
