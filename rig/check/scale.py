@@ -1,5 +1,7 @@
 """What a check measured of the scale of force and motion, for runs to compare with."""
 
+import math
+
 import numpy as np
 
 from rig.arming.checked_scale import CheckedScale
@@ -35,7 +37,7 @@ def scale_of(bench: Bench, responses: Responses, mode: Mode | None, at: str = ""
     terms = np.vander(off[near], 3)
     found, *_ = np.linalg.lstsq(terms.astype(complex), volts, rcond=None)
     left = np.linalg.norm(volts - terms @ found) / np.linalg.norm(volts)
-    if not left <= LARGEST_ERROR or not abs(found[-1]) > 0.0:
+    if not (left <= LARGEST_ERROR and abs(found[-1]) > 0.0 and 0.0 < per_newton < math.inf):
         return None
     return CheckedScale(
         at=at,

@@ -4,8 +4,6 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from identification import IdentificationError
 from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
@@ -85,7 +83,9 @@ class StartJudgement:
         half = rows.size // 2
         drive = self._bench.index_of("drive")
         first, second = (
-            abs(recorded_vibration(self._bench, part, 1).harmonics[drive, 1]) for part in (rows[:half], rows[half:])
+            float(abs(recorded_vibration(self._bench, part, 1).harmonics[drive, 1]))
+            for part in (rows[:half], rows[half:])
         )
-        ratio = float(second / first)
-        return math.log(ratio) * self._bench.sample_rate_hz / half if np.isfinite(ratio) and ratio > 0.0 else 0.0
+        if not (0.0 < first < math.inf and 0.0 < second < math.inf):
+            return 0.0
+        return math.log(second / first) * self._bench.sample_rate_hz / half

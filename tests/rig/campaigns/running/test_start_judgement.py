@@ -5,7 +5,9 @@ import pytest
 
 from rig.arming.run_options import RunOptions
 from rig.campaigns.running.runner import carry_out
+from rig.campaigns.running.start_judgement import StartJudgement
 from rig.check.run import check
+from rig.tick.layout import recorded_row
 from tests.reliability.faults.plans import bench_for, plan_for
 from tests.rig.check.rewired import Rewiring, column, rewire, scaled
 from tests.rig.rigs import bench_with
@@ -74,6 +76,16 @@ def test_levels_in_volts_are_judged_with_the_first_point_and_go_no_further(tmp_p
     end, _, points = run(tmp_path, "V", checked=scale)
     assert "channel force: " in end["text"]
     assert points < 3
+
+
+@pytest.mark.parametrize("samples", [0, 1, 50, 206, 2000])
+@pytest.mark.parametrize("reads", [0.0, np.nan])
+def test_rows_that_hold_no_vibration_prove_nothing(scale, samples, reads):
+    bench = bench_for("m")
+    rows = np.zeros(samples, recorded_row(len(bench.channels)))
+    rows["theta_rad"] = np.mod(2.0 * np.pi * 24.37 / bench.sample_rate_hz * np.arange(samples), 2.0 * np.pi)
+    rows["inputs"] = reads
+    assert StartJudgement(bench, plan_for("m"), scale).refusal_of_rows(rows) == ""
 
 
 def test_a_sound_rig_goes_on_as_if_nothing_had_been_judged(tmp_path, scale):
