@@ -18,7 +18,7 @@ __all__ = ["Bound", "bound_for", "objections"]
 
 OUTPUT_RATIO, OUTPUT_EXTRA_V = 2.0, 0.1
 FADED = {"middle": 3.5, "start": 5.5}
-"""Of what is held: the run ends at three times the output of a level, and what fades from the start has faded by its first level."""
+"""Of what is held: a run ends at three times the output of a level; what fades from the start has faded by its first level."""
 LIMIT_RATIO = 1.25  # beyond it the guard drops what it began to ramp
 TO_ZERO_SAMPLES = 50  # beside the ramp: a block and the queue
 FIRST_LEVEL = 1.01  # what is broken from the start ends at the first level in volts, before the first rise
