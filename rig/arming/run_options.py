@@ -86,7 +86,7 @@ class RunOptions:
     """Permission to move something physical: True, a callable that asks a person, or None (`rig.arming.arming`)."""
     about: About = field(default_factory=About)
     """Operator, specimen and notes, recorded with the part."""
-    checked: CheckedScale | None = None
+    check: CheckedScale | None = None
     """Scale of force and motion from a check of the bench, in place of the last one that is remembered."""
     rehearsal: Rehearsed | None = None
     """A rehearsal of the plan on this bench, recorded with the part; some benches need one (`rig.arming.rehearsed`)."""

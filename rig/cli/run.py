@@ -48,7 +48,7 @@ def run(
     if check is not None:
         from rig.check.assessment import checked_scale
 
-        options = replace(options, checked=checked_scale(check, chosen))
+        options = replace(options, check=checked_scale(check, chosen))
     options = _with_rehearsal(options, rehearsal, override_rehearsal)
     _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
 

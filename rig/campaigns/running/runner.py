@@ -164,9 +164,9 @@ def _still_rehearsed(recording: Recording, options: RunOptions) -> RunOptions:
 
 def _still_checked(recording: Recording, bench: Bench, options: RunOptions) -> RunOptions:
     """Return the options with the check of the last part, if neither they nor the memory of the bench have one."""
-    if options.checked is not None or not recording.parts or memory_of(bench).check is not None:
+    if options.check is not None or not recording.parts or memory_of(bench).check is not None:
         return options
-    return replace(options, checked=_checked(recording.parts[-1].information.get("about", {})))
+    return replace(options, check=_checked(recording.parts[-1].information.get("about", {})))
 
 
 def _further_part(
@@ -274,7 +274,7 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
     purpose = options.about.purpose
     rehearsed = {} if purpose else rehearsal_facts(plan, bench, options.rehearsal, options.override_rehearsal)
     virtual = session.capabilities.virtual
-    scale, unproven = known_scale(bench, session.identity, options.checked, virtual=virtual)
+    scale, unproven = known_scale(bench, session.identity, options.check, virtual=virtual)
     missing = [unproven, unproven_phase(bench, virtual=virtual)] if isinstance(plan, LockedPlan) else []
     facts = {
         **options.about.facts(),

@@ -112,7 +112,7 @@ def driver(make: Any, *given: Any) -> Iterator[list[Any]]:
 
 def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str, bool]:
     """The device, the part of the recording, what was raised, and whether the recording has an end."""
-    options = RunOptions(seed=SEED, checked=checked(LEVELS[levels]["bench"]))
+    options = RunOptions(seed=SEED, check=checked(LEVELS[levels]["bench"]))
     with tempfile.TemporaryDirectory() as folder, driver(DEVICES[device], *given) as made:
         output, raised = Path(folder) / "run.h5", ""
         try:

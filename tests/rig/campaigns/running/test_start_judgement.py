@@ -57,7 +57,7 @@ def test_a_sensor_of_another_scale_than_in_the_check_ends_the_run_at_the_start_v
     tmp_path, monkeypatch, scale, channel, factor, levels
 ):
     rewire(monkeypatch, scaled(channel, factor))
-    end, largest_v, points = run(tmp_path, levels, checked=scale)
+    end, largest_v, points = run(tmp_path, levels, check=scale)
     assert f"channel {channel}: " in end["text"]
     assert largest_v < 1.05 * plan_for(levels).start_v
     assert points == 0
@@ -65,7 +65,7 @@ def test_a_sensor_of_another_scale_than_in_the_check_ends_the_run_at_the_start_v
 
 def test_half_of_the_scale_is_a_warning_of_every_point(tmp_path, monkeypatch, scale):
     rewire(monkeypatch, scaled("force", 2.0))
-    with carry_out(plan_for("m"), bench_for("m"), tmp_path / "run.h5", RunOptions(seed=3, checked=scale)) as recording:
+    with carry_out(plan_for("m"), bench_for("m"), tmp_path / "run.h5", RunOptions(seed=3, check=scale)) as recording:
         points = list(recording.points)
     assert len(points) == 3
     assert all(any("channel force: " in line for line in point["warnings"]) for point in points)
@@ -73,7 +73,7 @@ def test_half_of_the_scale_is_a_warning_of_every_point(tmp_path, monkeypatch, sc
 
 def test_levels_in_volts_are_judged_with_the_first_point_and_go_no_further(tmp_path, monkeypatch, scale):
     rewire(monkeypatch, scaled("force", 10.0))
-    end, _, points = run(tmp_path, "V", checked=scale)
+    end, _, points = run(tmp_path, "V", check=scale)
     assert "channel force: " in end["text"]
     assert points < 3
 
@@ -96,7 +96,7 @@ def test_a_sound_rig_goes_on_as_if_nothing_had_been_judged(tmp_path, scale):
 
 
 def _both(tmp_path, scale):
-    for name, options in (("with", {"checked": scale}), ("without", {})):
+    for name, options in (("with", {"check": scale}), ("without", {})):
         (tmp_path / name).mkdir()
         yield name, options
 

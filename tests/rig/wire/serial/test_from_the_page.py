@@ -51,6 +51,8 @@ def bench_at(port: str, **options: object) -> Bench:
 
 
 class TestMadeFromThePage(DriverContract):
+    late_s = prompt_s = 10.0  # the device is a process of this machine, which the tests keep busy
+
     @pytest.fixture(autouse=True)
     def _reached(self):
         with device() as (self.process, self.port):
