@@ -259,7 +259,9 @@ def test_a_voltage_beyond_the_amplifier_is_said_and_ends_the_default_levels():
 def test_a_bench_that_may_not_be_driven_at_resonance_at_all_says_what_forbids_it():
     bench = bench_with({"limits": {"displacement_m": 1e-9}})
     lowest = f"already at {0.01 * bench.limits.voltage_v:g} V the bench may not be driven at resonance"
-    with pytest.raises(ConfigurationError, match=rf"^{lowest} \(displacement reaches [^;]*\)$"):
+    with pytest.raises(
+        ConfigurationError, match=rf"^{lowest} \(displacement reaches \S+ m and is in 1 of 1 points [^;]*\)$"
+    ):
         backbone(subject_of(bench))
 
 
