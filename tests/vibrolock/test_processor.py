@@ -5,6 +5,7 @@ import pytest
 
 from vibrolock import content_cache
 
+HAS = dict.fromkeys(content_cache.LEVEL_3, True)
 NAMES = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
 
 
@@ -12,12 +13,11 @@ NAMES = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
 def chosen(monkeypatch):
     """Choose with these variables on such a machine; the name and the features that numba is told."""
 
-    def choose(variables, machine="x86_64", missing=()):
+    def choose(variables, machine="x86_64", features=HAS):
         for name in NAMES:
             monkeypatch.delenv(name, raising=False)
         for name, value in variables.items():
             monkeypatch.setenv(name, value)
-        features = {name: name not in missing for name in content_cache.LEVEL_3}
         monkeypatch.setattr(content_cache.llvmlite.binding, "get_host_cpu_features", lambda: features)
         monkeypatch.setattr(content_cache.platform, "machine", lambda: machine)
         monkeypatch.setattr(numba.config, "CPU_NAME", "numba's own", raising=False)
@@ -41,4 +41,6 @@ def test_what_the_environment_names_is_left_to_numba(chosen, variables):
 def test_another_processor_is_left_to_numba(chosen):
     assert chosen({}, "aarch64") == ("numba's own", "numba's own")
     for name in content_cache.LEVEL_3:
-        assert chosen({}, missing=(name,)) == ("numba's own", "numba's own")
+        without = {other: True for other in content_cache.LEVEL_3 if other != name}
+        assert chosen({}, features=without) == ("numba's own", "numba's own")
+        assert chosen({}, features=without | {name: False}) == ("numba's own", "numba's own")
