@@ -49,9 +49,24 @@ def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicRespons
     """Return a backbone over the voltages of the bench, and the index of its last point within the bench's limits."""
     limit_v = subject.bench.limits.voltage_v
     volts = np.geomspace(_LOWEST_SHARE * limit_v, limit_v, _SEARCHED)
+    path = _over_voltages(subject, volts, harmonics)
+    allowed = subject.within(path)
+    count = path.frequency_hz.size if np.all(allowed) else int(np.argmin(allowed))
+    if count == 0:  # higher levels may leave further ranges, which is not the reason
+        lowest = _over_voltages(subject, volts[:1], harmonics)
+        low_hz, high_hz = subject.bench.limits.frequency_hz
+        excesses = "; ".join(subject.excesses(lowest)) or (
+            f"the resonance at {lowest.frequency_hz[0]:.4g} Hz is outside of limits.frequency_hz = {low_hz:g} to {high_hz:g} Hz"
+        )
+        raise ConfigurationError(f"already at {volts[0]:g} V the bench may not be driven at resonance ({excesses})")
+    return path, count - 1
+
+
+def _over_voltages(subject: Subject, volts: Real, harmonics: int) -> PeriodicResponses:
+    """Return the backbone over voltages, as far as it is found; raise `ConfigurationError` if nothing is."""
     try:
         with refusing():
-            path = phase_resonance_backbone(
+            return phase_resonance_backbone(
                 subject.rig,
                 voltages_v=volts,
                 near_hz=subject.near_hz,
@@ -61,13 +76,7 @@ def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicRespons
     except NotConvergedError as failure:
         if failure.found is None:
             raise ConfigurationError(f"no resonance found at {volts[0]:g} V: {failure}") from failure
-        path = failure.found
-    allowed = subject.within(path)
-    count = path.frequency_hz.size if np.all(allowed) else int(np.argmin(allowed))
-    if count == 0:
-        excesses = "; ".join(subject.excesses(path)) or "the resonance is outside of limits.frequency_hz"
-        raise ConfigurationError(f"already at {volts[0]:g} V the bench may not be driven at resonance ({excesses})")
-    return path, count - 1
+        return failure.found
 
 
 def samples_for(harmonics: int) -> int:

@@ -51,7 +51,7 @@ SETTLING = np.dtype(
     ]
 )
 """Means of the last periods, as rings, and the state of the settle rule (one record). ``clamped_in_row`` counts the present run
-of periods with clamped frequency; ``clamped_periods`` counts all such periods of the present settling."""
+of periods with clamped frequency; ``clamped_periods`` counts those of that run that the settle rule has judged."""
 
 
 @kernel

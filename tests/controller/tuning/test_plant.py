@@ -110,3 +110,27 @@ def test_responses_without_a_mode_give_no_plant_whatever_the_rounding_and_the_no
         accelerance = (0.5 - 2.0 * (frequency / 25.0) ** 2) * (1.0 + noise * generator.standard_normal(200))
         with pytest.raises(ValueError, match="no damped resonance"):
             PlantModel.from_frequency_responses(frequency, force, accelerance * force, **RATE)
+
+
+def one_mode(damping_ratio, noise=0.0, seed=0):
+    """A mode at 25 Hz of lines 0.05 Hz apart behind a plain exciter, force and acceleration each with their own noise."""
+    frequency = np.linspace(20.0, 30.0, 201)
+    z = 1j * frequency / 25.0
+    accelerance = 0.8 * z**2 / (z**2 + 2.0 * damping_ratio * z + 1.0)
+    force = 1.0 / (0.3 + 0.05 * z + 0.01 * accelerance)
+    return frequency, noisy(force, noise, seed), noisy(accelerance * force, noise, seed + 50)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mode_narrower_than_the_lines_is_found_whatever_sign_noise_gives_its_damping(seed):
+    found = PlantModel.from_frequency_responses(*one_mode(1e-6, 1e-3, seed), **RATE)
+    assert found.frequency_rad_s == pytest.approx(2 * math.pi * 25.0, rel=1e-3)
+    assert 0.0 < found.damping_ratio < 2e-3
+
+
+@pytest.mark.parametrize("damping_ratio", [0.02, 0.05])
+def test_a_mode_wider_than_the_lines_needs_a_damping_above_zero(damping_ratio):
+    found = PlantModel.from_frequency_responses(*one_mode(damping_ratio, 1e-4), **RATE)
+    assert found.damping_ratio == pytest.approx(damping_ratio, rel=0.02)
+    with pytest.raises(ValueError, match="no damped resonance"):
+        PlantModel.from_frequency_responses(*one_mode(-damping_ratio, 1e-4), **RATE)

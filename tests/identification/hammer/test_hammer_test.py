@@ -101,6 +101,7 @@ def test_several_hits_in_one_record_are_found_and_each_has_its_own_window():
     found = hammer_test([record(16.0, hits, noise_db=50)], CHANNELS, RATE_HZ, record_s=2.2, pretrigger_s=0.1, **BAND)
     assert [round(hit.time_s, 2) for hit in found.used] == [at for at, _ in hits]
     assert [hit.peak_n for hit in found.used] == pytest.approx([height for _, height in hits], rel=0.03)
+    assert found.record_s == pytest.approx(2.2, abs=1.0 / RATE_HZ)
     modes = linear_modes(found.responses)
     np.testing.assert_allclose(modes.frequency_hz, FREQUENCY_HZ, rtol=1e-4)
     np.testing.assert_allclose(modes.damping_ratio, DAMPING, rtol=0.02)

@@ -45,6 +45,14 @@ def test_standard_errors_are_those_of_first_order_propagation(lag_deg: float) ->
     assert mode.phase_lag_std_deg[0] == pytest.approx(np.degrees(angle), rel=0.03)
 
 
+@pytest.mark.parametrize(("periods", "freedom"), [(4, 6), (5, 8), (8, 14), (20, 38), (500, 38)])
+def test_standard_errors_of_few_periods_are_those_of_students_distribution(periods: int, freedom: int) -> None:
+    """Each coefficient has two parts, and each batch but one is free; the variance of Student's t is ``n / (n - 2)``."""
+    point = replace(noisy_point(relative=1e-3), periods=periods)
+    mode = identify(Backbone((point,), drive_mode_shape=PHI), draws=20_000)
+    assert mode.force_std_n[0] == pytest.approx(0.3e-3 * np.sqrt(freedom / (freedom - 2)), rel=0.03)
+
+
 def test_one_percent_of_the_shape_is_two_percent_of_the_damping_at_all_points_alike() -> None:
     points = tuple(noisy_point(relative=1e-6, forces=(0, force, 0)) for force in (0.1, 0.2, 0.3))
     shapes = ModeShapes(("drive",), np.array([[PHI]]), shapes_std=np.array([[0.01 * PHI]]))

@@ -1,14 +1,15 @@
 """Several elements in one fit: a cubic spring where no sensor is, and a joint, on a structure integrated with tiny steps."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from numba import njit
 
-from identification import Channel, ElementPlan, IdentificationError, LinearModes, fit_structured
+from identification import Channel, ElementPlan, IdentificationError, LinearModes, NonlinearElement, fit_structured
 from identification.pnlss.experiment import Experiment
-from identification.structured.laws import Jenkins, PolynomialSpring, Stop
+from identification.structured.laws import Damper, Jenkins, PolynomialSpring, Spring, Stop
 
 OMEGA, ZETA = 2.0 * np.pi * np.array([20.0, 55.0, 130.0]), np.array([0.01, 0.012, 0.015])
 INPUT = np.array([0.9, 0.7, 0.5])
@@ -158,7 +159,6 @@ def test_an_element_at_a_channel_keeps_to_it(tested):
 
 def test_derivatives_by_shapes_of_an_element_at_a_place(tested):
     """Against central differences of simulations."""
-    from identification.structured.elements import NonlinearElement
     from identification.structured.parameters import Parameters
     from identification.structured.start import linear_start
 
@@ -196,3 +196,32 @@ def test_plans_that_cannot_be_are_refused(tested):
         ElementPlan(between=("tip", "tip"))
     with pytest.raises(IdentificationError, match="nowhere"):
         fit_structured(modes(), training[:1], elements=(ElementPlan(between=("nowhere",)),))
+
+
+class Straight(Spring):
+    """``2 x``."""
+
+    free: ClassVar = {}
+
+    def force(self, x):
+        return 2.0 * x
+
+
+class Dashpot(Damper):
+    """3 N s/m everywhere."""
+
+    free: ClassVar = {}
+
+    def damping(self, x):
+        return np.full(np.shape(x), 3.0)
+
+
+@pytest.mark.parametrize("scale_m", [1e-3, 0.5, 2.0])
+@pytest.mark.parametrize("reach", [1.0, 3.0])
+def test_small_motions_have_the_stiffness_of_springs_and_stuck_sliders_and_the_damping_of_dashpots(scale_m, reach):
+    """With ``z = scale x`` the energy is ``k scale x^2 / 2`` for a force of k x, and the power lost is ``c scale^2 x'^2``."""
+    laws = (Straight(), PolynomialSpring((0.7, 0.4)), Jenkins(stiffness_n=5.0, slip=0.2), Dashpot(), Dashpot())
+    element = NonlinearElement(direction=[1.0], scale_m=scale_m, laws=laws, reach=reach)
+    stiffness_j, damping_j_s = element.at_rest
+    assert stiffness_j == pytest.approx((2.0 + 5.0) * scale_m, rel=1e-8)
+    assert damping_j_s == pytest.approx((3.0 + 3.0) * scale_m**2, rel=1e-12)

@@ -1,6 +1,7 @@
 """``rig analyse``: its numbers against independent ones, its figures, and one line for every mistake."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from rig.analysis.backbone import backbone
 from rig.analysis.constant_force import constant_force, folds_of
 from rig.analysis.forced import forced
+from rig.analysis.levels import level_range
 from rig.analysis.linear_responses import responses
 from rig.analysis.modes import modes
 from rig.analysis.subject import peak, subject_of
@@ -256,8 +258,25 @@ def test_a_voltage_beyond_the_amplifier_is_said_and_ends_the_default_levels():
 
 def test_a_bench_that_may_not_be_driven_at_resonance_at_all_says_what_forbids_it():
     bench = bench_with({"limits": {"displacement_m": 1e-9}})
-    with pytest.raises(ConfigurationError, match="displacement reaches"):
+    lowest = f"already at {0.01 * bench.limits.voltage_v:g} V the bench may not be driven at resonance"
+    with pytest.raises(
+        ConfigurationError, match=rf"^{lowest} \(displacement reaches \S+ m and is in 1 of 1 points [^;]*\)$"
+    ):
         backbone(subject_of(bench))
+
+
+def test_a_resonance_outside_of_the_bench_s_frequencies_is_the_reason_whatever_higher_levels_would_leave():
+    bench = bench_with({"limits": {"frequency_hz": (8.0, 12.0)}})
+    with pytest.raises(ConfigurationError) as caught:
+        level_range(subject_of(bench), "force", None, None, points=5, harmonics=7)
+    found = re.fullmatch(
+        r"already at 0\.095 V the bench may not be driven at resonance "
+        r"\(the resonance at (.*) Hz is outside of limits\.frequency_hz = 8 to 12 Hz\)",
+        str(caught.value),
+    )
+    assert found is not None
+    (truth,) = reference_backbone(ONE_SIDED, [0.001])  # at so small a level it is that of small vibrations
+    assert float(found[1]) == pytest.approx(truth.frequency_hz, rel=2e-3)
 
 
 @pytest.mark.parametrize(

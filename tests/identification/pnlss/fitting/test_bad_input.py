@@ -86,11 +86,18 @@ def test_data_and_models_that_cannot_be_used_are_named(
     [
         ({"iterations": -1}, "iterations: is -1, allowed are 0 and above"),
         ({"patience": -1}, "patience: is -1"),
+        ({"least_gain": -1e-9}, "least_gain: is -1e-09"),
+        ({"least_gain": 1.0}, "least_gain: is 1.0"),
+        ({"tolerance": -1e-9}, "tolerance: is -1e-09"),
         ({"tolerance": 1.0}, "tolerance: is 1.0"),
         ({"outputs": "peak"}, "outputs: is peak, allowed are rms, none"),
         ({"ridge": float("nan")}, "ridge: is nan"),
+        ({"ridge": -1e-9}, "ridge: is -1e-09"),
+        ({"ridge": float("inf")}, "ridge: is inf"),
         ({"damping": 0.0}, "damping: is 0.0"),
-        ({"truncation": 2.0}, "truncation: is 2.0"),
+        ({"damping": float("inf")}, "damping: is inf"),
+        ({"truncation": -1e-9}, "truncation: is -1e-09"),
+        ({"truncation": 1.0}, "truncation: is 1.0, allowed are 0 and above, below 1"),
         ({"band_hz": (20.0, 10.0)}, "band_hz: is 20 to 10 Hz"),
         ({"line_weights": ((2.0, 1.0), (1.0, 1.0))}, "line_weights: need rows"),
         ({"line_weights": ((1.0, -1.0),)}, "line_weights: need rows"),
@@ -99,6 +106,20 @@ def test_data_and_models_that_cannot_be_used_are_named(
 def test_settings_out_of_range_are_named(settings: dict[str, Any], message: str) -> None:
     with pytest.raises(IdentificationError, match=message):
         FitSettings(**settings)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        dict.fromkeys(("iterations", "patience"), 0),
+        dict.fromkeys(("least_gain", "tolerance", "ridge", "truncation"), 0.0),
+        dict.fromkeys(("least_gain", "tolerance", "truncation"), 0.999),
+        {"ridge": 10.0, "damping": 10.0},
+    ],
+)
+def test_settings_at_the_edges_of_their_ranges_are_allowed(settings: dict[str, Any]) -> None:
+    found = FitSettings(**settings)
+    assert all(getattr(found, name) == value for name, value in settings.items())
 
 
 def test_a_fit_is_resumed_with_its_own_start_and_experiments_alone() -> None:

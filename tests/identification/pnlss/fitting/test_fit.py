@@ -257,3 +257,17 @@ def test_memory_that_is_not_there_is_asked_for_before_the_fit(monkeypatch: pytes
     with pytest.raises(IdentificationError, match=r"memory: .*are free; leave the frequency weighting out"):
         fit_pnlss(disturbed(system), [one], settings=FitSettings(band_hz=(0.0, 50.0)))
     assert fit_pnlss(disturbed(system), [one], settings=FitSettings(iterations=1)).history.iterations == 1
+
+
+@pytest.mark.parametrize(("level", "driven"), [(1.0, [True, True]), (1e-3, [True, False]), (1.0, [False, False])])
+def test_states_are_scaled_by_their_rms_in_the_start_and_those_at_rest_as_the_largest_or_by_one(
+    level: float, driven: list[bool]
+) -> None:
+    """Two states without memory, ``x_i(t + 1) = b_i u(t)``: their RMS is that of the input times ``b_i``."""
+    system = linear_system(2, 1, 1)
+    begin = level * np.array([[0.5], [4.0]]) * np.array(driven)[:, None]
+    start = replace(system, a=np.zeros((2, 2)), b=begin, c=np.array([[1.0, 1.0]]), d=np.array([[1.0]]))
+    one = experiment(start, 400)
+    fit = fit_pnlss(start, [one], settings=FitSettings(iterations=0))
+    rms = np.abs(begin[:, 0]) * np.sqrt(np.sum(one.inputs[0, :-1] ** 2) / one.inputs.shape[1])
+    np.testing.assert_allclose(fit.state_scale, np.where(driven, rms, np.max(rms) or 1.0), rtol=1e-12)

@@ -115,3 +115,18 @@ def test_with_an_exciter_the_damping_is_that_of_the_same_amplitude():
     np.testing.assert_allclose(driven.damping_ratio, at, rtol=5e-3)
     np.testing.assert_allclose(driven.damping_ratio_std / driven.damping_ratio, 0.05, rtol=0.02)
     assert np.max(driven.force_harmonic_ratio(3)) > 1e-4
+
+
+@pytest.mark.parametrize(("name", "exponent"), [("damping 1", 1.0), ("shape 1 at force", 0.0)])
+def test_the_damping_is_in_proportion_to_that_of_the_mode_and_not_to_its_shape_at_the_force(name, exponent):
+    """At one amplitude A of the drive point ``D = F phi^2 / (2 w^2 A)`` with ``F = 2 z w^2 A / phi^2``: phi drops out."""
+    found = structured_mode(fit_of(duffing(0.0), {name: 0.01}), 1.0)
+    np.testing.assert_allclose(found.damping_ratio_std / found.damping_ratio, 0.01 * exponent, rtol=0.02, atol=1e-5)
+
+
+def test_the_damping_follows_the_modal_frequency_as_far_as_the_spring_hardens_it():
+    """``D = z w_1 / w`` and ``w^2 = w_1^2 + k(A)``: a relative change e of w_1 changes D by ``e (1 - w_1^2 / w^2)``."""
+    found = structured_mode(fit_of(duffing(40.0 * CUBIC_N), {"frequency 1": 1e-3}))
+    expected = 1e-3 * (1.0 - (25.0 / found.modal_frequency_hz) ** 2)
+    assert expected[-1] > 5e-5
+    np.testing.assert_allclose(found.damping_ratio_std / found.damping_ratio, expected, rtol=0.05, atol=3e-6)

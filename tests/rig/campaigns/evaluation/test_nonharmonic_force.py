@@ -91,3 +91,17 @@ def test_every_campaign_under_a_lock_refuses_points_with_more_than_is_accepted(n
         assert "are no harmonics, accepted up to 0.0001 %" in point["reason"]
         assert point["quality"] == "rejected"
     assert skipped.startswith(f"{len(points)} of {len(points)} points skipped: rejected")
+
+
+def test_of_a_long_record_stretches_of_equal_length_are_evaluated_as_records_of_their_own(monkeypatch):
+    """Two equal halves, each long enough by itself, the thirds of the whole are not; every line is in one bin."""
+    samples, periods = 40 * (FEWEST_PERIODS + 1), FEWEST_PERIODS + 1
+    theta = 2.0 * math.pi * periods * np.arange(samples) / samples
+    noise = 0.01 * np.random.default_rng(3).standard_normal(samples)
+    half = rows_of(np.cos(theta) + 0.3 * np.cos(3.6 * theta) + noise, theta)
+    whole = np.concatenate([half, half])
+    alone = nonharmonic_force(BENCH, [half])
+    assert alone == pytest.approx(0.3 / math.sqrt(1.09), rel=0.02)
+    monkeypatch.setattr("rig.campaigns.evaluation.nonharmonic_force.LONGEST", whole.size - 1)
+    assert nonharmonic_force(BENCH, [whole]) == pytest.approx(alone, rel=1e-12)
+    assert nonharmonic_force(BENCH, [whole, half[:100]]) == pytest.approx(alone, rel=1e-12)

@@ -125,3 +125,13 @@ def test_a_motion_without_a_force_is_a_decay_and_has_no_period(command, tmp_path
     table = tomllib.loads((tmp_path / "decay.toml").read_text(encoding="utf-8"))
     assert [channel["role"] for channel in table["channels"]] == ["drive"]
     assert "period_samples" not in table
+
+
+def test_channels_of_one_name_are_numbered_and_the_others_keep_theirs(tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        for path in ("left/acc", "right/acc", "hammer", "tip"):
+            file[path] = RANDOM.normal(size=300)
+        file["fs"] = 1000.0
+    table = tomllib.loads(proposed_mapping([tmp_path / "x.h5"])[0])
+    names = [(channel["value"], channel["name"]) for channel in table["channels"]]
+    assert names == [("left/acc", "acc_1"), ("right/acc", "acc_2"), ("hammer", "hammer"), ("tip", "tip")]

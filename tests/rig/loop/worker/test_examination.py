@@ -8,9 +8,10 @@ import pytest
 from rig.bench import load_bench
 from rig.drivers.wire import WireOptions
 from rig.emulator import Faults
+from rig.errors import DaqRefused
 from rig.loop.recommendation import Settings
 from rig.loop.session import LocalSession
-from rig.loop.worker.examination import examine_device, with_settings
+from rig.loop.worker.examination import _that_opens, examine_device, with_settings
 from rig.loop.worker.probe import round_trips
 from rig.wire.messages import DeviceState, EmergencyStop, Parameter
 from tests.rig.loop.worker.rigs import tone
@@ -222,3 +223,32 @@ def test_all_outputs_are_0_v(examined, monkeypatch):
     examine_device(BENCH, 0)
     assert len(sent) > 1000
     assert max(sent) == 0.0
+
+
+@pytest.mark.parametrize(("block", "least", "taken"), [(1, 2, 2), (1, 3, 5), (10, 11, 20), (2, 37, 50), (50, 120, 200)])
+def test_of_a_device_that_refuses_short_blocks_the_next_longer_one_of_the_series_1_2_5_is_examined(
+    monkeypatch, block, least, taken
+):
+    def asked(bench, seed):
+        if bench.block < least:
+            raise DaqRefused(f"needs blocks of {least} samples")
+        return bench.block
+
+    monkeypatch.setattr("rig.loop.worker.examination._asked", asked)
+    bench = bench_with({"block": block})
+    longer, known, refusal = _that_opens(bench, 0)
+    assert (longer.block, known, refusal) == (taken, taken, f"needs blocks of {least} samples")
+    assert longer == bench.model_copy(update={"block": taken})
+
+
+def test_a_device_that_refuses_every_block_that_a_bench_may_have_is_not_examined(monkeypatch):
+    tried = []
+
+    def asked(bench, seed):
+        tried.append(bench.block)
+        raise DaqRefused("no bus")
+
+    monkeypatch.setattr("rig.loop.worker.examination._asked", asked)
+    with pytest.raises(DaqRefused, match="no bus"):
+        _that_opens(bench_with({"block": 10}), 0)
+    assert tried == [10, 20, 50, 100, 200, 500, 1000]  # 0.2 s at 5 kHz

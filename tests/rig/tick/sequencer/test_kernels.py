@@ -85,6 +85,26 @@ def test_a_level_that_saturates_and_is_not_reached_is_counted():
     assert _judge([(0.0, 1.0, 0.995)] * 60, wanted_force=1.0, saturated=True)["saturated_periods"] == 0
 
 
+@pytest.mark.parametrize(
+    ("clamped", "in_row", "judged"),
+    [
+        ([1] * 9, 9, 0),  # the rule judges from twice the average of five periods on
+        ([1] * 10, 10, 1),
+        ([1] * 35, 35, 26),
+        ([1] * 34 + [0], 0, 0),
+        ([1] * 30 + [0] + [1] * 4, 4, 4),
+        ([0] * 5 + [1] * 7, 7, 3),
+        ([0] * 40, 0, 0),
+    ],
+)
+def test_periods_with_a_clamped_frequency_are_counted_in_a_row(clamped, in_row, judged):
+    settling, rule, period = np.zeros(1, SETTLING), RULE.build(), np.zeros(1, PERIOD)
+    for one in clamped:
+        period["clamped"] = one
+        judge_period(settling[0], rule[0], period[0], 0.0, True, False, 0.0)
+    assert (settling[0]["clamped_in_row"], settling[0]["clamped_periods"]) == (in_row, judged)
+
+
 class Walk:
     """A sequencer without a rig: cycles are dealt out by hand."""
 
