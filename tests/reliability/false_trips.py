@@ -16,6 +16,7 @@ from rig.campaigns.plans import bench_of, load_plan, shipped_plans
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
 from rig.tick.safety.following import ASTRAY_PERIODS
+from rig.tick.safety.keeping import CHANGED_PERIODS, FAR
 from rig.tick.safety.layout import EndReason
 from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with
@@ -80,15 +81,17 @@ def table_of(runs: Iterable[SoundRun]) -> list[str]:
     runs = list(runs)
     out = [
         "| plans | noise | runs | tripped or ended early | most periods astray, of "
-        f"{ASTRAY_PERIODS} | most periods against the known plant, of 1 |",
-        "|---|---|---|---|---|---|",
+        f"{ASTRAY_PERIODS} | most periods against the known plant, of 1 | largest ratio to the level, of {FAR:g} | "
+        f"most periods with a changed gain, of {CHANGED_PERIODS} |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for held, noise in sorted({(run.held, run.noise) for run in runs}, key=lambda key: (not key[0], key[1])):
         some = [run for run in runs if (run.held, run.noise) == (held, noise)]
         ended = sum(run.reason is not EndReason.COMPLETED for run in some)
         out.append(
             f"| {'a level is held' if held else 'all others'} | {noise:g} × | {len(some)} | {ended} | "
-            f"{max(run.astray_periods for run in some)} | {max(run.unlike_periods for run in some):.2f} |"
+            f"{max(run.astray_periods for run in some)} | {max(run.unlike_periods for run in some):.2f} | "
+            f"{max(run.highest for run in some):.2f} | {max(run.changed_periods for run in some)} |"
         )
     return out
 
