@@ -21,4 +21,4 @@ def test_a_sound_rig_with_ten_times_the_noise_never_comes_near_a_trip(plan):
 def test_a_run_that_ended_early_is_counted():
     sound = SoundRun("a/b", True, 1.0, EndReason.COMPLETED, 2, 0.0)
     tripped = sound._replace(reason=EndReason.LEVEL_NOT_FOLLOWED, astray_periods=10)
-    assert table_of([sound, tripped])[-1] == "| a level is held | 1 × | 2 | 1 | 10 | 0.00 |"
+    assert table_of([sound, tripped])[-1] == "| a level is held | 1 × | 2 | 1 | 10 | 0.00 | 0.00 | 0 |"
