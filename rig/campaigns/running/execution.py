@@ -436,6 +436,8 @@ class Execution:
 
     def _end(self) -> dict[str, Any]:
         reason = EndReason(int(self.tick.guard["reason"][0]))
+        if self.start.refused and reason is EndReason.STOP_REQUESTED:
+            reason = EndReason.START_REFUSED
         if self.loop.failure is not None and not reason.is_trip:
             reason = end_reason_of(self.loop.failure)  # the driver failed when it was stopped, after ramp-down
         return {

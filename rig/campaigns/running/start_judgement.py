@@ -37,6 +37,8 @@ class StartJudgement:
         self._warning = ""
         self.pending = isinstance(plan, LockedPlan)
         """Whether the scale was not compared yet."""
+        self.refused = False
+        """Whether the run must end."""
 
     @property
     def longest_periods(self) -> float:
@@ -55,7 +57,9 @@ class StartJudgement:
             return ""  # a record that cannot be evaluated proves nothing; other checks end a run without a vibration
         target = Target(number=0, level=1.0)
         point = replace(planned_point(self._plan, target), vibration=vibration_part(vibration, rows))
-        return start_refusal(self._bench, self._plan, point) or self._judged(point, growth_1_s, at_start=True)
+        refusal = start_refusal(self._bench, self._plan, point) or self._judged(point, growth_1_s, at_start=True)
+        self.refused = bool(refusal)
+        return refusal
 
     def applied(self, point: Point[Any]) -> tuple[Point[Any], str]:
         """Judge a point unless the start was judged, and add the warning; also return why the run must end."""
@@ -63,6 +67,7 @@ class StartJudgement:
         if self.pending and point.accepted and point.spectrum is not None:
             refusal = self._judged(point)
         if refusal:
+            self.refused = True
             return point.refused(refusal, Quality.IMPLAUSIBLE), refusal
         return (point.warned(self._warning) if self._warning and point.accepted else point), ""
 

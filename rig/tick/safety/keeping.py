@@ -9,9 +9,9 @@ so the force counts only where the motion is above that of the check, too.
 
 *Gain*: the output over what is held may not change by `LARGEST_CHANGE` within a level. Between levels the damping of the
 structure changes, by the square root of the ratio of the levels at most (as for points,
-`rig.campaigns.evaluation.plausibility`), and the force that a lag needs changes as the sine of the lag. Where the exciter is
-known, what it explains of the change is left out, up to `LARGEST_CHANGE`: it cannot tell a force sensor that fades from a
-structure that loses damping.
+`rig.campaigns.evaluation.plausibility`), and the force that a lag needs changes as the sine of the lag. Lags farther than 45
+degrees from resonance are not compared. Where the exciter is known, what it explains of the change is left out, up to
+`LARGEST_CHANGE`: it cannot tell a force sensor that fades from a structure that loses damping.
 """
 
 import math
@@ -35,7 +35,7 @@ LARGEST_CHANGE = 3.0
 CHANGED_PERIODS = 10
 NEAR = 0.1  # of its level; what is held is in order within it
 IN_ORDER_PERIODS = 10  # in order in a row, after which the output of a level is known
-FLATTEST = 1e-3  # sine of a lag: lower bound of a divisor
+COMPARED = 0.7  # sine of a lag below which levels are not compared: exciter and structure may cancel each other there
 
 KEPT = np.dtype(
     [
@@ -114,7 +114,7 @@ def explained(kept: Record, held: float, needed: float) -> tuple[float, float]:
     ``needed``: output over what is ``held`` that the known exciter needs, 0 if unknown.
     """
     levels = max(held / kept.first_level, kept.first_level / held)
-    lags = max(abs(math.sin(kept.lag)), FLATTEST) / max(abs(math.sin(kept.first_lag)), FLATTEST)
+    lags = abs(math.sin(kept.lag) / math.sin(kept.first_lag))
     highest = math.sqrt(levels) * max(lags, 1.0 / lags)
     lowest = 1.0 / highest
     if needed > 0.0 and kept.first_needed > 0.0:
@@ -140,12 +140,12 @@ def gain_has_changed(
     if kept.in_order_periods >= IN_ORDER_PERIODS:
         if kept.gain == 0.0:
             kept.gain = gain
-        if kept.first_gain == 0.0:
+        if kept.first_gain == 0.0 and abs(math.sin(kept.lag)) >= COMPARED:
             kept.first_gain, kept.first_level, kept.first_lag, kept.first_needed = gain, held, kept.lag, needed
     kept.factor = 1.0
     if kept.gain > 0.0:
         kept.factor = max(gain / kept.gain, kept.gain / gain)
-    if kept.first_gain > 0.0:
+    if kept.first_gain > 0.0 and abs(math.sin(kept.lag)) >= COMPARED:
         lowest, highest = explained(kept, held, needed)
         ratio = gain / kept.first_gain
         kept.factor = max(kept.factor, ratio / highest, lowest / ratio)

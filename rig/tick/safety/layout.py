@@ -29,6 +29,7 @@ class EndReason(IntEnum):
     PLAN_STOPPED = 3
     NO_LOCK_IN_WINDOW = 4
     NO_LOCK = 5
+    START_REFUSED = 6
     FORCE_LIMIT = 10
     RESPONSE_LIMIT = 11
     DISPLACEMENT_LIMIT = 12
@@ -63,6 +64,7 @@ TEXT = {
         "no lock at the start voltage: the phase error stays large, or force or drive is too small to be read "
         "(start_periods may be too short)"
     ),
+    EndReason.START_REFUSED: "what was measured at the start does not fit the bench",
     EndReason.FORCE_LIMIT: "force above its limit",
     EndReason.RESPONSE_LIMIT: "response above its limit",
     EndReason.DISPLACEMENT_LIMIT: "displacement above its limit",

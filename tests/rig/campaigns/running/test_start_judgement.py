@@ -43,6 +43,7 @@ def run(tmp_path, levels, **options):
 def test_a_drive_sensor_10_ms_late_ends_the_run_at_the_start_voltage(tmp_path, monkeypatch, levels):
     rewire(monkeypatch, late("drive", 50))
     end, largest_v, points = run(tmp_path, levels)
+    assert end["reason"] == "start_refused"
     assert end["text"].startswith("before the first level: channel drive: all others")
     assert "refused from 45 deg" in end["text"]
     assert largest_v < 1.05 * plan_for(levels).start_v
