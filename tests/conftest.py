@@ -6,8 +6,11 @@ import os
 # wait for each other make an identification ten times slower.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from pathlib import Path
+
 import pytest
 from hypothesis import settings
+from joblib.externals.loky import reusable_executor
 
 from tests.running import first_those_that_wait, keep_bytecode, use_memory_for_files, workers
 from tests.sharing import shared_folder
@@ -47,3 +50,21 @@ def runs_of_the_tests_alone(tmp_path_factory):
     os.environ.pop("VIBROLOCK_LIVE")
     if before is not None:
         os.environ["VIBROLOCK_LIVE"] = before
+
+
+@pytest.fixture(autouse=True)
+def workers_stand_in_no_folder_that_goes():
+    """Worker processes that a test has started in a folder of its own end with it; the next test's would find none."""
+    here = Path.cwd()
+    yield
+    executor = reusable_executor._executor
+    if executor is not None and any(_folder_of(worker) != here for worker in executor._processes or ()):
+        executor.shutdown()
+
+
+def _folder_of(process: int) -> Path | None:
+    """The folder in which a process stands; None if it is gone, or cannot be asked on this system."""
+    try:
+        return Path(f"/proc/{process}/cwd").readlink()
+    except OSError:
+        return None

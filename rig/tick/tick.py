@@ -162,14 +162,14 @@ class Tick:
         return bool(self.arrays.progress["held_back"][0])
 
     @property
-    def start_left_samples(self) -> float:
-        """Samples of a period, or fewer if a start segment has less left of its time."""
+    def start_left_periods(self) -> float:
+        """Periods left of the start segment's time, 0 and less once it is over; infinite while another segment runs."""
         progress = self.arrays.progress[0]
-        periods, segment = 1.0, int(progress["segment"])
-        if segment < self.arrays.segments.size and self.arrays.segments["kind"][segment] == SegmentKind.START:
-            left = float(self.arrays.segments["periods"][segment] - (progress["cycle"] - progress["start_cycle"]))
-            periods = min(periods, left) if left > 0.0 else periods
-        return periods * self.bench.sample_rate_hz / self.frequency_hz
+        segment = int(progress["segment"])
+        running = segment < self.arrays.segments.size and progress["entered"]
+        if not (running and self.arrays.segments["kind"][segment] == SegmentKind.START):
+            return math.inf
+        return float(self.arrays.segments["periods"][segment] - (progress["cycle"] - progress["start_cycle"]))
 
     def release_start(self) -> None:
         """Let the start segment end at its time."""

@@ -3,21 +3,12 @@
 from pathlib import Path
 
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 from tests.docs.pages import ROOT, blocks, rig_commands
 
 ON_A_BENCH = next(
     block for block in blocks(ROOT / "README.md") if block.not_run == "needs the device" and block.language == "bash"
 )
-
-
-@pytest.fixture(autouse=True)
-def workers_of_this_folder(command):
-    """Worker processes are new, for those of another test stand in a folder that may be gone; none stays."""
-    get_reusable_executor().shutdown()
-    yield
-    get_reusable_executor().shutdown()
 
 
 @pytest.mark.slow

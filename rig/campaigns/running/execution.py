@@ -125,6 +125,7 @@ class Execution:
         kinds = loop.tick.arrays.segments["kind"]
         self.start_segment = int(np.argmax(kinds == SegmentKind.START)) if (kinds == SegmentKind.START).any() else None
         self.start_judged = 0  # sample up to which the start was judged
+        self.start_asked = False  # whether a judgement of it is under way
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -250,7 +251,7 @@ class Execution:
 
         The start lasts until it is judged, and a little longer while the vibration is not steady.
         """
-        if self.start_segment is None:
+        if self.start_segment is None or self.start_asked:
             return
         entry, progress = self.tick.outcomes[self.start_segment], self.tick.arrays.progress[0]
         if Outcome(int(entry["outcome"])) is not Outcome.RUNNING:
@@ -263,18 +264,31 @@ class Execution:
         last = late >= self.start.longest_periods
         if last or ((late >= 0.0 or self.last["lock"] == LockState.LOCKED) and first >= begin):
             self.start_judged = end
+            self.start_asked = True
             self.evaluations.ask(self._judged_start, self.kept.take(max(first, begin), end), last)
+        elif late >= 0.0:
+            self.loop.go_on_starting()
 
     def _start_samples(self) -> int:
         return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
 
     def _judged_start(self, rows: Rows, last: bool) -> list[Point[Any]]:
-        """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused."""
-        if refusal := self.start.refusal_of_rows(rows):
+        """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused.
+
+        ``last``: there will be no further judgement.
+        """
+        try:
+            refusal = self.start.refusal_of_rows(rows)
+        except BaseException:
+            self.loop.request_stop()  # a loop in lockstep waits for an answer
+            raise
+        if refusal:
             self.loop.request_stop(f"before the first level: {refusal}")
         elif last or not self.start.pending:
             self.loop.release_start()
         else:
+            self.start_asked = False
+            self.loop.go_on_starting()
             return []
         self.start_segment = None
         return []

@@ -11,7 +11,7 @@ import numpy as np
 from rig.daq import DAQ
 from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
-from rig.loop.worker.memory import RELEASE_START, STOP, SharedMemory, Slot
+from rig.loop.worker.memory import GO_ON_STARTING, RELEASE_START, STOP, SharedMemory, Slot
 from rig.loop.worker.pace import pace_of
 from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
@@ -87,6 +87,7 @@ class WallClockLoop(DrivenLoop):
         self._pace.begin()
         over = False
         while not over:
+            self._wait_for_judgement()
             slot = self._memory.to_fill()
             rows = self._fill(slot)
             over = self.failure is not None or self.tick.over
@@ -107,6 +108,8 @@ class WallClockLoop(DrivenLoop):
                 tick.request_stop()
             if words[RELEASE_START]:
                 tick.release_start()
+            if first > 0 and self._start_is_over():
+                return first
             if first in chores:
                 chores[first]()
                 if self.failure is not None:  # the ring may be full
@@ -127,6 +130,27 @@ class WallClockLoop(DrivenLoop):
                 self._account()
                 return end
         return self._memory.layout.chunk
+
+    def _start_is_over(self) -> bool:
+        """Whether, in lockstep, the start segment's time is over and its judgement has still to come."""
+        if self._pace.has_clock or not self.tick.start_held or self._memory.words[GO_ON_STARTING]:
+            return False
+        return self.tick.start_left_periods <= 0.0
+
+    def _wait_for_judgement(self) -> None:
+        """Wait, in lockstep, for the judgement of a start whose time is over: the same rows come of every run.
+
+        Where a clock runs on, the start lasts longer instead.
+        """
+        while self._start_is_over():
+            self._announce()
+            words = self._memory.words
+            if words[RELEASE_START]:
+                self.tick.release_start()
+            elif words[STOP] or os.getppid() != self._parent or self._asked():
+                return
+            else:
+                time.sleep(0.001)
 
     def _account(self) -> None:
         """Count the times of the previous block, whose outputs are sent now."""

@@ -3,17 +3,8 @@
 from pathlib import Path
 
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 RIGS = sorted((Path(__file__).parent / "drawn_rigs").glob("*.toml"))
-
-
-@pytest.fixture(autouse=True)
-def workers_of_this_folder(command):
-    """Worker processes are new, for those of another test stand in a folder that may be gone; none stays."""
-    get_reusable_executor().shutdown()
-    yield
-    get_reusable_executor().shutdown()
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """What is wrong from the first sample on ends a run at the start voltage, before the level rises."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from rig.arming.run_options import RunOptions
 from rig.campaigns.running.runner import carry_out
 from rig.campaigns.running.start_judgement import StartJudgement
 from rig.check.run import check
+from rig.emulator.emulated import emulated
 from rig.tick.layout import recorded_row
 from tests.reliability.faults.plans import bench_for, plan_for
 from tests.rig.check.rewired import Rewiring, column, rewire, scaled
@@ -108,3 +111,33 @@ def test_the_command_takes_the_recording_of_a_check(tmp_path, command):
     command("run", "magnet-beam/backbone-short", "-o", tmp_path / "run.h5", "--check", path).succeeded()
     ended = command("run", "friction-beam/backbone-short", "-o", tmp_path / "other.h5", "--check", path)
     assert "is a check of other channels than those of the bench" in ended.err
+
+
+@pytest.mark.parametrize("scaled_by", [1.0, 0.1])
+def test_in_lockstep_behind_a_wire_the_same_rows_come_as_in_this_process(tmp_path, scaled_by, scale, monkeypatch):
+    bench, plan = bench_for("m"), plan_for("m")
+    options = {**bench.driver.options, "queue_blocks": 1}
+    near = bench.model_copy(update={"driver": bench.driver.model_copy(update={"options": options})})
+    wrong = (
+        scale if scaled_by == 1.0 else replace(scale, acceleration_per_newton=scaled_by * scale.acceleration_per_newton)
+    )
+    found = []
+    with emulated(bench, "serial") as far:
+        for number, one in enumerate((near, far)):
+            with carry_out(plan, one, tmp_path / f"{number}.h5", RunOptions(check=wrong)) as recording:
+                part = recording.parts[-1]
+                found.append((part.end["reason"], part.rows("command_v")))
+    assert found[0][0] == found[1][0] == ("completed" if scaled_by == 1.0 else "start_refused")
+    whole = min(rows.size for _, rows in found) if scaled_by == 1.0 else 5000  # a refusal comes when it is ready
+    np.testing.assert_allclose(found[0][1][:whole], found[1][1][:whole], rtol=1e-6)
+    if scaled_by == 1.0:
+        assert abs(found[0][1].size - found[1][1].size) <= 2 * bench.block
+
+
+def test_a_judgement_that_fails_ends_the_run_and_leaves_no_loop_waiting(tmp_path, monkeypatch):
+    def fail(self, rows):
+        raise RuntimeError("for a test")
+
+    monkeypatch.setattr(StartJudgement, "refusal_of_rows", fail)
+    with emulated(bench_for("m"), "serial") as far, pytest.raises(RuntimeError, match="for a test"):
+        carry_out(plan_for("m"), far, tmp_path / "run.h5", RunOptions())

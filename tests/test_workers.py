@@ -1,0 +1,20 @@
+"""Worker processes of one test are not left to another in a folder that is gone."""
+
+from pathlib import Path
+
+from joblib import Parallel, delayed
+
+
+def stand(_: int) -> str:
+    """The folder of the process that is asked."""
+    return str(Path.cwd())
+
+
+def test_workers_may_be_started_in_a_folder_that_goes(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert set(Parallel(n_jobs=2)(delayed(stand)(k) for k in range(4))) == {str(tmp_path / "here")}
+
+
+def test_workers_after_it_stand_where_the_tests_do(tmp_path):
+    assert set(Parallel(n_jobs=2)(delayed(stand)(k) for k in range(4))) == {str(Path.cwd())}
