@@ -83,8 +83,8 @@ class RunningLoop(Protocol):
     def release_start(self) -> None:
         """Let the start segment of a tick with ``start_judged`` end at its time. Returns at once; any thread may call it."""
 
-    def go_on_starting(self) -> None:
-        """Let the start segment go on although its time is over, as more of it is needed. Returns at once, as above."""
+    def go_on_starting(self, judgements: int) -> None:
+        """Let the start segment go on after so many judgements (`Tick.start_judgements`). Returns at once, as above."""
 
     def bring_down(self) -> None:
         """Ramp to 0 V if the loop still runs, and wait for its end; for a caller that takes no more rows."""
@@ -168,7 +168,7 @@ class Loop(DrivenLoop):
         """Let the start segment end at its time."""
         self.tick.release_start()
 
-    def go_on_starting(self) -> None:
+    def go_on_starting(self, judgements: int) -> None:
         """Do nothing: this loop goes on by itself."""
 
     @property
@@ -203,17 +203,16 @@ class Loop(DrivenLoop):
     def _chunk_samples(self) -> int:
         """Return the size of the next chunk: up to the end of the present 0.5 s, or 0.02 s if a clock paces the loop.
 
-        A start that is judged comes in chunks of a period up to the block in which its time is over, so that it lasts no longer
-        than the judgement needs.
+        A start that is judged comes in chunks of a period, up to the block in which a judgement is due: it lasts no longer than
+        that needs.
         """
         seconds = PACED_CHUNK_S if self.paced or self.daq.capabilities.paced else CHUNK_S
         block = self.daq.block
         whole = max(1, round(seconds * self.daq.sample_rate_hz / block))
         blocks = whole - self.statistics.samples // block % whole
         if self.tick.start_held:
-            left = self.tick.start_left_periods
             period = self.daq.sample_rate_hz / self.tick.frequency_hz / block
-            blocks = min(blocks, max(1, math.floor(period * (min(1.0, left) if left > 0.0 else 1.0)) - 1))
+            blocks = min(blocks, max(1, math.floor(period * min(1.0, self.tick.periods_to_judgement)) - 1))
         return blocks * block
 
     def _advance(self, readings: np.ndarray, rows: np.ndarray) -> int:

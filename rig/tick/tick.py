@@ -21,6 +21,7 @@ from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
 
 __all__ = ["Tick", "TickSettings"]
 
+JUDGED_AGAIN = 11.0  # periods
 NEGLIGIBLE_BITS = 0.1  # amplitude of a harmonic, in bits of the converter, that counts as none
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
 
@@ -162,14 +163,29 @@ class Tick:
         return bool(self.arrays.progress["held_back"][0])
 
     @property
-    def start_left_periods(self) -> float:
-        """Periods left of the start segment's time, 0 and less once it is over; infinite while another segment runs."""
+    def start_late_periods(self) -> float:
+        """Periods since the start segment's time was over; negative before that, and -inf while another segment runs."""
         progress = self.arrays.progress[0]
         segment = int(progress["segment"])
         running = segment < self.arrays.segments.size and progress["entered"]
         if not (running and self.arrays.segments["kind"][segment] == SegmentKind.START):
-            return math.inf
-        return float(self.arrays.segments["periods"][segment] - (progress["cycle"] - progress["start_cycle"]))
+            return -math.inf
+        return float(progress["cycle"] - progress["start_cycle"] - self.arrays.segments["periods"][segment])
+
+    @property
+    def start_judgements(self) -> int:
+        """How many judgements of the start are due.
+
+        One is due when its time is over, another one after every further `JUDGED_AGAIN` periods.
+        """
+        late = self.start_late_periods
+        return 0 if late < 0.0 else 1 + int(late / JUDGED_AGAIN)
+
+    @property
+    def periods_to_judgement(self) -> float:
+        """Periods until the next judgement of the start is due; infinite while another segment runs."""
+        late = self.start_late_periods
+        return -late if late < 0.0 else JUDGED_AGAIN - late % JUDGED_AGAIN
 
     def release_start(self) -> None:
         """Let the start segment end at its time."""

@@ -124,8 +124,7 @@ class Execution:
         self.start = StartJudgement(bench, plan, checked)
         kinds = loop.tick.arrays.segments["kind"]
         self.start_segment = int(np.argmax(kinds == SegmentKind.START)) if (kinds == SegmentKind.START).any() else None
-        self.start_judged = 0  # sample up to which the start was judged
-        self.start_asked = False  # whether a judgement of it is under way
+        self.start_judgements = 0
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -247,35 +246,23 @@ class Execution:
                 self._report(point)
 
     def _judge_start(self) -> None:
-        """Request the judgement of the vibration at the start voltage, once the loop is locked there or its time is over.
-
-        The start lasts until it is judged, and a little longer while the vibration is not steady.
-        """
-        if self.start_segment is None or self.start_asked:
+        """Request the judgement of the vibration at the start voltage when it is due; the start lasts until then."""
+        due = self.tick.start_judgements
+        if self.start_segment is None or due <= self.start_judgements:
             return
-        entry, progress = self.tick.outcomes[self.start_segment], self.tick.arrays.progress[0]
-        if Outcome(int(entry["outcome"])) is not Outcome.RUNNING:
-            return
-        end, begin = self.tick.sample, max(int(entry["first_sample"]), self.start_judged)
-        first = end - self._start_samples()
-        late = float(
-            progress["cycle"] - progress["start_cycle"] - self.tick.arrays.segments[self.start_segment]["periods"]
-        )
-        last = late >= self.start.longest_periods
-        if last or ((late >= 0.0 or self.last["lock"] == LockState.LOCKED) and first >= begin):
-            self.start_judged = end
-            self.start_asked = True
-            self.evaluations.ask(self._judged_start, self.kept.take(max(first, begin), end), last)
-        elif late >= 0.0:
-            self.loop.go_on_starting()
+        end, begin = self.tick.sample, int(self.tick.outcomes[self.start_segment]["first_sample"])
+        rows = self.kept.take(max(end - self._start_samples(), begin), end)
+        self.start_judgements = due
+        last = self.tick.start_late_periods >= self.start.longest_periods
+        self.evaluations.ask(self._judged_start, rows, due, last)
 
     def _start_samples(self) -> int:
         return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
 
-    def _judged_start(self, rows: Rows, last: bool) -> list[Point[Any]]:
+    def _judged_start(self, rows: Rows, number: int, last: bool) -> list[Point[Any]]:
         """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused.
 
-        ``last``: there will be no further judgement.
+        ``number`` of the judgement, from 1; ``last``: it is the last one.
         """
         try:
             refusal = self.start.refusal_of_rows(rows)
@@ -287,8 +274,7 @@ class Execution:
         elif last or not self.start.pending:
             self.loop.release_start()
         else:
-            self.start_asked = False
-            self.loop.go_on_starting()
+            self.loop.go_on_starting(number)
             return []
         self.start_segment = None
         return []

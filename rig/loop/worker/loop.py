@@ -11,7 +11,7 @@ import numpy as np
 from rig.daq import DAQ
 from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
-from rig.loop.worker.memory import GO_ON_STARTING, RELEASE_START, STOP, SharedMemory, Slot
+from rig.loop.worker.memory import RELEASE_START, START_JUDGED, STOP, SharedMemory, Slot
 from rig.loop.worker.pace import pace_of
 from rig.loop.worker.times import BlockTimes, disturbances, since
 from rig.tick.kernels import tick_block
@@ -108,7 +108,7 @@ class WallClockLoop(DrivenLoop):
                 tick.request_stop()
             if words[RELEASE_START]:
                 tick.release_start()
-            if first > 0 and self._start_is_over():
+            if first > 0 and self._judgement_is_due():
                 return first
             if first in chores:
                 chores[first]()
@@ -131,18 +131,18 @@ class WallClockLoop(DrivenLoop):
                 return end
         return self._memory.layout.chunk
 
-    def _start_is_over(self) -> bool:
-        """Whether, in lockstep, the start segment's time is over and its judgement has still to come."""
-        if self._pace.has_clock or not self.tick.start_held or self._memory.words[GO_ON_STARTING]:
+    def _judgement_is_due(self) -> bool:
+        """Whether, in lockstep, a judgement of the start is due and has still to come."""
+        if self._pace.has_clock or not self.tick.start_held:
             return False
-        return self.tick.start_left_periods <= 0.0
+        return self.tick.start_judgements > self._memory.words[START_JUDGED]
 
     def _wait_for_judgement(self) -> None:
-        """Wait, in lockstep, for the judgement of a start whose time is over: the same rows come of every run.
+        """Wait, in lockstep, for a judgement of the start that is due: the same rows come of every run.
 
         Where a clock runs on, the start lasts longer instead.
         """
-        while self._start_is_over():
+        while self._judgement_is_due():
             self._announce()
             words = self._memory.words
             if words[RELEASE_START]:

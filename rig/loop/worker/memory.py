@@ -22,7 +22,7 @@ __all__ = ["TIMES", "Layout", "SharedMemory", "Slot", "anonymous_file", "packed"
 
 CHUNK_S = 0.02
 ALIGNMENT = 64
-STOP, TAKEN, PUBLISHED, RELEASE_START, GO_ON_STARTING = range(5)
+STOP, TAKEN, PUBLISHED, RELEASE_START, START_JUDGED = range(5)
 CONTROL_WORDS = 8
 TIMES = ("wake_up", "execution", "response")
 """Times counted for every block: delay of the block's start, duration, and the sum of both."""
@@ -183,6 +183,6 @@ class SharedMemory:
         """Let the start segment end; the loop looks for it at every block."""
         self.words[RELEASE_START] = 1
 
-    def go_on_starting(self) -> None:
-        """Let a loop in lockstep that waits for the judgement of its start go on."""
-        self.words[GO_ON_STARTING] = 1
+    def go_on_starting(self, judgements: int) -> None:
+        """Let a loop in lockstep go on that waits for so many judgements of its start."""
+        self.words[START_JUDGED] = judgements

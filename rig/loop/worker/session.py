@@ -82,9 +82,9 @@ class WorkerLoop:
         """Let the start segment end at its time; the loop looks for it at every block."""
         self._memory.release_start()
 
-    def go_on_starting(self) -> None:
-        """Let the start segment go on although its time is over; a loop in lockstep waits for this or for its release."""
-        self._memory.go_on_starting()
+    def go_on_starting(self, judgements: int) -> None:
+        """Let the start segment go on after so many judgements; a loop in lockstep waits for this or for its release."""
+        self._memory.go_on_starting(judgements)
 
     def bring_down(self) -> None:
         """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
