@@ -20,6 +20,7 @@ NO_MODE = 0.15
 
 If the residuals of other modes explain the accelerance to within this fraction, there is no mode inside the band: the
 equations for the pole then contain only noise or rounding. With a mode inside the band the misfit is 0.8 or more."""
+UNDETERMINED = 1e3  # standard error over alpha, where the lines say nothing of it
 
 
 def fitted(
@@ -104,7 +105,7 @@ def fitted(
         "frequency_std_rad_s": _finite(centre * math.exp(x[0]) * float(frequency_std)),
         "damping_ratio_std": _finite(math.exp(x[1]) * float(damping_std)),
         "drive_shape_std": _finite(0.5 * math.exp(0.5 * x[2]) * float(shape_std)),
-        "force_v_n_std": _finite(_alpha_std(alone[5:9, 5:9], math.exp(x[0]))),
+        "force_v_n_std": _alpha_std(x[5:9], alone[5:9, 5:9], math.exp(x[0])),
         "residual_per_kg": (float(x[3]), float(x[4])),
         "force_v_n": tuple(map(float, x[5:9])),
         "acceleration_v_s2_m": tuple(map(float, x[9:13])),
@@ -114,10 +115,17 @@ def fitted(
     }
 
 
-def _alpha_std(covariance: Real, z: float) -> float:
-    """Standard error of ``|alpha|`` at ``s = i z`` (relative to the centre), from the covariance [4, 4] of its coefficients."""
+def _alpha_std(coefficients: Real, covariance: Real, z: float) -> float:
+    """Standard error of ``|alpha|`` at ``s = i z`` (relative to the centre), from the covariance [4, 4] of its coefficients.
+
+    If the lines do not determine alpha at all, this is `UNDETERMINED` times alpha: nothing may be concluded from it.
+    """
     parts = np.array([[1.0, 0.0, -(z**2), 0.0], [0.0, z, 0.0, -(z**3)]])
-    return math.sqrt(float(np.trace(parts @ covariance @ parts.T)))
+    undetermined = UNDETERMINED * float(np.linalg.norm(parts @ coefficients))
+    if not np.isfinite(covariance).all():
+        return undetermined
+    variance = float(np.trace(parts @ covariance @ parts.T))
+    return math.sqrt(variance) if 0.0 <= variance < undetermined**2 else undetermined
 
 
 def _finite(std: float) -> float | None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from controller.tuning import PlantModel
+from controller.tuning.plant_fit import _alpha_std
 
 FREQUENCY_RAD_S, RATE_HZ = 157.0, 5000.0
 VOLTS_PER_NEWTON = 0.5
@@ -63,3 +64,14 @@ def test_a_plan_without_this_error_is_read_and_a_plan_with_it_keeps_it():
     known = plant.to_dict()
     del known["force_v_n_std"]
     assert PlantModel.from_dict(known).force_v_n_std is None
+
+
+@pytest.mark.parametrize("covariance", [np.full((4, 4), np.nan), np.full((4, 4), np.inf), 1e30 * np.eye(4), -np.eye(4)])
+def test_an_alpha_that_the_lines_do_not_determine_has_an_error_far_above_itself(covariance):
+    std = _alpha_std(np.array([0.5, 0.0, 0.0, 0.0]), covariance, 1.0)
+    assert std == pytest.approx(500.0)
+
+
+def test_the_error_of_alpha_is_that_of_its_two_parts():
+    std = _alpha_std(np.array([0.5, 0.0, 0.0, 0.0]), np.diag([9.0, 16.0, 0.0, 0.0]), 1.0)
+    assert std == pytest.approx(5.0)
