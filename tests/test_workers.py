@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from joblib import Parallel, delayed
+from joblib.externals.loky import get_reusable_executor
 
 
 def stand(_: int) -> str:
@@ -11,6 +12,7 @@ def stand(_: int) -> str:
 
 
 def test_workers_may_be_started_in_a_folder_that_goes(tmp_path, monkeypatch):
+    get_reusable_executor().shutdown()  # of tests before, in the folder of the tests
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     assert set(Parallel(n_jobs=2)(delayed(stand)(k) for k in range(4))) == {str(tmp_path / "here")}
