@@ -14,7 +14,7 @@ class CheckedScale:
     """
 
     at: str
-    """End of the check, ISO 8601; empty if unknown."""
+    """Begin of the check, ISO 8601; empty if unknown."""
     frequency_hz: float
     """Natural frequency of the mode, Hz."""
     damping_ratio: float

@@ -291,8 +291,11 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
 
 
 def _checked(facts: Mapping[str, Any]) -> CheckedScale | None:
-    """Return the scale with which a part compares its own, of what is recorded of the part."""
-    return CheckedScale(**facts["checked"]) if "checked" in facts else None
+    """Return the scale with which a part compares its own, of what is recorded of the part; None for what is no scale."""
+    try:
+        return CheckedScale(**facts["checked"]) if "checked" in facts else None
+    except (TypeError, ValueError):
+        return None
 
 
 def _lead(loop: RunningLoop) -> float:

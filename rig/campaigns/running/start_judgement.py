@@ -21,7 +21,7 @@ __all__ = ["PERIODS", "StartJudgement"]
 PERIODS = 10
 """Periods at the start voltage that are judged."""
 HARMONICS = 3
-LONGEST = 300.0
+LONGEST = 300.0  # periods: largest extension of the start, for modes with little damping
 
 
 class StartJudgement:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.arming.run_options import RunOptions
-from rig.campaigns.running.runner import carry_out
+from rig.campaigns.running.runner import _checked, carry_out
 from rig.campaigns.running.start_judgement import StartJudgement
 from rig.check.run import check
 from rig.emulator.emulated import emulated
@@ -132,6 +132,13 @@ def test_in_lockstep_behind_a_wire_the_same_rows_come_as_in_this_process(tmp_pat
     np.testing.assert_allclose(found[0][1][:whole], found[1][1][:whole], rtol=1e-6)
     if scaled_by == 1.0:
         assert abs(found[0][1].size - found[1][1].size) <= 2 * bench.block
+
+
+@pytest.mark.parametrize(
+    "told", [None, 1.0, "x", {"at": ""}, {"at": "", "frequency_hz": float("nan")}, {"no": "field"}]
+)
+def test_what_a_recording_holds_in_place_of_a_scale_is_no_scale(told):
+    assert _checked({"checked": told}) is None
 
 
 def test_a_judgement_that_fails_ends_the_run_and_leaves_no_loop_waiting(tmp_path, monkeypatch):
