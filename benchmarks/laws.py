@@ -110,13 +110,14 @@ def cost(bench: Bench, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, level:
     done = daq.run_fused(tick.arrays, readings, rows)
     assert done == SAMPLES, "the run has ended before its time"
     volts = readings * np.array([channel.sensitivity_v_per_unit for channel in bench.channels])
-    flags, outputs = np.zeros(SAMPLES, daq.flags.dtype), np.empty(SAMPLES)
+    flags, outputs, put_out = np.zeros(SAMPLES, daq.flags.dtype), np.empty(SAMPLES), np.full(SAMPLES, np.nan)
+    told = daq.continuation
 
     def once() -> float:
         again = _tick(bench, daq, law, amplitude_law, level)
-        tick_block(again.arrays, volts[:10], flags[:10], readings[:10], rows[:10], outputs[:10])
+        tick_block(again.arrays, volts[:10], flags[:10], readings[:10], rows[:10], outputs[:10], put_out[:10], told)
         start = time.perf_counter()
-        tick_block(again.arrays, volts, flags, readings, rows, outputs)
+        tick_block(again.arrays, volts, flags, readings, rows, outputs, put_out, told)
         return 1e6 * (time.perf_counter() - start) / SAMPLES
 
     return once

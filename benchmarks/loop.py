@@ -75,12 +75,14 @@ def exchanged(bench: Bench, block: int) -> Callable[[], float]:
     calls = SAMPLES // 4 // block
     readings, rows = tick.buffers(block)
     voltages = np.zeros(block)
-    tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
+    tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages, daq.put_out, daq.continuation)
 
     def once() -> float:
         start = time.perf_counter()
         for _ in range(calls):
-            tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
+            tick_block(
+                tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages, daq.put_out, daq.continuation
+            )
         return 1e6 * (time.perf_counter() - start) / (calls * block)
 
     return once

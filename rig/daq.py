@@ -21,12 +21,31 @@ from rig.bench.configuration import Configured
 from rig.errors import DaqError, DaqRefused, RigError, as_daq_error
 from vibrolock.compiled import bound, kernel
 
-__all__ = ["DAQ", "HELD", "LOST", "Adjustable", "Capabilities", "Channel", "Role", "State", "flag_names"]
+__all__ = [
+    "CONTINUATION",
+    "CONTINUED",
+    "DAQ",
+    "HELD",
+    "LOST",
+    "Adjustable",
+    "Capabilities",
+    "Channel",
+    "Role",
+    "State",
+    "flag_names",
+]
 
 LOST = 1 << 15
 """Bit of `DAQ.flags`: the sample was lost in transfer; its inputs are NaN."""
 HELD = "output_held"
 """Name of the flag of a sample at which the converter repeated its last output, because the next one came too late."""
+CONTINUED = "output_continued"
+"""Name of the flag of a sample at which the device went on with the last period of outputs, because the next came too late."""
+
+CONTINUATION = np.dtype([("period_samples", "f8"), ("ramp_samples", "f8")])
+"""How the outputs of a block go on, for a device that goes on with them when the next ones come too late (one record).
+``period_samples``: their period, 0 if they have none. ``ramp_samples``: samples from the end of the block until a ramp to 0 V
+has ended, 0 if there is no ramp."""
 
 
 def flag_names(counters: Iterable[str]) -> list[str]:
@@ -120,7 +139,13 @@ class DAQ(ABC):
 
     ``flags`` (uint16[n]) hold the device's status bits for each sample of the last block. A driver with such bits fills
     ``flags`` in `_exchange` and names the bits, lowest first, by the keys of `counters`. Lost samples keep their place as rows
-    of NaN with the bit `LOST`, so that the number of rows is the device's number of instants. `start` arms the device; whether
+    of NaN with the bit `LOST`, so that the number of rows is the device's number of instants.
+
+    ``continuation`` (`CONTINUATION`, one record) is filled by the caller before `exchange` and says how the outputs that it
+    passes go on; a driver may ignore it. ``put_out`` (float64[n], V) is NaN where the converter put out what was handed over
+    for an instant of the last block, and otherwise what it put out instead; a driver that is not told leaves it alone.
+
+    `start` arms the device; whether
     it may be started is decided by a person at a higher level. A condition that the device has `latched` stays until `clear`,
     which a run calls.
 
@@ -137,6 +162,8 @@ class DAQ(ABC):
         self.output_range_v = output_range_v
         self.block = 0
         self.flags = np.zeros(0, np.uint16)
+        self.put_out = np.zeros(0)
+        self.continuation = np.zeros(1, CONTINUATION)
         self.state = State.CLOSED
         self._driven = False
         self._blocks_of_zero = 0
@@ -162,7 +189,12 @@ class DAQ(ABC):
     @property
     def queue_blocks(self) -> int:
         """q: whole blocks between `exchange` of an output and the converter; known once started."""
-        return max(0, int((self.latency_samples - self.filter_delay_samples) // self.block))
+        return self.queue_samples // self.block
+
+    @property
+    def queue_samples(self) -> int:
+        """Whole samples between `exchange` of an output and the converter; known once started."""
+        return max(0, int(self.latency_samples - self.filter_delay_samples))
 
     @property
     def counters(self) -> dict[str, int]:
@@ -234,7 +266,9 @@ class DAQ(ABC):
             raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
         self.block = block
         self.flags = np.zeros(block, np.uint16)
-        self._flags = self.flags
+        self.put_out = np.full(block, math.nan)
+        self.continuation[:] = 0.0
+        self._flags, self._put_out = self.flags, self.put_out
         self._shape = block, len(self.channels)
         self._largest_of = bound(largest_of, np.zeros(block))
         self._driven = False
@@ -267,8 +301,8 @@ class DAQ(ABC):
             raise
         except Exception as error:
             raise as_daq_error(error) from error
-        if self.flags is not self._flags:  # the loop's machine code takes it as it was made
-            raise DaqError("the driver has replaced `flags`; allowed is to fill the array that `start` has made")
+        if self.flags is not self._flags or self.put_out is not self._put_out:  # the loop's machine code takes them so
+            raise DaqError("the driver has replaced `flags` or `put_out`; allowed is to fill what `start` has made")
         self._blocks_of_zero += int(largest == 0.0)
         return inputs
 
@@ -280,6 +314,7 @@ class DAQ(ABC):
         """
         if self.state is not State.RUNNING or not self._driven:
             return
+        self.continuation[:] = 0.0
         try:
             for _ in range(self.queue_blocks + 1 - self._blocks_of_zero):
                 self.exchange(np.zeros(self.block))

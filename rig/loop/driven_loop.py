@@ -4,7 +4,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from rig.daq import DAQ, HELD, LOST, flag_names
+from rig.daq import CONTINUED, DAQ, HELD, LOST, flag_names
 from rig.errors import DaqError, as_daq_error
 from rig.tick.safety.layout import GuardMode
 from rig.tick.safety.limits import end_reason_of
@@ -46,7 +46,8 @@ class DrivenLoop:
         self._counted: dict[str, int] | None = None
         self._voltages = np.zeros(daq.block)
         flags = flag_names(daq.counters)
-        tick.arrays.loop["held_flag"] = 1 << flags.index(HELD) if HELD in flags else 0
+        for field, name in (("held_flag", HELD), ("continued_flag", CONTINUED)):
+            tick.arrays.loop[field] = 1 << flags.index(name) if name in flags else 0
 
     @property
     def counters(self) -> dict[str, int]:
@@ -95,4 +96,5 @@ class DrivenLoop:
             self.cause = " ".join(f"{type(error).__name__} was raised in the driver: {error}".split()).rstrip(":")
         self.tick.request_stop()
         daq = self.daq
+        daq.put_out.fill(np.nan)
         return np.full((daq.block, len(daq.channels)), np.nan), np.full(daq.block, LOST, np.uint16)

@@ -193,7 +193,8 @@ class Loop(DrivenLoop):
             self._fused.run_fused(self.tick.arrays, readings, rows)
         else:
             nothing = np.empty((0, len(self.daq.channels)))
-            tick_block(self.tick.arrays, nothing, self.daq.flags, readings, rows, np.empty(0))
+            daq, none = self.daq, np.empty(0)
+            tick_block(self.tick.arrays, nothing, daq.flags, readings, rows, none, daq.put_out, daq.continuation)
 
     @property
     def over(self) -> bool:
@@ -224,7 +225,8 @@ class Loop(DrivenLoop):
             if swapped is None:
                 return first
             part = slice(first, first + block)
-            tick_block(self.tick.arrays, *swapped, readings[part], rows[part], self._voltages)
+            told = self.daq.put_out, self.daq.continuation
+            tick_block(self.tick.arrays, *swapped, readings[part], rows[part], self._voltages, *told)
             if self.over:
                 return first + block
         return int(rows.size)

@@ -30,7 +30,7 @@ from rig.tick.safety.kernels import (
     shut_down,
     watch_frequency,
 )
-from rig.tick.safety.layout import ARMED
+from rig.tick.safety.layout import ARMED, RAMPING
 from rig.tick.sequencer.kernels import advance, is_ramp
 from rig.tick.sequencer.layout import LOOP_DRIVE, RELEASE, SILENT, TONE, WAVEFORM
 from vibrolock.compiled import Record, inner_kernel, kernel
@@ -54,12 +54,41 @@ def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: fl
 
 @inner_kernel
 def note_faults(t: TickArrays, flags: int) -> None:
-    """Count a sample with a held output or a lost one, by the device's ``flags``, in the present segment."""
+    """Count a sample with a held output, a continued one or a lost one, by the device's ``flags``, in the present segment."""
     loop, progress = t.loop[0], t.progress[0]
-    progress.disturbed = 1 if flags & (loop.held_flag | LOST) else 0
+    progress.disturbed = 1 if flags & (loop.held_flag | loop.continued_flag | LOST) else 0
     if progress.disturbed == 1:
         progress.held += 1 if flags & loop.held_flag else 0
+        progress.continued += 1 if flags & loop.continued_flag else 0
         progress.lost += 1 if flags & LOST else 0
+
+
+@inner_kernel
+def note_put_out(t: TickArrays, voltage: float) -> None:
+    """Note that the converter, at this sample, put out ``voltage`` (V) in place of the output that was sent for it."""
+    loop = t.loop[0]
+    t.history[(loop.sample - loop.queue_whole) % t.history.size].output_v = voltage
+
+
+@inner_kernel
+def tell_continuation(t: TickArrays, continuation: np.ndarray) -> None:
+    """Fill ``continuation`` (`rig.daq.CONTINUATION`) for the outputs up to this sample.
+
+    A tone and the loop's output have the oscillator's period; a waveform has its own, but not in the block in which it begins.
+    An output of 0 V has none.
+    """
+    loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]
+    played = loop.waveform + 1 if loop.drive == WAVEFORM else 0
+    changes = played != loop.played
+    loop.played = played
+    told = continuation[0]
+    told.period_samples = told.ramp_samples = 0.0
+    if changes or guard.amplitude_v == 0.0 or loop.drive == SILENT:
+        return
+    omega = t.control[0].frequency.omega
+    told.period_samples = t.waveforms.shape[1] if played > 0 else TWO_PI / (omega * loop.dt_s)
+    if guard.mode == RAMPING:
+        told.ramp_samples = max(guard.ramp_sample + limits.ramp_down_samples - loop.sample, 0.0)
 
 
 @inner_kernel
@@ -280,13 +309,20 @@ def tick_block(
     readings: np.ndarray,
     rows: np.ndarray,
     outputs: np.ndarray,
+    put_out: np.ndarray,
+    continuation: np.ndarray,
 ) -> None:
-    """Process a block: take ``volts`` (float64[n, n_channels]) and the device's ``flags`` (uint16[n]).
+    """Process a block: take ``volts`` (float64[n, n_channels]), the device's ``flags`` (uint16[n]) and its ``put_out``.
 
-    Fills ``readings``, ``rows`` and ``outputs`` (float64[n]), the voltages for the next block.
+    ``put_out`` (float64[n], V) is what the converter put out in place of an output that was sent, else NaN. Fills
+    ``readings``, ``rows``, ``outputs`` (float64[n]), the voltages for the next block, and their ``continuation``
+    (`rig.daq.CONTINUATION`).
     """
     for index in range(outputs.size):
         lost = (flags[index] & LOST) != 0
         note_faults(t, flags[index])
+        if math.isfinite(put_out[index]):
+            note_put_out(t, put_out[index])
         outputs[index] = tick(t, volts[index], lost, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags[index]) << np.uint32(DEVICE_SHIFT)
+    tell_continuation(t, continuation)

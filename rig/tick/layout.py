@@ -16,6 +16,7 @@ LOOP = np.dtype(
         ("sample", "i8"),
         ("lead_whole", "i8"),
         ("lead_fraction", "f8"),
+        ("queue_whole", "i8"),
         ("dt_s", "f8"),
         ("force_channel", "i8"),
         ("drive_channel", "i8"),
@@ -32,13 +33,17 @@ LOOP = np.dtype(
         ("lost", "i8"),
         ("seen", "i8"),
         ("held_flag", "i8"),
+        ("continued_flag", "i8"),
+        ("played", "i8"),
     ]
 )
 """State of the tick itself (one record): sample counter, delay from output to input, channels, oscillator phase at the output
-and at the inputs, readings of the sample, source of the frequency. ``skew_samples``: delay of the force channel minus that of
+and at the inputs, readings of the sample, source of the frequency. ``queue_whole``: whole samples from an output to the
+converter. ``skew_samples``: delay of the force channel minus that of
 the drive channel. ``held``: the level is not being ramped. ``lost``: counts up with each lost sample and down with each
-received one, never below 0. ``seen``: number of samples received. ``held_flag``: the device's flag of a held output; 0 if it
-has none."""
+received one, never below 0. ``seen``: number of samples received. ``held_flag``, ``continued_flag``: the device's flags
+of a held output and of one that it continued; 0 if it has none. ``played``: 1 + the waveform that the last block has played;
+0 for a tone."""
 
 HISTORY = np.dtype([("theta", "f8"), ("omega", "f8"), ("amplitude_v", "f8"), ("turn", "f8"), ("output_v", "f8")])
 """Outputs sent whose effect the inputs do not yet show; a ring."""

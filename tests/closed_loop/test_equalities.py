@@ -44,7 +44,9 @@ def _exchanged(block, **options):
         voltages, chunks = np.zeros(block), []
         for _ in range(SAMPLES // block):
             readings, rows = tick.buffers(block)
-            tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages)
+            tick_block(
+                tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages, daq.put_out, daq.continuation
+            )
             chunks.append(tick.joined(readings, rows))
         return np.concatenate(chunks), tick
 

@@ -33,7 +33,8 @@ class Running:
             if spoil is not None:
                 spoil(inputs[0])
             readings, rows = self.tick.buffers(1)
-            tick_block(self.tick.arrays, inputs, self.daq.flags, readings, rows, self.voltages)
+            told = self.daq.put_out, self.daq.continuation
+            tick_block(self.tick.arrays, inputs, self.daq.flags, readings, rows, self.voltages, *told)
             self.rows.append((float(rows["frequency_hz"][0]), float(self.voltages[0]), int(rows["guard"][0])))
         return self
 

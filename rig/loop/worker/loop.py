@@ -70,7 +70,15 @@ class WallClockLoop(DrivenLoop):
         slot, block = memory.to_fill(), daq.block
         inputs = np.empty((block, len(daq.channels)))
         self._tick_block = bound(
-            tick_block, tick.arrays, inputs, daq.flags, slot.readings[:block], slot.rows[:block], self._voltages
+            tick_block,
+            tick.arrays,
+            inputs,
+            daq.flags,
+            slot.readings[:block],
+            slot.rows[:block],
+            self._voltages,
+            daq.put_out,
+            daq.continuation,
         )
         self._samples = 0
         self.disturbances: dict[str, int] = {}
@@ -100,6 +108,7 @@ class WallClockLoop(DrivenLoop):
     def _fill(self, slot: Slot) -> int:
         """Fill a slot block by block; return the number of rows in it."""
         tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
+        told = self.daq.put_out, self.daq.continuation
         arrays, block = tick.arrays, self.daq.block
         chores, tick_block = self._chores, self._tick_block
         guard = arrays.guard.view(np.int64).data
@@ -123,7 +132,7 @@ class WallClockLoop(DrivenLoop):
                 return first
             begun = begun or _now()
             inputs, flags = swapped
-            tick_block(arrays, inputs, flags, readings, rows, voltages)
+            tick_block(arrays, inputs, flags, readings, rows, voltages, *told)
             self.times.begun(begun)
             self._samples += block
             if guard[0] == OFF and tick.over:

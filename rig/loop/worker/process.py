@@ -116,7 +116,7 @@ def _shared(
 def _begin(
     daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
 ) -> WallClockLoop:
-    tick = settings.build(daq.latency_samples)
+    tick = settings.build(daq.latency_samples, daq.filter_delay_samples)
     tick.arrays, state = packed(tick.arrays)
     return WallClockLoop(daq, tick, state, memory, facts, asked)
 
@@ -127,7 +127,8 @@ def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
     arrays, _ = packed(tick.arrays)
     readings, rows = tick.buffers(0)
     nothing = np.empty((0, len(bench.channels)))
-    tick_block(arrays, nothing, np.zeros(0, np.uint16), readings, rows, np.empty(0))
+    none = np.empty(0)
+    tick_block(arrays, nothing, np.zeros(0, np.uint16), readings, rows, none, none, daq.continuation)
     _ = tick.over
     if not daq.wall_clock:  # software, which begins anew at the next start
         daq.start(bench.block)

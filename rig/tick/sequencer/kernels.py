@@ -69,6 +69,7 @@ def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outc
     entry.drift = settling.drift
     entry.distortion, entry.left_alone = settling.distortion, settling.left_alone
     entry.held = progress.held
+    entry.continued = progress.continued
     entry.lost = progress.lost
     progress.segment += 1
     progress.entered = 0
@@ -180,6 +181,7 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     progress.frozen_cycles = 0.0
     progress.waited_cycles = 0.0
     progress.held = 0
+    progress.continued = 0
     progress.lost = 0
     if segment.point != progress.point:
         progress.point = segment.point

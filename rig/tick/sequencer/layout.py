@@ -118,13 +118,15 @@ OUTCOME = np.dtype(
         ("mean_error_rad", "f8"),
         ("drift", "f8"),
         ("held", "i8"),
+        ("continued", "i8"),
         ("lost", "i8"),
         ("distortion", "f8"),
         ("left_alone", "i8"),
     ]
 )
 """Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, number
-of samples with a held output and of lost ones. ``distortion``: last error of the controlled harmonics over its tolerance;
+of samples with a held output, with a continued one, and of lost ones. ``distortion``: last error of the controlled harmonics
+over its tolerance;
 ``left_alone``: bit h for each harmonic h that the harmonics loop leaves alone."""
 
 REFUSED = np.dtype(
@@ -137,6 +139,7 @@ REFUSED = np.dtype(
         ("mean_error_rad", "f8"),
         ("drift", "f8"),
         ("held", "i8"),
+        ("continued", "i8"),
         ("lost", "i8"),
         ("force_n", "f8"),
     ]
@@ -174,6 +177,7 @@ PROGRESS = np.dtype(
         ("tries_left", "i8"),
         ("retries", "i8"),
         ("held", "i8"),
+        ("continued", "i8"),
         ("lost", "i8"),
         ("disturbed", "i8"),
         ("n_refused", "i8"),
@@ -187,5 +191,6 @@ ever gained. ``kept_level``: the last held level with a lock; ``held_back``: the
 has judged it; ``returning``: the level goes back there because the lock was lost.
 
 ``retries``: how often a record is measured again at most; ``point``, ``tries_left``: how often the record of the present point
-still may be. ``held``, ``lost``: samples of the present segment with a held output, and lost ones; ``disturbed``: whether this
-sample is one of them. ``refused``: a ring of the records that were refused so far, ``n_refused`` in all."""
+still may be. ``held``, ``continued``, ``lost``: samples of the present segment with a held output, with a continued one, and
+lost ones; ``disturbed``: whether this sample is one of them. ``refused``: a ring of the records that were refused so far,
+``n_refused`` in all."""

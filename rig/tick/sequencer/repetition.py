@@ -47,6 +47,7 @@ def measure_again(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     entry.mean_error_rad = settling.mean_error_rad
     entry.drift = settling.drift
     entry.held = progress.held
+    entry.continued = progress.continued
     entry.lost = progress.lost
     entry.force_n = settling.forces[(settling.count - 1) % settling.forces.size] if settling.count > 0 else math.nan
     progress.n_refused += 1

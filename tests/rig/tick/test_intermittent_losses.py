@@ -9,6 +9,7 @@ from rig.tick.kernels import tick_block
 from rig.tick.safety.layout import EndReason
 from tests.rig.loop.worker.rigs import slow_bench, tone
 from tests.rig.lossy import LossyDAQ
+from tests.rig.tick.blocks import nothing_told
 
 RATE_HZ = 1000
 
@@ -56,7 +57,7 @@ def test_the_mean_is_at_first_that_of_the_samples_seen():
     volts = np.full((n, len(bench.channels)), np.nan)
     volts[lost:] = np.array([0.01, 0.04, 0.07])[:, None]
     flags = np.where(np.arange(n) < lost, LOST, 0).astype(np.uint16)
-    tick_block(tick.arrays, volts, flags, *tick.buffers(n), np.empty(n))
+    tick_block(tick.arrays, volts, flags, *tick.buffers(n), np.empty(n), *nothing_told(n))
     scale = np.array([1.0 / channel.sensitivity_v_per_unit for channel in bench.channels])
     assert tick.arrays.loop["seen"][0] == seen
     np.testing.assert_allclose(tick.arrays.watches["mean"], 0.04 * scale, rtol=1e-12)

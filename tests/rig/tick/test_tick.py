@@ -13,6 +13,7 @@ from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
 from tests.rig.rigs import bench_with
+from tests.rig.tick.blocks import nothing_told
 
 HELD = [Segment(SegmentKind.RAMP, -1, 0.5, 2.0), Segment(SegmentKind.HOLD, -1, 0.5, 1000.0)]
 
@@ -36,7 +37,9 @@ def _wired(lead_whole, lead_fraction, samples=20_000, bench=None, skew=(0.0, 0.0
         phase = [omega * dt * (k - lead_whole - lead_fraction - s) for s in skew]
         volts[0, 0] = scale[0] * math.cos(phase[0])
         volts[0, 1:] = scale[1] * math.cos(phase[1] + math.pi / 2)
-        tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings[k : k + 1], rows[k : k + 1], out)
+        tick_block(
+            tick.arrays, volts, np.zeros(1, np.uint16), readings[k : k + 1], rows[k : k + 1], out, *nothing_told(1)
+        )
         estimates[k] = tick.arrays.control["vibration"]["force"][0]
     return estimates, rows
 
@@ -89,9 +92,8 @@ def test_readings_are_in_si_units_and_a_flipped_sensor_is_turned_back():
     channels[1]["sensitivity_v_per_unit"] *= -1
     tick = _tick(1.5, bench_with({"channels": channels}))
     readings, rows = tick.buffers(1)
-    tick_block(
-        tick.arrays, np.array([[0.1124, -0.0102, 0.0102, 0.0204]]), np.zeros(1, np.uint16), readings, rows, np.zeros(1)
-    )
+    volts, out = np.array([[0.1124, -0.0102, 0.0102, 0.0204]]), np.zeros(1)
+    tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings, rows, out, *nothing_told(1))
     np.testing.assert_allclose(readings[0], [1.0, 1.0, 1.0, 2.0], rtol=1e-6)
 
 

@@ -16,6 +16,7 @@ from rig.measurements import backbone, decays, point_rows
 from rig.tick.safety.layout import GuardMode
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
+from tests.rig.tick.blocks import nothing_told
 
 
 def decay(name="magnet-beam", **changes):
@@ -128,7 +129,7 @@ def test_a_limit_trips_during_the_decay_and_latches():
             volts[0, 1] = 0.98 * bench.channels[1].range_v
         readings, rows = tick.buffers(1)
         out = np.zeros(1)
-        tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings, rows, out)
+        tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings, rows, out, *nothing_told(1))
         outputs.append(out[0])
         reasons.append(int(tick.guard["reason"][0]))
     released = 1 + max(index for index, value in enumerate(outputs) if value != 0.0)
@@ -156,7 +157,7 @@ def test_a_stop_during_the_decay_ends_the_run(tmp_path):
     for sample, volts in enumerate(noise):
         if sample == 100:
             tick.request_stop()
-        tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings, rows, np.zeros(1))
+        tick_block(tick.arrays, volts, np.zeros(1, np.uint16), readings, rows, np.zeros(1), *nothing_told(1))
     assert int(tick.guard["reason"][0]) == EndReason.STOP_REQUESTED
     assert tick.over
 
