@@ -60,12 +60,14 @@ def ring_for(longest_period: int) -> np.ndarray:
     return np.zeros(2 * longest_period + _REACH, np.int64)
 
 
+@kernel
 def period_steps(period_samples: float) -> int:
     """Return a period in steps, to the nearest; 0 for one that is not positive, not finite, or beyond 32 bits."""
     steps = period_samples * STEPS
     return round(steps) if 0.0 < steps < 2.0**32 - 1.0 else 0
 
 
+@kernel
 def ramp_length(ramp_samples: float) -> int:
     """Return the samples until a ramp is over, rounded up; 0 where there is none, at most 32 bits."""
     return math.ceil(min(ramp_samples, 2.0**32 - 1.0)) if ramp_samples > 0.0 else 0

@@ -144,6 +144,8 @@ class VirtualPlant:
         """Allocate the kernel's output arrays for blocks of ``n``: the kernel does not check their size."""
         self._readings_v = np.empty((n, len(self.names)))
         self._raised = np.zeros(n, np.uint16)
+        self.put_out = np.full(n, np.nan)
+        """Voltages of the last block [n] where the rig's own faults have put out others than those given, V; else NaN."""
 
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
         """Advance the virtual rig by one sample a voltage [n], V; returns counts [n, n_channels] and `DeviceFlag` bits."""
@@ -160,6 +162,7 @@ class VirtualPlant:
                 voltages[part],
                 self._readings_v[part],
                 self._raised[part],
+                self.put_out[part],
             )
         counts, flags = self._counted()
         if self._wiring is not None:

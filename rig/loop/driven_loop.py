@@ -45,6 +45,7 @@ class DrivenLoop:
         self.interruption: BaseException | None = None
         self._counted: dict[str, int] | None = None
         self._voltages = np.zeros(daq.block)
+        tick.arrays.loop["queue_whole"] = daq.block + daq.queue_samples
         flags = flag_names(daq.counters)
         for field, name in (("held_flag", HELD), ("continued_flag", CONTINUED)):
             tick.arrays.loop[field] = 1 << flags.index(name) if name in flags else 0

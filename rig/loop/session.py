@@ -52,8 +52,7 @@ class LocalSession:
         """Start the device; the loop runs while its rows are taken."""
         self._daq.clear()
         self._daq.start(settings.bench.block)
-        tick = settings.build(self._daq.latency_samples, self._daq.filter_delay_samples)
-        loop = Loop(self._daq, tick, paced=self._realtime)
+        loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
         if self._realtime or self._daq.wall_clock:
             loop.notes = (NO_PROCESS,)
         self._loop = loop

@@ -325,4 +325,5 @@ def tick_block(
             note_put_out(t, put_out[index])
         outputs[index] = tick(t, volts[index], lost, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags[index]) << np.uint32(DEVICE_SHIFT)
-    tell_continuation(t, continuation)
+    if outputs.size > 0:
+        tell_continuation(t, continuation)

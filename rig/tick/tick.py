@@ -30,12 +30,11 @@ class Tick:
     """The control state of a run.
 
     ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
-    latency, including the fraction; ``filter_delay_samples`` is the part of it behind the converter's hold. ``waveforms``
-    [n, period] of unit peak can be played by segments. If the plant is known, the fundamentals are checked against its
-    ``exciter``, and the law uses its mode shape in place of the bench's. ``per_volt``: force (N/V) and motion (m/s^2/V) at
-    resonance in the last check, if there was one, for levels in volts. A record that is refused for something that passes is
-    measured again up to ``retries`` times. ``armed = False`` keeps the output at 0 V. With ``start_judged`` a start segment
-    lasts until `release_start`, so that a caller can judge the vibration there.
+    latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
+    the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. ``per_volt``:
+    force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts. A record that is
+    refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the output at 0 V. With
+    ``start_judged`` a start segment lasts until `release_start`, so that a caller can judge the vibration there.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """
@@ -49,7 +48,6 @@ class Tick:
         segments: Sequence[Segment],
         lead_samples: float,
         *,
-        filter_delay_samples: float = 0.0,
         waveforms: np.ndarray | None = None,
         exciter: PlantModel | None = None,
         per_volt: tuple[float, float] | None = None,
@@ -85,7 +83,7 @@ class Tick:
         loop = np.zeros(1, LOOP)
         loop["lead_whole"] = math.floor(lead_samples)
         loop["lead_fraction"] = lead_samples - math.floor(lead_samples)
-        loop["queue_whole"] = math.floor(lead_samples - filter_delay_samples)
+        loop["queue_whole"] = math.floor(lead_samples)
         loop["dt_s"] = 1.0 / bench.sample_rate_hz
         loop["force_channel"], loop["drive_channel"] = force, drive
         loop["skew_samples"] = bench.channels[force].skew_samples - bench.channels[drive].skew_samples
@@ -223,8 +221,8 @@ class TickSettings:
     start_judged: bool = False
     per_volt: tuple[float, float] | None = None
 
-    def build(self, latency_samples: float, filter_delay_samples: float = 0.0) -> Tick:
-        """Build the tick for a device of this latency, of which its filters have a part; its outputs show one block later."""
+    def build(self, latency_samples: float) -> Tick:
+        """Build the tick for a device of this latency; its outputs show one block later in addition."""
         return Tick(
             self.bench,
             self.law,
@@ -232,7 +230,6 @@ class TickSettings:
             self.settle,
             self.segments,
             self.bench.block + latency_samples,
-            filter_delay_samples=filter_delay_samples,
             waveforms=self.waveforms,
             exciter=self.exciter,
             per_volt=self.per_volt,

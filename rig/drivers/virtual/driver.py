@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError
 from rig.bench import Bench
 from rig.bench.configuration import Configured, explain, validated
 from rig.daq import DAQ, Capabilities
-from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, PassingFaults
+from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, Outputs, PassingFaults, held_outputs
 from rig.drivers.virtual.kernels import Converters, Loopback, exchange_block, fused, loopback_of
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
@@ -86,12 +86,13 @@ class VirtualDAQ(DAQ):
                 f"driver.options.at_zero_v = {self._how!r}: allowed is 'attached' for a specimen that wears"
             )
         self._released = self._released_arrays()
-        self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults())
+        self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults(bench.block))
         self._first = 0
         self._exchange_bound: Callable[..., None] | None = None
 
-    def _faults(self) -> FaultArrays:
-        return self._queue_options.faults.build(self._seed, self.sample_rate_hz, self._bench_block)
+    def _faults(self, ahead: int) -> FaultArrays:
+        outputs = Outputs(self.block or self._bench_block, ahead, self.continuation)
+        return self._queue_options.faults.build(self._seed, self.sample_rate_hz, self._bench_block, outputs)
 
     def _released_arrays(self) -> RigArrays:
         """Arrays of the rig while the output is 0 V; those of the rig itself if its exciter stays attached."""
@@ -100,16 +101,12 @@ class VirtualDAQ(DAQ):
 
     def converters(self, counts: np.ndarray, loopback: Loopback) -> Converters:
         """Converters without a queue for a device around the rig that counts and loses samples in a way of its own."""
-        return Converters(np.zeros(0), counts, loopback, self.held_outputs(), self._how != "attached", self._released)
+        faults = held_outputs(self._seed, self.sample_rate_hz, self._bench_block, self._queue_options.faults)
+        return Converters(np.zeros(0), counts, loopback, faults, self._how != "attached", self._released)
 
     def _converters(self, queue_samples: int, loopback: Loopback, faults: FaultArrays) -> Converters:
         releases = self._how != "attached"
         return Converters(np.zeros(queue_samples), self._counts, loopback, faults, releases, self._released)
-
-    def held_outputs(self) -> FaultArrays:
-        """The held outputs among the passing faults, for a device around the rig that loses samples in a way of its own."""
-        held = self._queue_options.faults.model_copy(update={"lost_per_s": 0.0})
-        return held.build(self._seed, self.sample_rate_hz, self._bench_block)
 
     def _check_arrays(self, seed: int) -> None:
         """Refuse, before a run begins, parts whose arrays cannot be computed or are not finite."""
@@ -221,7 +218,7 @@ class VirtualDAQ(DAQ):
         self._realised = self.rig.realised(self._seed)
         self._arrays, self._state = self._realised.build(self._seed)
         loopback = loopback_of(self.channels, HOLD_SAMPLES + self.filter_delay_samples)
-        faults = self._faults()
+        faults = self._faults(self.block + self.queue_samples)
         self._exchanged = self._converters(self.queue_samples, loopback, faults)
         self._fused = self._converters(self.block + self.queue_samples, loopback, faults)
         self._counts[:] = 0
@@ -231,16 +228,18 @@ class VirtualDAQ(DAQ):
         if self._wears:
             for arrays, part in self._pieces(voltages.size):
                 self._arrays = arrays
-                self._swap(exchange_block, voltages[part], inputs[part], self.flags[part])
+                self._swap(exchange_block, voltages[part], inputs[part], self.flags[part], self.put_out[part])
             return
         if self._exchange_bound is None:
             fixed = self._arrays, self._state, self._exchanged
-            self._exchange_bound = bound(exchange_block, *fixed, self._first, voltages, inputs, self.flags)
-        self._swap(self._exchange_bound, voltages, inputs, self.flags)
+            self._exchange_bound = bound(
+                exchange_block, *fixed, self._first, voltages, inputs, self.flags, self.put_out
+            )
+        self._swap(self._exchange_bound, voltages, inputs, self.flags, self.put_out)
 
-    def _swap(self, kernel: Callable[..., None], voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
-        """Exchange samples during which the plant does not change."""
-        kernel(self._arrays, self._state, self._exchanged, self._first, voltages, inputs, flags)
+    def _swap(self, kernel: Callable[..., None], voltages: np.ndarray, *filled: np.ndarray) -> None:
+        """Exchange samples during which the plant does not change; fills inputs, flags and ``put_out``."""
+        kernel(self._arrays, self._state, self._exchanged, self._first, voltages, *filled)
         self._first += voltages.size
 
     def _pieces(self, n: int) -> Iterator[tuple[RigArrays, slice]]:

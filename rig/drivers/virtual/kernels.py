@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.daq import LOST, Channel
-from rig.drivers.virtual.faults import OUTPUT_HELD, FaultArrays, is_hit
-from rig.tick.kernels import note_faults, tick
+from rig.drivers.virtual.faults import FaultArrays, convert
+from rig.tick.kernels import note_faults, note_put_out, tell_continuation, tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from rig.tick.safety.kernels import is_over
 from simulators.kernels import sample
@@ -84,10 +84,12 @@ def exchange_block(
     voltages: np.ndarray,
     inputs: np.ndarray,
     flags: np.ndarray,
+    put_out: np.ndarray,
 ) -> None:
     """Swap one block with the rig; ``flags`` (uint16[n]) are the rig's for each sample.
 
-    ``first`` is the number of the block's first sample. The queue holds the outputs that the device keeps back.
+    ``first`` is the number of the block's first sample. The queue holds the outputs that the device keeps back. ``put_out``
+    (float64[n], V) is what the converter has put out in place of an output, else NaN.
     """
     queue, loopback = converters.queue, converters.loopback
     delay = queue.size
@@ -100,25 +102,11 @@ def exchange_block(
             queue[slot] = voltages[index]
         row = inputs[index]
         voltage, raised = convert(converters.faults, first + index, voltage)
+        put_out[index] = voltage if raised & ~LOST else math.nan
         read_output(loopback, first + index, voltage, row)
         flags[index] = told(sampled(rig, state, converters, voltage, row[:sensed]) | raised, converters.counts)
         if flags[index] & LOST:
             row[:] = math.nan
-
-
-@kernel
-def convert(faults: FaultArrays, index: int, voltage: float) -> tuple[float, int]:
-    """Return the voltage on the converter at sample ``index``, which may be the held one, and the flags of passing faults."""
-    if not faults.any:
-        return voltage, 0
-    raised = 0
-    if is_hit(faults, 0, index):
-        voltage = faults.last_v[0]
-        raised |= OUTPUT_HELD
-    faults.last_v[0] = voltage
-    if is_hit(faults, 1, index):
-        raised |= LOST
-    return voltage, raised
 
 
 @kernel
@@ -149,7 +137,7 @@ def fused(
 
     The queue (float64[d]) holds the outputs under way: what the tick computes at a sample is on the converter d later.
     """
-    queue, loopback = converters.queue, converters.loopback
+    queue, loopback, outputs = converters.queue, converters.loopback, converters.faults.outputs
     delay = queue.size
     looped, sensed = loopback.v_per_v.size > 0, volts[: volts.size - loopback.v_per_v.size]
     for index in range(rows.size):
@@ -159,8 +147,12 @@ def fused(
             read_output(loopback, t.loop[0].sample, voltage, volts)
         flags = told(sampled(rig, state, converters, voltage, sensed) | raised, converters.counts)
         note_faults(t, flags)
+        if raised & ~LOST:
+            note_put_out(t, voltage)
         queue[slot] = tick(t, volts, (flags & LOST) != 0, readings[index], rows[index])
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
+        if converters.faults.any and t.loop[0].sample % outputs.block == 0:
+            tell_continuation(t, outputs.told)
         if is_over(t.guard[0], t.loop[0].lead_whole):
             return index + 1
     return int(rows.size)

@@ -116,7 +116,7 @@ def _shared(
 def _begin(
     daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
 ) -> WallClockLoop:
-    tick = settings.build(daq.latency_samples, daq.filter_delay_samples)
+    tick = settings.build(daq.latency_samples)
     tick.arrays, state = packed(tick.arrays)
     return WallClockLoop(daq, tick, state, memory, facts, asked)
 
