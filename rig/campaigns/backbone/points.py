@@ -27,10 +27,11 @@ from rig.campaigns.evaluation.acceptance import (
     with_settling,
 )
 from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.lost_samples import lost_objection, lost_rows
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
-from rig.campaigns.evaluation.recorded_flow import flagged, recorded_flow
+from rig.campaigns.evaluation.recorded_flow import SAMPLES_LOST, flagged, recorded_flow
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import (
@@ -113,7 +114,7 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) ->
     error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
     nonharmonic, shape = nonharmonic_force(bench, [rows]), drive_shape(bench, plan.plant)
     reason = _short_objection(plan, found, error_deg, nonharmonic)
-    reason = reason or next((why for why, at in flagged(bench, rows, flow).items() if at.any()), "")
+    reason = reason or _flagged_objection(bench, rows, flow)
     turned = np.unwrap(rows["theta_rad"].astype(float))
     grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
     return replace(
@@ -138,6 +139,13 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) ->
             periods_in_all=float(turned[-1] - turned[0]) / (2.0 * math.pi),
         ),
     )
+
+
+def _flagged_objection(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> str:
+    """Object if anything was at a limit at any instant, or too many samples of the whole record were lost."""
+    at_limit = {why: at for why, at in flagged(bench, rows, flow).items() if why != SAMPLES_LOST}
+    lost = int(np.count_nonzero(lost_rows(rows)))
+    return first_of((*(why for why, at in at_limit.items() if at.any()), lost_objection(lost, rows.size)))
 
 
 def _arrival_s(flow: SlowFlow) -> float:

@@ -8,7 +8,12 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.rows import Rows, std_of, stretches
 from rig.tick.layout import SAMPLE_LOST
 
-__all__ = ["bridged", "lost_rows", "lost_warnings", "rms_of", "rms_of_force"]
+__all__ = ["bridged", "lost_objection", "lost_rows", "lost_warnings", "rms_of", "rms_of_force", "too_many_lost"]
+
+LARGEST_LOST = 0.05  # of a record's samples
+LARGEST_LOST_WITHIN = (
+    0.02  # of the window of an instant: a gap is filled from the periods beside it, which are in the window
+)
 
 
 def lost_rows(rows: Rows) -> np.ndarray:
@@ -27,6 +32,19 @@ def _lost_in(rows: Rows) -> np.ndarray:
 def lost_warnings(lost: int, size: int) -> list[str]:
     """Return one line on the number of lost samples; an empty list if none was lost."""
     return [f"{lost} of {size} samples were lost on their way"] if lost else []
+
+
+def lost_objection(lost: int, size: int) -> str:
+    """Object if more than 5 % of the ``size`` samples of a record were lost."""
+    if lost <= LARGEST_LOST * size:
+        return ""
+    return f"{lost} of {size} samples were lost on their way, allowed is up to {LARGEST_LOST:.0%}"
+
+
+def too_many_lost(lost: np.ndarray, first: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return bool[n]: windows ``first`` to ``end`` (int[n]) of which more than 2 % is lost; ``lost`` is bool[n_rows]."""
+    count = np.concatenate([[0], np.cumsum(lost)])
+    return np.asarray(count[end] - count[first] > LARGEST_LOST_WITHIN * (end - first))
 
 
 def rms_of(rows: Rows) -> list[float]:

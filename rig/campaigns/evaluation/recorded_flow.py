@@ -4,15 +4,16 @@ import numpy as np
 
 from identification import SlowFlow, slow_flow
 from rig.bench import Bench
-from rig.campaigns.evaluation.lost_samples import bridged
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, too_many_lost
 from rig.campaigns.evaluation.vibrations import channels_of
 from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plant import PlantFacts
-from rig.tick.layout import FREQUENCY_CLAMPED, SAMPLE_LOST, SATURATED, SENSOR_AT_RANGE
+from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED, SENSOR_AT_RANGE
 
-__all__ = ["AT_VOLTAGE_LIMIT", "flagged", "recorded_flow"]
+__all__ = ["AT_VOLTAGE_LIMIT", "SAMPLES_LOST", "flagged", "recorded_flow"]
 
 AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
+SAMPLES_LOST = "samples were lost on their way"
 
 HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far its window reaches to either side of an instant
 
@@ -49,19 +50,21 @@ def recorded_flow(
 def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndarray]:
     """Return the unusable instants by reason, bool[n] each.
 
-    An instant is unusable if, within its window, the output, the frequency or a sensor was at a limit, or samples were lost.
+    An instant is unusable if, within its window, the output, the frequency or a sensor was at a limit, or more than 2 % of the
+    samples were lost; fewer are filled in.
     """
     half = HALF_WINDOW_PERIODS / flow.frequency_hz
     first, end = (
-        np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size) for side in (-1, 1)
+        np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size).astype(int)
+        for side in (-1, 1)
     )
     out = {}
     for reason, bit in (
         (AT_VOLTAGE_LIMIT, SATURATED),
         ("the frequency stood at an end of its window", FREQUENCY_CLAMPED),
         ("a sensor was near its range", SENSOR_AT_RANGE),
-        ("samples were lost on their way", SAMPLE_LOST),
     ):
         count = np.concatenate([[0], np.cumsum((rows["flags"] & bit) != 0)])
-        out[reason] = count[end.astype(int)] > count[first.astype(int)]
+        out[reason] = count[end] > count[first]
+    out[SAMPLES_LOST] = too_many_lost(lost_rows(rows), first, end)
     return out

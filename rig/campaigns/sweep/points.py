@@ -8,7 +8,7 @@ from controller import AmplitudeLaw
 from identification import ForceDropOut, IdentificationError, Transient, demodulate, force_drop_out
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
-from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of, too_many_lost
 from rig.campaigns.evaluation.point import PART, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
@@ -170,7 +170,7 @@ def _course(bench: Bench, plan: SweepPlan, rows: np.ndarray, transient: Transien
 def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
     """Return the fundamentals over time of recorded rows: every input without its skew, and the output as channel ``voltage``.
 
-    There are no instants where samples were lost. Raises `identification.IdentificationError` if no instant is left.
+    There are no instants where too many samples were lost. Raises `identification.IdentificationError` if no instant is left.
     """
     lost = lost_rows(rows)
     inputs = bridged(rows) if lost.any() else rows["inputs"]
@@ -187,16 +187,15 @@ def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
 
 
 def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float) -> Transient:
-    """Remove the instants within whose window samples were lost."""
+    """Remove the instants within whose window too many samples were lost."""
     if not lost.any():
         return transient
-    count = np.concatenate([[0], np.cumsum(lost)])
     half = 0.5 * transient.window_periods / transient.frequency_hz
     first, end = (
         np.clip(np.rint((transient.time_s + side * half) * sample_rate_hz), 0, lost.size).astype(int)
         for side in (-1, 1)
     )
-    keep = count[end] == count[first]
+    keep = ~too_many_lost(lost, first, end)
     return replace(
         transient,
         time_s=transient.time_s[keep],

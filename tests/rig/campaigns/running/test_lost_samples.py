@@ -7,8 +7,9 @@ import pytest
 
 import rig
 from rig.bench import Bench
-from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
+from rig.campaigns.evaluation.lost_samples import bridged, lost_objection, lost_rows, too_many_lost
 from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import RecordingError
 from rig.exchange.export import export_file
@@ -170,6 +171,73 @@ def test_too_many_lost_samples_refuse_the_point(monkeypatch):
         point = run.recording.points[0]
     assert not point["accepted"]
     assert "were lost, allowed is up to 5 %" in point["reason"]
+
+
+SLOW_FLOWS = {"backbone-short": {"levels_m": (6.965e-4, 1.066e-3)}, "continuous-backbone": {}}
+
+
+@pytest.fixture(scope="module")
+def slow_flows():
+    out = {}
+    for name, changed in SLOW_FLOWS.items():
+        with rig.run(shipped_plan(name, **changed), seed=1) as run:
+            out[name] = run.recording.points
+    return out
+
+
+def shipped_plan(name: str, **changed: object):
+    return load_plan(f"magnet-beam/{name}").model_copy(update=changed)
+
+
+@pytest.mark.parametrize("every", [500, 100])
+@pytest.mark.parametrize("name", SLOW_FLOWS)
+def test_a_slow_flow_with_scattered_lost_samples_is_the_one_without(monkeypatch, slow_flows, name, every):
+    lose(monkeypatch, [(k, k + 1) for k in range(every // 2, 200_000, every)])
+    with rig.run(shipped_plan(name, **SLOW_FLOWS[name]), seed=1) as run:
+        for point, sound in zip(run.recording.points, slow_flows[name], strict=True):
+            assert point["accepted"], point["reason"]
+            assert point["lost_samples"] > 0
+            assert point["modal_frequency_hz"] == pytest.approx(sound["modal_frequency_hz"], rel=1e-4)
+            assert point["damping_ratio"] == pytest.approx(sound["damping_ratio"], rel=1e-2)
+
+
+def test_too_many_lost_samples_refuse_a_point_of_a_slow_flow(monkeypatch):
+    lose(monkeypatch, [(k, k + 1) for k in range(1, 200_000, 19)])
+    with rig.run(shipped_plan("backbone-short", levels_m=(6.965e-4,), retries=0), seed=1) as run:
+        point = run.recording.points[0]
+    assert not point["accepted"]
+    assert (
+        point["reason"]
+        == f"{point['lost_samples']} of {rows_of(point)} samples were lost on their way, allowed is up to 5%"
+    )
+
+
+def rows_of(point) -> int:
+    return point["end_sample"] - point["first_sample"]
+
+
+def test_windows_of_which_more_than_2_percent_are_lost_are_told():
+    lost = np.zeros(1000, bool)
+    lost[[100, 101, 500]] = True
+    first, end = np.array([0, 0, 100, 400, 450, 501]), np.array([100, 101, 200, 500, 500, 502])
+    assert too_many_lost(lost, first, end).tolist() == [False] * 6
+    assert too_many_lost(lost, np.array([100, 100, 499]), np.array([199, 102, 501])).tolist() == [True, True, True]
+    assert lost_objection(50, 1000) == ""
+    assert lost_objection(51, 1000) == "51 of 1000 samples were lost on their way, allowed is up to 5%"
+
+
+def test_a_sweep_with_scattered_lost_samples_has_all_its_instants(monkeypatch):
+    plan = SweepPlan.model_validate(
+        {"bench": "magnet-beam", "start_hz": 22.0, "stop_hz": 27.0, "rate_hz_per_s": 2.0, "levels_v": [0.4]}
+    )
+    with rig.run(plan, seed=1) as run:
+        sound = run.sweeps()[0]
+    lose(monkeypatch, [(k, k + 1) for k in range(50, 100_000, 100)])
+    with rig.run(plan, seed=1) as run:
+        found, point = run.sweeps()[0], run.recording.points[0]
+    assert point["accepted"]
+    np.testing.assert_array_equal(found.time_s, sound.time_s)
+    np.testing.assert_allclose(np.abs(found.force), np.abs(sound.force), rtol=3e-3, atol=3e-4)
 
 
 def test_another_driver_than_the_bases_begins_without_its_options(tmp_path):
