@@ -239,6 +239,8 @@ class Point(Generic[Result]):
     """RMS of every channel without its mean, if no single frequency was evaluated."""
     lost_samples: int | None = None
     """Number of samples lost in transfer; None if nothing was recorded."""
+    continued_samples: int | None = None
+    """Number of samples at which the device went on by itself with the vibration; None if nothing was recorded."""
     misfit: float | None = None
     """Largest factor by which a channel does not fit the others; None if there was nothing to compare with."""
     misfit_channels: tuple[str, ...] = ()

@@ -10,7 +10,7 @@ import numpy as np
 from identification import Channel, PeriodicVibration, nonlinear_mode
 from identification.signals.fourier import vibration_in
 from rig.bench import Bench
-from rig.campaigns.evaluation.device_faults import DISTURBED, faults_text, why_disturbed
+from rig.campaigns.evaluation.device_faults import DISTURBED, DeviceFaults, why_disturbed
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.rows import Rows, phases
@@ -18,6 +18,7 @@ from rig.campaigns.planning.drive_shape import DriveShape
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
 from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome
+from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD, LARGEST_LOST
 
 __all__ = [
     "VOLTAGE",
@@ -50,7 +51,14 @@ WHY = {
 }
 
 SPOILT_BY_THE_DEVICE = {Outcome.NOT_SETTLED, Outcome.LOST_LOCK, Outcome.NOT_LOCKED, Outcome.OUTSIDE_WINDOW}
-"""Outcomes that held outputs or lost samples may explain."""
+"""Outcomes that late outputs or lost samples may explain."""
+
+ALLOWED = {
+    Outcome.OUTPUT_HELD: LARGEST_HELD,
+    Outcome.OUTPUT_CONTINUED: LARGEST_CONTINUED,
+    Outcome.SAMPLES_LOST: LARGEST_LOST,
+}
+"""Outcomes of records that were given up for late outputs or lost samples, and the part of the samples that may be such."""
 
 POLARITY_DEG = 60.0  # a larger phase error does not come from a settling time that is too short
 FEW_BITS = 20.0  # below this, quantisation may change the damping by a percent unless noise dithers it
@@ -64,18 +72,19 @@ def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -
 def failed_point(
     plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
 ) -> Point[Any]:
-    """Return a point that was not measured, with the reason: held outputs and lost samples before anything else.
+    """Return a point that was not measured, with the reason: late outputs and lost samples before anything else.
 
     ``at_start``: no lock was gained at the start voltage. ``locked``: a lock had been gained before, so the polarity is right.
     """
     code = Outcome(int(outcome["outcome"]))
     error, drift = math.degrees(float(outcome["mean_error_rad"])), float(outcome["drift"])
-    held, lost = int(outcome["held"]), int(outcome["lost"])
-    samples = int(outcome["end_sample"]) - int(outcome["first_sample"])
+    faults = DeviceFaults.of(outcome)
     why = WHY.get(code, code.name.lower()).format(longest=plan.settle_rule.longest_periods)
     if code is Outcome.DISTURBED:
-        why = why_disturbed(held, lost, samples)
-    elif code in SPOILT_BY_THE_DEVICE and (said := faults_text(held, lost, samples)):
+        why = why_disturbed(faults)
+    elif code in ALLOWED:
+        why = f"{faults.text()}; allowed is up to {ALLOWED[code]:.0%}"
+    elif code in SPOILT_BY_THE_DEVICE and (said := faults.text()):
         why = f"{why}; {said}"
     if at_start:
         why = f"no lock at the start voltage: {why}"
@@ -91,7 +100,7 @@ def failed_point(
     if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
         why += f"; {POLARITY_HINT}"
     failed = replace(planned_point(plan, target), settled=False, settle_periods=float(outcome["periods"]))
-    return failed.refused(why, Quality(code.name.lower().replace("_", "-")))
+    return failed.refused(why, Quality.REJECTED if code in ALLOWED else Quality(code.name.lower().replace("_", "-")))
 
 
 def _of_harmonics(distortion: float) -> str:

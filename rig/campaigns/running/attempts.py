@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.campaigns.evaluation.device_faults import faults_text, why_disturbed
+from rig.campaigns.evaluation.device_faults import DeviceFaults, why_disturbed
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.tick.sequencer.layout import RING, Drive, Outcome
@@ -64,13 +64,12 @@ def _attempt(entry: np.void, stored: StoredRows, sample_rate_hz: float, plays: b
 
 def _reason(entry: np.void, plays: bool) -> str:
     """Return why a record was refused."""
-    samples = int(entry["end_sample"]) - int(entry["first_sample"])
-    held, lost = int(entry["held"]), int(entry["lost"])
+    faults = DeviceFaults.of(entry)
     if int(entry["outcome"]) != Outcome.DISTURBED:
-        return faults_text(held, lost, samples, final=False)
+        return faults.text(final=False)
     error_deg, drift = math.degrees(float(entry["mean_error_rad"])), 100.0 * float(entry["drift"])
     course = f" (averaged phase error {error_deg:.2f} deg, amplitude drift {drift:.3g} %)" if not plays else ""
-    return why_disturbed(held, lost, samples, course, final=False)
+    return why_disturbed(faults, course, final=False)
 
 
 def attempt_at(point: Point[Any]) -> Attempt:

@@ -57,6 +57,9 @@ OVER = {
     Outcome.UNREACHABLE,
     Outcome.OUTSIDE_WINDOW,
     Outcome.NOT_LOCKED,
+    Outcome.OUTPUT_HELD,
+    Outcome.OUTPUT_CONTINUED,
+    Outcome.SAMPLES_LOST,
 }
 
 
@@ -297,7 +300,7 @@ class Execution:
         if first > 0 and not settled:
             first = self._point_begins(first - 1)
         outcomes = self.tick.outcomes[first:end]
-        return int(outcomes["held"].sum() + outcomes["lost"].sum())
+        return int(sum(outcomes[name].sum() for name in ("held", "continued", "lost")))
 
     def _measured(self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
         """Evaluate the points in rows that begin with sample ``first``.

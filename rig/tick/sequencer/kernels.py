@@ -36,7 +36,7 @@ from rig.tick.sequencer.layout import (
     OnFailure,
     Outcome,
 )
-from rig.tick.sequencer.repetition import measure_again, passing_fault
+from rig.tick.sequencer.repetition import measure_again, step_is_over, too_many_faults
 from vibrolock.compiled import Record, kernel
 
 COMPLETED = int(EndReason.COMPLETED)
@@ -48,6 +48,7 @@ NO_LOCK = int(EndReason.NO_LOCK)
 
 SKIPPED = int(Outcome.SKIPPED)
 INTERRUPTED = int(Outcome.INTERRUPTED)
+OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
 STOP = int(OnFailure.STOP)
 
 LONGEST_WAIT = 200.0  # periods of a ramp that waits for the phase; a loop that hunts at a level hunts more at the next
@@ -55,6 +56,7 @@ LONGEST_WAIT_FOR_HARMONICS = (
     300.0  # periods beyond its own that the start goes on until the harmonics loop has done its work
 )
 RETURN_PERIODS = 20.0  # of the way back to the last level with a lock
+FIRST_PERIODS = 0.01  # of a record, from which on its length in samples is foretold
 ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relative to the larger of its two levels
 
 
@@ -186,6 +188,7 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
     if segment.point != progress.point:
         progress.point = segment.point
         progress.tries_left = progress.retries
+        progress.faulty_before = math.inf
     entry.outcome = RUNNING
     entry.first_sample = progress.sample
     if is_ramp(segment.kind) and lock.state == LOST:
@@ -229,6 +232,14 @@ def has_returned(progress: Record, cycle: float) -> bool:
 def wants_harmonics(segment: Record, settling: Record, elapsed: float) -> bool:
     """Return whether a start or hold of so many ``elapsed`` periods goes on because the harmonics are not yet controlled."""
     return bool(settling.distortion > 1.0 and elapsed < segment.periods + LONGEST_WAIT_FOR_HARMONICS)
+
+
+@kernel
+def samples_of(segment: Record, samples: int, elapsed: float) -> float:
+    """Return how many samples a record will have: so many ``samples`` have taken ``elapsed`` periods."""
+    if segment.samples > 0:
+        return float(segment.samples)
+    return float(samples * max(segment.periods / max(elapsed, FIRST_PERIODS), 1.0))
 
 
 @kernel
@@ -322,9 +333,14 @@ def advance(
             give_up(progress, segments, outcomes, settling, lock, guard, verdict)
         return
     over = samples >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
-    if segment.kind == RECORD and progress.held + progress.lost > 0:
-        fault = passing_fault(progress, samples, over)
-        if fault != DONE and measure_again(progress, segments, outcomes, settling, fault):
+    if segment.kind == RECORD and progress.held + progress.continued + progress.lost > 0:
+        fault = too_many_faults(progress, samples_of(segment, samples, elapsed))
+        if fault != DONE:
+            if not measure_again(progress, segments, outcomes, settling, fault, True):
+                close_segment(progress, outcomes, settling, fault)
+                skip_point(progress, segments, outcomes, False)
+            return
+        if step_is_over(progress, over) and measure_again(progress, segments, outcomes, settling, OUTPUT_HELD):
             return
     if segment.kind == HOLD and wants_harmonics(segment, settling, elapsed):
         return

@@ -66,9 +66,11 @@ class Outcome(IntEnum):
     NOT_LOCKED = 10
     """The phase error was that of a lost lock during the whole time at the start voltage."""
     OUTPUT_HELD = 11
-    """The device held outputs that came too late; only of records that are measured again."""
+    """The device held outputs that came too late."""
     SAMPLES_LOST = 12
-    """Too many samples were lost on their way; only of records that are measured again."""
+    """Too many samples were lost on their way."""
+    OUTPUT_CONTINUED = 13
+    """The device went on by itself for too many samples, because outputs came too late."""
 
 
 class OnFailure(IntEnum):
@@ -180,6 +182,8 @@ PROGRESS = np.dtype(
         ("continued", "i8"),
         ("lost", "i8"),
         ("disturbed", "i8"),
+        ("faulty_share", "f8"),
+        ("faulty_before", "f8"),
         ("n_refused", "i8"),
         ("refused", REFUSED, (RING,)),
     ]
@@ -192,5 +196,6 @@ has judged it; ``returning``: the level goes back there because the lock was los
 
 ``retries``: how often a record is measured again at most; ``point``, ``tries_left``: how often the record of the present point
 still may be. ``held``, ``continued``, ``lost``: samples of the present segment with a held output, with a continued one, and
-lost ones; ``disturbed``: whether this sample is one of them. ``refused``: a ring of the records that were refused so far,
+lost ones; ``disturbed``: whether this sample is one of them; ``faulty_share``, ``faulty_before``: part of the samples that were
+such in the present record, and in the refused one before. ``refused``: a ring of the records that were refused so far,
 ``n_refused`` in all."""

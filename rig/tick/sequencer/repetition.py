@@ -1,4 +1,4 @@
-"""Compiled repetition of records that were refused for something that passes: held outputs, lost samples, a disturbance."""
+"""Compiled repetition of records that were refused for something that passes: late outputs, lost samples, a disturbance."""
 
 import math
 
@@ -7,37 +7,70 @@ import numpy as np
 from rig.tick.sequencer.layout import RING, Outcome
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["measure_again", "passing_fault"]
+__all__ = ["LARGEST_CONTINUED", "LARGEST_HELD", "LARGEST_LOST", "measure_again", "step_is_over", "too_many_faults"]
 
 PENDING = int(Outcome.PENDING)
 DONE = int(Outcome.DONE)
 OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
 SAMPLES_LOST = int(Outcome.SAMPLES_LOST)
-LARGEST_LOST = 0.05  # of a record's samples; with more lost, its evaluation refuses it
+OUTPUT_CONTINUED = int(Outcome.OUTPUT_CONTINUED)
+LARGEST_HELD = 0.05
+LARGEST_CONTINUED = 0.25
+LARGEST_LOST = 0.05
+"""Parts of a record's samples; with more, it is refused."""
+MOST_ATTEMPTS = 6  # at a record, beyond the retries of the plan, while fewer of its samples are faulty each time
 
 
 @kernel
-def passing_fault(progress: Record, samples: int, over: bool) -> int:
-    """Return why the present record is refused for a passing fault of the device, or DONE.
-
-    A held output refuses it as soon as the device follows its outputs again, lost samples at its end if they are too many.
-    """
-    if progress.held > 0 and (over or progress.disturbed == 0):
+def too_many_faults(progress: Record, samples: float) -> int:
+    """Return for which fault of the device a record that will have so many ``samples`` is certain to be refused, or DONE."""
+    if progress.held > LARGEST_HELD * samples:
         return OUTPUT_HELD
-    if over and progress.lost > LARGEST_LOST * samples:
+    if progress.continued > LARGEST_CONTINUED * samples:
+        return OUTPUT_CONTINUED
+    if progress.lost > LARGEST_LOST * samples:
         return SAMPLES_LOST
     return DONE
 
 
 @kernel
-def measure_again(progress: Record, segments: np.ndarray, outcomes: np.ndarray, settling: Record, outcome: int) -> bool:
+def step_is_over(progress: Record, over: bool) -> bool:
+    """Return whether an output was held in this record, which is a step in the sine, and the device follows again."""
+    return bool(progress.held > 0 and (over or progress.disturbed == 0))
+
+
+@kernel
+def may_try_again(progress: Record, is_certain: bool) -> bool:
+    """Return whether a refused record may be measured again: up to the plan's retries.
+
+    One with too many faults of the device (``is_certain``) may be tried more often while they become fewer.
+    """
+    if progress.tries_left > 0:
+        return True
+    gets_better = is_certain and progress.faulty_share < progress.faulty_before
+    return bool(gets_better and 0 < progress.retries < progress.tries_left + MOST_ATTEMPTS - 1)
+
+
+@kernel
+def measure_again(
+    progress: Record,
+    segments: np.ndarray,
+    outcomes: np.ndarray,
+    settling: Record,
+    outcome: int,
+    is_certain: bool = False,
+) -> bool:
     """Note a record that is refused for something that passes, and go back to where its point settles.
 
-    Returns False, and does nothing, if the record may not be measured again.
+    ``is_certain``: it has too many faults of the device. Returns False, and does nothing, if the record may not be measured
+    again.
     """
     segment = segments[progress.segment]
-    if segment.again < 0 or progress.tries_left < 1:
+    faults = progress.held + progress.continued + progress.lost
+    progress.faulty_share = faults / max(progress.sample - progress.start_sample, 1)
+    if segment.again < 0 or not may_try_again(progress, is_certain):
         return False
+    progress.faulty_before = progress.faulty_share
     entry = progress.refused[progress.n_refused % RING]
     entry.segment = progress.segment
     entry.outcome = outcome

@@ -8,7 +8,7 @@ from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.tick.layout import DEVICE_SHIFT, SAMPLE_LOST, recorded_row
 from tests.rig.campaigns.made_points import made_point
 
-COUNTERS = ("overload", "output_clipped", "output_held", *(f"counter_{n}" for n in range(3, 22)))
+COUNTERS = ("overload", "output_clipped", "output_held", "output_continued", *(f"counter_{n}" for n in range(4, 22)))
 
 
 def rows_with(flag: int, count: int, size: int = 1000) -> np.ndarray:
@@ -28,6 +28,19 @@ def test_a_point_with_more_than_a_twentieth_of_its_outputs_held_is_not_accepted(
         assert point.reason.startswith(
             "outputs came too late: held in 51 samples of 1000, `rig doctor --daq` recommends"
         )
+
+
+@pytest.mark.parametrize(("continued", "accepted"), [(0, True), (250, True), (251, False)])
+def test_outputs_that_the_device_continued_are_counted_and_spoil_a_point_above_a_quarter(
+    continued: int, accepted: bool
+) -> None:
+    point = with_device_remarks(made_point(), rows_with(1 << (DEVICE_SHIFT + 3), continued), COUNTERS)
+    assert point.accepted is accepted
+    assert point.continued_samples == continued
+    assert point.warnings == ()
+    if not accepted:
+        assert point.reason.startswith("outputs came too late: continued in 251 samples of 1000, ")
+        assert point.reason.endswith("; allowed is up to 25%")
 
 
 def test_a_point_that_failed_for_another_reason_keeps_it_behind_the_outputs_that_were_held() -> None:

@@ -170,7 +170,8 @@ def test_too_many_lost_samples_refuse_the_point(monkeypatch):
     with rig.run(plan_with(levels_v=(0.8,)), seed=1) as run:
         point = run.recording.points[0]
     assert not point["accepted"]
-    assert "were lost, allowed is up to 5 %" in point["reason"]
+    assert "were lost on their way" in point["reason"]
+    assert "allowed is up to 5%" in point["reason"]
 
 
 SLOW_FLOWS = {"backbone-short": {"levels_m": (6.965e-4, 1.066e-3)}, "continuous-backbone": {}}

@@ -436,6 +436,48 @@ def test_a_record_is_repeated_at_its_end_if_more_than_a_twentieth_was_lost(lost,
     assert walk.codes()[2] == ("PENDING" if again else "DONE")
 
 
+def test_a_record_is_given_up_as_soon_as_too_many_of_its_samples_are_certain():
+    """A record has 20 periods of 50 samples: 250 may be continued, 50 lost, and 50 held."""
+    for name, allowed, outcome in (
+        ("continued", 250, "OUTPUT_CONTINUED"),
+        ("lost", 50, "SAMPLES_LOST"),
+        ("held", 50, "OUTPUT_HELD"),
+    ):
+        walk = _recording(0, *_point(0, 1.0), *_point(1, 2.0)).go(2)
+        walk.progress[name] = allowed
+        walk.progress["disturbed"] = 1
+        walk.go(1)
+        assert walk.codes()[2] == "RUNNING"
+        walk.progress[name] = allowed + 3
+        walk.go(1)
+        assert walk.codes()[2:4] == [outcome, "RUNNING"]  # the next point begins
+        assert _refused(walk) == []
+
+
+def test_a_record_is_tried_beyond_its_retries_while_fewer_samples_are_faulty_up_to_six_times():
+    def attempts(*faulty):
+        walk = _recording(2, *_point(0, 1.0), *_point(1, 2.0))
+        for lost in faulty:
+            walk.go(2)
+            walk.progress["lost"] = lost
+            walk.go(1)
+            walk.settling["good_periods"] = RULE.settled_periods
+            walk.go(1)
+        return len(_refused(walk)) + 1, walk.codes()[2]
+
+    assert attempts(99, 99, 99) == (3, "SAMPLES_LOST")
+    assert attempts(99, 120, 98, 97, 97) == (5, "SAMPLES_LOST")
+    assert attempts(99, 98, 97, 96, 95, 94) == (6, "SAMPLES_LOST")
+    assert attempts(99, 98, 97, 96, 95, 10)[0] == 6
+
+
+def test_a_plan_without_retries_tries_nothing_again_however_much_better_it_became():
+    walk = _recording(0, *_point(0, 1.0), *_point(1, 2.0)).go(2)
+    walk.progress["lost"] = 60
+    walk.go(1)
+    assert _refused(walk) == []
+
+
 @pytest.mark.parametrize("outcome", ["NOT_SETTLED", "LOST_LOCK", "UNREACHABLE", "OUTSIDE_WINDOW"])
 def test_what_does_not_pass_is_not_repeated(outcome):
     skips = OnFailure.SKIP, OnFailure.SKIP
