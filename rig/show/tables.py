@@ -7,6 +7,7 @@ from typing import Any
 from rig.arming.run_facts import About, user_name
 from rig.campaigns.evaluation.point import point_name
 from rig.check.report import say
+from rig.daq import CONTINUED
 from rig.models.files.files import KINDS
 from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
@@ -43,7 +44,9 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
             f"what was accepted is kept; `rig resume {path}` measures the rest, with --plan PLAN.toml by a changed plan"
         )
     for name, count in summary["counters"].items():
-        if count:
+        if count and name == CONTINUED:
+            print(f"note: outputs came too late in {count} samples; the device went on with the vibration")
+        elif count:
             print(f"warning: {name.replace('_', ' ')}: {count} samples")
 
 
