@@ -53,8 +53,10 @@ class Hypotheses(Configured):
     """Standard deviation of the relative change of the modal frequency since the measurement, as temperature makes it."""
     damping_drift: float = Field(0.05, ge=0.0, le=1.0)
     """Standard deviation of the logarithm of the change of damping since the measurement."""
+    late_per_s: float = Field(0.0, ge=0.0, le=1000.0)
+    """Rate at which outputs come too late and the device goes on with their last period, 1/s."""
     held_per_s: float = Field(0.0, ge=0.0, le=1000.0)
-    """Rate of blocks whose output comes late and is held, 1/s, as `rig doctor` counts them."""
+    """The same of a device that cannot, and holds its output, 1/s, as `rig doctor` counts them."""
     lost_per_s: float = Field(0.0, ge=0.0, le=1000.0)
     """Rate of blocks of inputs that are lost, 1/s."""
 

@@ -288,7 +288,7 @@ class _Drawing:
     def _device(self) -> dict[str, Any]:
         """Return converter, latency and faults: a virtual bench's own, else as the measurement saw them."""
         bench, hypotheses = self.bench, self.hypotheses
-        faults = {"held_per_s": hypotheses.held_per_s, "lost_per_s": hypotheses.lost_per_s}
+        faults = {name: getattr(hypotheses, name) for name in ("late_per_s", "held_per_s", "lost_per_s")}
         if bench.driver.name == "virtual":
             own = VirtualDAQ(bench)
             converter = own.rig.converter.model_dump()

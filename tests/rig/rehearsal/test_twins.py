@@ -47,6 +47,12 @@ def test_everything_at_once_is_in_the_rig():
     assert twin.unknowns["gain_factor"] != 1.0
 
 
+def test_faults_of_the_device_are_those_that_are_supposed():
+    faults = {"late_per_s": 0.5, "held_per_s": 0.2, "lost_per_s": 0.1}
+    options = draw(1, Hypotheses(**faults)).bench.driver.options
+    assert {name: rate for name, rate in options["faults"].items() if rate} == faults
+
+
 def test_properties_come_as_often_as_they_are_probable():
     drawn = [draw(n).unknowns for n in range(200)]
     share = {name: np.mean([one[name] != 0.0 for one in drawn]) for name in ("shift", "joint_shift", "stop_gap")}
