@@ -13,6 +13,7 @@ from rig.emulator.states import Life
 from rig.wire.link import Link
 from rig.wire.messages import (
     HEARTBEATS_HZ,
+    LOWEST_VERSION,
     Answer,
     Command,
     DeviceFlag,
@@ -22,6 +23,7 @@ from rig.wire.messages import (
     Message,
     Output,
     Parameter,
+    Readback,
     Request,
     Samples,
     Status,
@@ -31,6 +33,8 @@ from rig.wire.messages import (
 __all__ = ["Device"]
 
 BEAT_S = 1.0 / HEARTBEATS_HZ
+COUNTED = {DeviceFlag.OUTPUT_HELD: "held_blocks", DeviceFlag.OUTPUT_CONTINUED: "continued_blocks"}
+MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
 
 
 class Device:
@@ -50,6 +54,7 @@ class Device:
         """Counts of events since the device was switched on."""
         self._parameters = Parameters(carried(words, plant, link), self.faults)
         self._sampling = Sampling(plant, lockstep=lockstep)
+        self._speak()
         self._life = Life(self._sampling, self._parameters, self.counts, self._beat)
         self._sender = FaultySender(link, self.faults)
         self._beat_s = -math.inf
@@ -136,7 +141,9 @@ class Device:
             case Command.SET if self._sampling.on:
                 return Status.WRONG_STATE, int(life.state)
             case Command.SET:
-                return parameters.set(request.parameter, request.item, request.value)
+                answer = parameters.set(request.parameter, request.item, request.value)
+                self._speak()
+                return answer
             case Command.START:
                 return self._start(now_s)
             case Command.STOP:
@@ -149,6 +156,14 @@ class Device:
             case Command.CLEAR:
                 return life.clear(now_s)
         return Status.UNKNOWN, 0
+
+    def _speak(self) -> None:
+        """Speak the version that was set; the definition of the wire's messages is that of the version."""
+        version, told = self._parameters.value(Parameter.VERSION), self.words[Parameter.LAYOUT_CRC, 0]
+        if version != self.link.version:
+            is_true = told == self.link.layout_crc
+            self.link.speak(version)
+            self.words[Parameter.LAYOUT_CRC, 0] = self.link.layout_crc if is_true else told
 
     def _start(self, now_s: float) -> tuple[Status, int]:
         if self.state is DeviceState.IDLE:
@@ -187,6 +202,7 @@ class Device:
         self._life.begin_anew()
         self._parameters.begin_anew()
         self.words[Parameter.BOOT, 0] = (self.words[Parameter.BOOT, 0] + 1) & 0xFFFFFFFF
+        self._speak()
         self._last = None
         self._reset_s = math.inf
         self._beat(now_s)
@@ -220,18 +236,20 @@ class Device:
             self.counts["stalled_us"] += round(1e6 * late_s)
 
     def _measure(self, now_s: float) -> None:
-        flags = self._life.latch
-        first, readings, seen, held = self._sampling.measure()
-        if held:
-            flags |= DeviceFlag.OUTPUT_HELD
-            self.counts["held_blocks"] += 1
+        latch = self._life.latch
+        first, readings, flags, put_out = self._sampling.measure()
+        for flag, name in COUNTED.items():
+            if flags & flag:
+                self.counts[name] += 1
         if self.faults.channels_sent is not None:
             readings = readings[:, : self.faults.channels_sent]
         number = self._sampling.blocks
         clock_us = round(1e6 * now_s) & 0xFFFFFFFFFFFFFFFF
         sequence = (number - 1) & 0xFFFF
-        samples = Samples(first, readings, flags | seen, self._sender.dropped_samples, clock_us, sequence)
-        self._sender.send_samples(samples, number, now_s)
+        samples = Samples(first, readings, flags | latch, self._sender.dropped_samples, clock_us, sequence)
+        reads_back = self.link.version > LOWEST_VERSION and flags & MISSED
+        block = (Readback(first, put_out, sequence), samples) if reads_back else (samples,)
+        self._sender.send_block(block, number, now_s)
 
     def _beat(self, now_s: float) -> None:
         self._beat_s = now_s

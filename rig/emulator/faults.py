@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from rig.errors import DaqError
 from rig.wire.link import Link
-from rig.wire.messages import Message, Samples
+from rig.wire.messages import Message, Readback, Samples
 
-__all__ = ["Faults", "FaultySender"]
+__all__ = ["Block", "Faults", "FaultySender"]
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Faults:
     """Faults of a device; none by default. Blocks count from 1, and 0 in ``..._every`` means never."""
 
     version: int | None = None
-    """The only version of the protocol that it speaks."""
+    """The only version of the protocol that it speaks; one of version 1 goes on with nothing."""
     channel_names: tuple[str, ...] | None = None
     """Channel names that it reports instead of the true ones."""
     channels_sent: int | None = None
@@ -41,13 +41,17 @@ class Faults:
     """By how much they are late, s."""
 
 
+Block = tuple[Samples] | tuple[Readback, Samples]
+"""The messages of a block of samples."""
+
+
 class FaultySender:
     """Sends over a link, with faults. Messages that the link refuses are dropped; lost samples are counted."""
 
     def __init__(self, link: Link, faults: Faults) -> None:
         self._link, self._faults = link, faults
         self.dropped_samples = 0
-        self._kept: Samples | None = None
+        self._kept: Block | tuple[()] = ()
         self._late: deque[tuple[float, Message]] = deque()
         self._silent_s = math.inf
 
@@ -59,7 +63,7 @@ class FaultySender:
     def start(self, now_s: float) -> None:
         """Begin a new stream."""
         self.dropped_samples = 0
-        self._kept = None
+        self._kept = ()
         self._late.clear()
         silent = self._faults.silent_after_s
         self._silent_s = now_s + silent if silent is not None else math.inf
@@ -77,7 +81,7 @@ class FaultySender:
         try:
             self._link.send(message)
         except DaqError:
-            if isinstance(message, Samples):
+            if isinstance(message, Samples | Readback):
                 self.dropped_samples += message.counts.shape[0]
             return False
         return True
@@ -87,20 +91,24 @@ class FaultySender:
         while self._late and self._late[0][0] <= now_s:
             self._send(self._late.popleft()[1])
 
-    def send_samples(self, samples: Samples, number: int, now_s: float) -> None:
+    def send_block(self, block: Block, number: int, now_s: float) -> None:
         """Send block ``number``, counted from 1, with its faults."""
         faults = self._faults
         if faults.drop_every and number % faults.drop_every < faults.drop_burst and number >= faults.drop_every:
             return
         if faults.late_every and number % faults.late_every == 0:
-            self._late.append((now_s + faults.late_s, samples))
+            self._late.extend((now_s + faults.late_s, message) for message in block)
             return
         if faults.reorder_every and number % faults.reorder_every == 0:
-            self._kept = samples
+            self._kept = block
             return
-        self.send(samples, now_s)
-        if self._kept is not None:
-            kept, self._kept = self._kept, None
-            self.send(kept, now_s)
+        self._send_whole(block, now_s)
+        if self._kept:
+            kept, self._kept = self._kept, ()
+            self._send_whole(kept, now_s)
         if faults.repeat_every and number % faults.repeat_every == 0:
-            self.send(samples, now_s)
+            self._send_whole(block, now_s)
+
+    def _send_whole(self, block: Block, now_s: float) -> None:
+        """Send a block, or as much of it as the link takes."""
+        all(self.send(message, now_s) for message in block)

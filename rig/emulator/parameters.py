@@ -3,7 +3,7 @@
 from rig.emulator.faults import Faults
 from rig.emulator.plant import Plant
 from rig.wire.link import Link
-from rig.wire.messages import VERSION, Parameter, Status
+from rig.wire.messages import LOWEST_VERSION, VERSION, Parameter, Status
 from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_words
 
 __all__ = ["SETTINGS", "Parameters", "Words", "carried", "described"]
@@ -15,6 +15,7 @@ LARGEST_BLOCK = 1000
 LARGEST_QUEUE = 64
 SHORTEST_WATCHDOG_US = 1000
 LONGEST_WATCHDOG_US = 4_000_000_000
+LONGEST_PERIOD = 16384
 
 SETTINGS = {
     Parameter.VERSION: (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION),
@@ -47,8 +48,10 @@ def described(
         for number, word in enumerate(text_words(text)):
             put(parameter, word, NAME_WORDS * channel + number)
 
-    for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION, Parameter.VERSION):
-        put(parameter, VERSION)
+    for parameter in (Parameter.LOWEST_VERSION, Parameter.VERSION):
+        put(parameter, LOWEST_VERSION)
+    put(Parameter.HIGHEST_VERSION, VERSION)
+    put(Parameter.LONGEST_PERIOD, LONGEST_PERIOD)
     put_text(Parameter.MODEL, model)
     put_text(Parameter.FIRMWARE, firmware)
     put_text(Parameter.SERIAL_NUMBER, serial_number)
@@ -81,9 +84,10 @@ def described(
 
 
 def carried(words: Words, plant: Plant, link: Link) -> Words:
-    """The words of a device whose blocks are no larger than its wire carries."""
+    """The words of a device whose blocks and versions are no larger than its wire carries."""
     carried_block = link.largest_block_of(len(plant.names), plant.bits)
-    return {**words, (Parameter.LARGEST_BLOCK, 0): min(words[Parameter.LARGEST_BLOCK, 0], carried_block)}
+    most = {Parameter.LARGEST_BLOCK: carried_block, Parameter.HIGHEST_VERSION: link.highest_version}
+    return {**words, **{(int(one), 0): min(words[one, 0], largest) for one, largest in most.items()}}
 
 
 class Parameters:
@@ -92,8 +96,10 @@ class Parameters:
     def __init__(self, words: Words, faults: Faults) -> None:
         self.words = dict(words)
         if faults.version is not None:
-            for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION):
+            for parameter in (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION, Parameter.VERSION):
                 self.words[parameter, 0] = faults.version
+            if faults.version == LOWEST_VERSION:
+                del self.words[Parameter.LONGEST_PERIOD, 0]
         for channel, name in enumerate(faults.channel_names or ()):
             for number, word in enumerate(text_words(name)):
                 self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word

@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.emulator.outputs import Converter, OutputQueue
 from rig.emulator.plant import Plant
-from rig.wire.messages import Output
+from rig.wire.messages import DeviceFlag, Output
 
 __all__ = ["Measured", "Sampling"]
 
@@ -20,10 +20,10 @@ class Measured(NamedTuple):
     first: int
     readings: np.ndarray
     """Counts [n, n_channels]."""
-    seen: int
-    """`DeviceFlag` bits of the converters."""
-    held: bool
-    """Whether an output was held because it had not come."""
+    flags: int
+    """`DeviceFlag` bits of the converters, and of outputs that had not come."""
+    put_out: np.ndarray
+    """Counts [n] that the output converter has put out, int64."""
 
 
 class Sampling:
@@ -47,7 +47,7 @@ class Sampling:
         self._block = self._queue = 1
         self._origin_s = 0.0
         self._put_out = 0
-        self._held = False
+        self._missing = 0
         self._converter = Converter(plant.output_range_v)
         self._at_rest = False
 
@@ -57,15 +57,15 @@ class Sampling:
             self.plant.reset()
         self._at_rest = True
 
-    def start(self, rate_hz: float, block: int, queue: int, now_s: float) -> None:
+    def start(self, rate_hz: float, block: int, queue: int, longest_period: int, now_s: float) -> None:
         """Begin with sample 0 now, at 0 V."""
         self._rate_hz, self._block, self._queue = rate_hz, block, queue
-        self._outputs = OutputQueue(block, queue)
+        self._outputs = OutputQueue(block, queue, longest_period)
         self._converter = Converter(self.plant.output_range_v)
         self._volts = np.zeros(block)
         self._origin_s = now_s
         self.measured = self.blocks = self._put_out = 0
-        self._has_output = self._held = False
+        self._has_output, self._missing = False, 0
         self.on = True
 
     def stop(self) -> None:
@@ -85,7 +85,7 @@ class Sampling:
         """Keep outputs until they are due; how many are in time, None for a malformed block."""
         present = self._present(now_s)
         self._put_out_before(present)  # which frees their places for outputs that are due later
-        in_time = self._outputs.put(output.first, output.counts, present)
+        in_time = self._outputs.put(output, present)
         self._has_output |= in_time is not None
         return in_time
 
@@ -98,7 +98,9 @@ class Sampling:
     def let_outputs_through(self, now_s: float) -> None:
         """Pass outputs from the present sample on."""
         if self.on:
-            self._put_out_before(self._present(now_s))
+            present = self._present(now_s)
+            self._put_out_before(present)
+            self._outputs.forget(present)
         self._converter.open()
 
     def bring_down(self, at_s: float, ramp_s: float) -> None:
@@ -121,10 +123,13 @@ class Sampling:
         end = min(end, block_first + self._block)
         if end <= begun:
             return
-        counts, there = self._outputs.take(begun, end)
-        volts, held = self._converter.put_out(begun, counts * self.plant.output_v_per_count, there)
+        due = self._outputs.take(begun, end)
+        volts = due.counts * self.plant.output_v_per_count
+        volts = self._converter.put_out(begun, volts, due.has_come | due.continued)
         self._volts[begun - block_first : end - block_first] = volts
-        self._held |= held and self._has_output and block_first >= self._queue * self._block
+        if self._converter.is_open and self._has_output and block_first >= self._queue * self._block:
+            held = not (due.has_come | due.continued).all()
+            self._missing |= DeviceFlag.OUTPUT_HELD * held | DeviceFlag.OUTPUT_CONTINUED * bool(due.continued.any())
         self._put_out = end
 
     def stand_still(self, now_s: float) -> float:
@@ -155,11 +160,18 @@ class Sampling:
         """Put out the rest of the block under way, and measure it."""
         first, block = self.measured, self._block
         self._put_out_before(first + block)
-        volts, held = self._volts, self._held
-        self._volts, self._held = np.zeros(block), False
+        volts, missing = self._volts, self._missing
+        self._volts, self._missing = np.zeros(block), 0
         self._at_rest = False
         readings, seen = self.plant.step(volts)
         self.output_v = volts
         self.measured = first + block
         self.blocks += 1
-        return Measured(first, readings, seen, held)
+        return Measured(first, readings, seen | missing, self._counts_of(volts))
+
+    def _counts_of(self, volts: np.ndarray) -> np.ndarray:
+        """What the converter makes of voltages: the nearest counts within its range."""
+        step_v, most = self.plant.output_v_per_count, 2 ** (self.plant.bits - 1) - 1
+        largest = round(self.plant.output_range_v / step_v)
+        counts = np.clip(np.rint(volts / step_v), -min(largest, most + 1), min(largest, most))
+        return np.asarray(counts, np.int64)

@@ -61,7 +61,8 @@ class Life:
         value = self._parameters.value
         self._watchdog_s = 1e-6 * value(Parameter.WATCHDOG_US)
         rate_hz = 1e-3 * value(Parameter.RATE_MHZ)
-        self._sampling.start(rate_hz, value(Parameter.BLOCK), value(Parameter.QUEUE), now_s)
+        longest_period = self._parameters.words.get((Parameter.LONGEST_PERIOD, 0), 0)
+        self._sampling.start(rate_hz, value(Parameter.BLOCK), value(Parameter.QUEUE), longest_period, now_s)
         self._become(DeviceState.RUNNING, now_s)
         return Status.DONE, 0
 

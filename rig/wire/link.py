@@ -3,9 +3,12 @@
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
-from rig.wire.messages import Message, Stream
+from rig.wire.messages import LOWEST_VERSION, VERSION, Message, Stream
 
-__all__ = ["Link", "Load"]
+__all__ = ["LATE_SHARE", "Link", "Load"]
+
+LATE_SHARE = 0.05
+"""Share of the blocks that are counted as late in the load of a wire, each with its readback (version 2)."""
 
 
 class Load(NamedTuple):
@@ -36,12 +39,23 @@ class Link(ABC):
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.version = LOWEST_VERSION
+        """Version of the protocol in use."""
         self.counters: dict[str, int] = {}
         """Faults so far, by name; whole numbers that only grow."""
 
     @abstractmethod
     def open(self) -> None:
         """Open the port; nothing is sent."""
+
+    def speak(self, version: int) -> None:
+        """Use a version of the protocol from now on; it is agreed on before `configure`."""
+        self.version = version
+
+    @property
+    def highest_version(self) -> int:
+        """Latest version that this wire can carry."""
+        return VERSION
 
     @abstractmethod
     def configure(self, stream: Stream) -> None:
@@ -71,7 +85,7 @@ class Link(ABC):
 
     @property
     def layout_crc(self) -> int:
-        """CRC-32 of the definition that both ends must share; 0 if the wire has none."""
+        """CRC-32 of the definition that both ends must share, in the version in use; 0 if the wire has none."""
         return 0
 
     @abstractmethod

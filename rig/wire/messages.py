@@ -13,6 +13,7 @@ import numpy as np
 __all__ = [
     "ARM_KEY",
     "HEARTBEATS_HZ",
+    "LOWEST_VERSION",
     "VERSION",
     "Answer",
     "Command",
@@ -23,14 +24,15 @@ __all__ = [
     "Message",
     "Output",
     "Parameter",
+    "Readback",
     "Request",
     "Samples",
     "Status",
     "Stream",
 ]
 
-VERSION = 1
-"""Version of the protocol that this package speaks."""
+LOWEST_VERSION, VERSION = 1, 2
+"""Oldest and latest version of the protocol that this package speaks."""
 
 HEARTBEATS_HZ = 10
 """Heartbeats per second; every change of state or of what has latched sends a further one."""
@@ -98,6 +100,8 @@ class DeviceFlag(IntFlag):
     """The watchdog has brought the output to 0 V, and latched."""
     EMERGENCY_STOP = 16
     """The emergency stop has brought the output to 0 V, and latched."""
+    OUTPUT_CONTINUED = 32
+    """An output did not arrive in time: the device went on with the last period (version 2)."""
 
 
 class Parameter(IntEnum):
@@ -146,6 +150,8 @@ class Parameter(IntEnum):
     """Delay behind the first channel, by channel."""
     FILTER_DELAY_S = 40
     """`FILTER_DELAY_NS` to the last bit, for a device in software: a double, its low word in item 0, its high one in item 1."""
+    LONGEST_PERIOD = 41
+    """Longest period of outputs that the device can go on with, samples (version 2); 0 for none."""
     RATE_MHZ = 48
     """Set: sample rate, millihertz."""
     BLOCK = 49
@@ -208,6 +214,24 @@ class Output(NamedTuple):
     """int16 or int32 [n]."""
     sequence: int = 0
     """Number of the block on the wire, wrapping."""
+    period: int = 0
+    """Period of the outputs, in 1/65536 sample; 0 for none, and in version 1."""
+    ramp: int = 0
+    """Samples from the end of the block until a ramp to 0 V is over; 0 where there is none, and in version 1."""
+
+
+class Readback(NamedTuple):
+    """Device to host, in version 2: what was put out at the instants of a block that was held or continued.
+
+    It goes immediately before the `Samples` of that block.
+    """
+
+    first: int
+    """Index of the first instant, as in `Samples`."""
+    counts: np.ndarray
+    """int16 or int32 [n]."""
+    sequence: int = 0
+    """Number of the block on the wire, wrapping."""
 
 
 class Heartbeat(NamedTuple):
@@ -234,7 +258,7 @@ class EmergencyStop(NamedTuple):
     reason: int = 0
 
 
-Message = Request | Answer | Samples | Output | Heartbeat | EmergencyStop
+Message = Request | Answer | Samples | Output | Readback | Heartbeat | EmergencyStop
 
 
 class Stream(NamedTuple):

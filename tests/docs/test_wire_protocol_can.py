@@ -13,12 +13,12 @@ from rig.wire.can.frames import Frame, frame_seconds
 from rig.wire.can.layout import compile_text
 from rig.wire.can.link import bus_load
 from rig.wire.can.protocol import FrameKind, definition, protocol, shape_of
-from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request, Samples, Stream
+from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Readback, Request, Samples, Stream
 from tests.docs.pages import ROOT, blocks
 
 PAGE = ROOT / "docs" / "reference" / "wire-protocol-can.md"
 MESSAGES: dict[str, Any] = {
-    kind.__name__: kind for kind in (Answer, EmergencyStop, Heartbeat, Output, Request, Samples)
+    kind.__name__: kind for kind in (Answer, EmergencyStop, Heartbeat, Output, Readback, Request, Samples)
 }
 
 
@@ -35,12 +35,13 @@ def table(heading: str) -> list[list[str]]:
     return out
 
 
-def known_answers() -> list[tuple[str, str, list[Frame]]]:
+def known_answers(version: int) -> list[tuple[str, str, list[Frame]]]:
     out: list[tuple[str, str, list[Frame]]] = []
-    for bus, message, identifier, data in table("bus | message | identifier | data"):
+    head = "bus" if version == 1 else f"bus of version {version}"
+    for bus, message, identifier, data in table(f"{head} | message | identifier | data"):
         if bus:
             out.append((bus, message.strip("`"), []))
-        large = out[-1][0] == "FD" and int(identifier, 16) >= 0x100
+        large = out[-1][0] == "FD" and int(identifier, 16) >= 0x60
         out[-1][2].append(Frame(int(identifier, 16), bytes.fromhex(data), large))
     return out
 
@@ -50,14 +51,18 @@ def said(text: str) -> Any:
     return message._replace(counts=np.array(message.counts, np.int16)) if hasattr(message, "counts") else message
 
 
-@pytest.mark.parametrize("bus", ["classical", "FD"])
-def test_the_known_answers_are_sent_and_understood(bus: str) -> None:
+@pytest.mark.parametrize(
+    ("bus", "version", "n"), [("classical", 1, 1), ("FD", 1, 2), ("classical", 2, 4), ("FD", 2, 2)]
+)
+def test_the_known_answers_are_sent_and_understood(bus: str, version: int, n: int) -> None:
     fd = bus == "FD"
     device, host = (CanCodec(protocol(4, fd, 1), end, {}) for end in (True, False))
     for end in (device, host):
-        end.configure(Stream(4, 2 if fd else 1, 1000.0))
-    rows = [(message, frames) for name, message, frames in known_answers() if name == bus]
-    assert len(rows) == 9
+        end.speak(version)
+        end.configure(Stream(4, n, 1000.0))
+    host._here = 65536 if version == 2 and not fd else 0
+    rows = [(message, frames) for name, message, frames in known_answers(version) if name == bus]
+    assert len(rows) == {("classical", 1): 9, ("FD", 1): 9, ("classical", 2): 5, ("FD", 2): 7}[bus, version]
     for text, frames in rows:
         message = said(text)
         sender, receiver = (host, device) if isinstance(message, Request | Output | EmergencyStop) else (device, host)
@@ -67,18 +72,20 @@ def test_the_known_answers_are_sent_and_understood(bus: str) -> None:
         if hasattr(message, "counts"):
             np.testing.assert_array_equal(got.counts, message.counts)
             assert got.first == message.first
+            assert got[3:] == message[3:] or isinstance(got, Samples)
         else:
             assert got == message
 
 
 def test_the_loads_are_those_that_the_driver_computes() -> None:
-    rows = table("bus | rate, Hz | n | load")
+    rows = table("bus | rate, Hz | n | load, version 1 | load, version 2")
     assert len(rows) >= 20
-    for bus, rate_hz, n, load in rows:
+    for bus, rate_hz, n, *loads in rows:
         fd = "/" in bus.removesuffix(" Mbit/s")
         data_bit_rate_hz = 1e6 * float(bus.removesuffix(" Mbit/s").split("/")[-1]) if fd else 0.0
-        found = bus_load(shape_of(4, fd), Stream(4, int(n), float(rate_hz)), 1e6, data_bit_rate_hz)
-        assert f"{found.share:.0%}" == load
+        for version, load in zip((1, 2), loads, strict=True):
+            found = bus_load(shape_of(4, fd), Stream(4, int(n), float(rate_hz)), 1e6, data_bit_rate_hz, version)
+            assert f"{found.share:.0%}" == load
 
 
 def test_the_formulas_for_frames_are_those_in_use() -> None:
@@ -91,9 +98,9 @@ def test_the_formulas_for_frames_are_those_in_use() -> None:
 
 def test_the_crc_is_that_of_the_lines_which_the_page_describes() -> None:
     for name, crc in table("definition | CRC-32"):
-        found = re.fullmatch(r"(\d+) channels, (CAN FD|classical)", name)
+        found = re.fullmatch(r"(\d+) channels, (CAN FD|classical), version (\d)", name)
         assert found is not None
-        layout = compile_text(definition(int(found[1]), found[2] == "CAN FD"))
+        layout = compile_text(definition(int(found[1]), found[2] == "CAN FD", int(found[3])))
         lines = [one.canonical for one in sorted(layout.messages.values(), key=lambda one: one.frame_id)]
         assert f"{zlib.crc32(chr(10).join(lines).encode()):08x}" == crc == f"{layout.crc:08x}"
     shown = next(block for block in blocks(PAGE) if " EmergencyStop " in block.text).text.splitlines()
@@ -118,5 +125,7 @@ def test_identifiers_lengths_and_largest_blocks_are_those_of_the_definition() ->
 
 def test_the_shipped_files_that_the_page_names_are_there() -> None:
     folder = Path(ROOT / "rig" / "wire" / "can")
-    assert {path.name for path in folder.glob("*.dbc")} == {"vibrolock-4-fd.dbc", "vibrolock-4-classical.dbc"}
+    assert {path.name for path in folder.glob("*.dbc")} == {
+        f"vibrolock-4-{bus}{version}.dbc" for bus in ("fd", "classical") for version in ("", "-v2")
+    }
     assert all(path.name in PAGE.read_text(encoding="utf-8") for path in folder.glob("*.dbc"))

@@ -7,7 +7,7 @@ from rig.emulator.parameters import described
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import Frame
 from rig.wire.link import Link, Load
-from rig.wire.messages import Message, Output, Parameter, Samples, Stream
+from rig.wire.messages import Message, Output, Parameter, Readback, Samples, Stream
 from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame
 from tests.firmware.events import BEGIN_US, BOOT, SERIAL, Choice, Event, Kind, frame_of, of_frame, protocol_of
@@ -34,6 +34,10 @@ class SerialEnd(Link):
         self._codec = Codec()
         self._reader = FrameReader(self._codec, self.counters)
 
+    def speak(self, version: int) -> None:
+        super().speak(version)
+        self._codec.version = version
+
     def configure(self, stream: Stream) -> None:
         self._codec.configure(stream)
         self._reader.configure(stream)
@@ -46,7 +50,7 @@ class SerialEnd(Link):
 
     def _encoded(self, message: Message) -> list[Event]:
         data = frame(self._codec.encode(message))
-        lead = b"" if isinstance(message, Samples | Output) else b"\0"
+        lead = b"" if isinstance(message, Samples | Output | Readback) else b"\0"
         return [Event(self.now_us, Kind.BYTES, lead + data)]
 
     def feed(self, data: bytes) -> list[Message]:
@@ -74,6 +78,10 @@ class CanEnd(SerialEnd):
         self._protocol = protocol_of(n_channels, fd, node)
         self._can_codec = CanCodec(self._protocol, True, self.counters)
 
+    def speak(self, version: int) -> None:
+        super().speak(version)
+        self._can_codec.speak(version)
+
     def configure(self, stream: Stream) -> None:
         self._can_codec.configure(stream)
 
@@ -89,7 +97,7 @@ class CanEnd(SerialEnd):
 
     @property
     def layout_crc(self) -> int:
-        return self._protocol.layout.crc
+        return self._can_codec.protocol.layout.crc
 
 
 class PythonDevice:
@@ -110,6 +118,8 @@ class PythonDevice:
             layout_crc=self.link.layout_crc,
             boot=BOOT,
         )
+        words[Parameter.HIGHEST_VERSION, 0] = 1  # what the firmware speaks
+        del words[Parameter.LONGEST_PERIOD, 0]
         words[Parameter.LOWEST_RATE_MHZ, 0] = choice.lowest_rate_mhz
         words[Parameter.SHORTEST_WATCHDOG_US, 0] = choice.shortest_watchdog_us
         words[Parameter.LONGEST_WATCHDOG_US, 0] = choice.longest_watchdog_us

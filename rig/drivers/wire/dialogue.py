@@ -12,6 +12,7 @@ from rig.wire.messages import (
     DeviceState,
     Heartbeat,
     Parameter,
+    Readback,
     Request,
     Samples,
     Status,
@@ -53,7 +54,7 @@ class Dialogue:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self.link = link
         self.clock = clock
-        self.early: deque[Samples | Heartbeat] = deque(maxlen=WAITING_BLOCKS)
+        self.early: deque[Samples | Readback | Heartbeat] = deque(maxlen=WAITING_BLOCKS)
         """Stream messages that arrived while an answer was awaited."""
         self.retries = 0
         self.stray_answers = 0
@@ -101,13 +102,13 @@ class Dialogue:
                 if message[0] == request.number and message[2:4] == request[2:4]:
                     return message
                 self.note_stray(message)
-            elif isinstance(message, Samples | Heartbeat):
+            elif isinstance(message, Samples | Readback | Heartbeat):
                 self.early.append(message)
         return None
 
     def forget_beats(self) -> None:
         """Drop the heartbeats that were kept; blocks stay."""
-        kept = [message for message in self.early if isinstance(message, Samples)]
+        kept = [message for message in self.early if not isinstance(message, Heartbeat)]
         self.early.clear()
         self.early.extend(kept)
 

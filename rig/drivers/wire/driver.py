@@ -91,6 +91,8 @@ class WireDAQ(DAQ):
             "serial_number": facts.serial_number,
             "boot": f"{facts.boot:08x}",
             "simulated": "yes" if facts.simulated else "no",
+            "protocol": str(facts.version),
+            "longest_period": str(facts.longest_period),
         }
 
     @property
@@ -156,7 +158,7 @@ class WireDAQ(DAQ):
         """Samples by device flag, then what was lost, repeated or damaged on the way."""
         streaming, connection = self._streaming, self._connection
         out = dict(streaming.flag_counts) if streaming else dict.fromkeys(FLAG_NAMES, 0)
-        for name in ("lost_samples", "repeated_blocks", "misplaced_blocks"):
+        for name in ("lost_samples", "repeated_blocks", "misplaced_blocks", "missing_readbacks"):
             out[name] = getattr(streaming.incoming, name) if streaming else 0
         out["dropped_by_device"] = streaming.incoming.dropped if streaming else 0
         if connection is not None:
@@ -184,7 +186,7 @@ class WireDAQ(DAQ):
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
         assert self._streaming is not None
-        self._streaming.exchange(voltages, inputs, self.flags)
+        self._streaming.exchange(voltages, self.continuation, inputs, self.flags, self.put_out)
 
     def emergency_stop(self, reason: int = 0) -> None:
         """Make the device drop its output to 0 V and latch. Sent three times, because it is not acknowledged."""

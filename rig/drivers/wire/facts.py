@@ -7,7 +7,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqMismatch, DaqProtocol
-from rig.wire.messages import VERSION, Command, Parameter
+from rig.wire.messages import LOWEST_VERSION, Command, Parameter
 from rig.wire.parameter_words import as_double
 
 __all__ = ["DeviceFacts", "compare", "negotiate", "read_facts", "remarks_on"]
@@ -48,17 +48,24 @@ class DeviceFacts:
     """Shortest and longest."""
     filter_delay_s: float
     layout_crc: int
+    version: int
+    """Version of the protocol in use."""
+    longest_period: int
+    """Longest period of outputs that the device can go on with, samples; 0 for none."""
 
 
 def negotiate(dialogue: Dialogue) -> None:
-    """Agree on a version of the protocol; raise `DaqProtocol` if there is none in common."""
+    """Agree on the latest version of the protocol that both speak; raise `DaqProtocol` if there is none."""
     lowest, highest = dialogue.get(Parameter.LOWEST_VERSION), dialogue.get(Parameter.HIGHEST_VERSION)
-    if not lowest <= VERSION <= highest:
+    ours = dialogue.link.highest_version
+    version = min(highest, ours)
+    if version < max(lowest, LOWEST_VERSION):
         raise DaqProtocol(
             f"{dialogue.link.name}: the device speaks versions {lowest} to {highest} of the protocol, "
-            f"this product speaks {VERSION}; update the older of the two"
+            f"this product speaks {LOWEST_VERSION} to {ours}; update the older of the two"
         )
-    dialogue.do(Command.SET, Parameter.VERSION, value=VERSION)
+    dialogue.do(Command.SET, Parameter.VERSION, value=version)
+    dialogue.link.speak(version)
 
 
 def read_facts(dialogue: Dialogue) -> DeviceFacts:
@@ -97,6 +104,8 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
         watchdog_s=(1e-6 * get(Parameter.SHORTEST_WATCHDOG_US), 1e-6 * get(Parameter.LONGEST_WATCHDOG_US)),
         filter_delay_s=_filter_delay_s(dialogue),
         layout_crc=get(Parameter.LAYOUT_CRC, default=0),
+        version=dialogue.link.version,
+        longest_period=get(Parameter.LONGEST_PERIOD, default=0) if dialogue.link.version > LOWEST_VERSION else 0,
     )
     _check_scales(dialogue.link.name, facts)
     return facts

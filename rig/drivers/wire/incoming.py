@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqEmergencyStop, DaqProtocol, DaqReset, DaqTimeout, DaqWatchdog
-from rig.wire.messages import Answer, DeviceFlag, DeviceState, Heartbeat, Message, Samples
+from rig.wire.messages import LOWEST_VERSION, Answer, DeviceFlag, DeviceState, Heartbeat, Message, Readback, Samples
 
 __all__ = ["Incoming"]
 
@@ -12,13 +14,14 @@ OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must ha
 UNARMED_BEATS = 2  # the first may have been sent before the device was armed
 UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
 STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
+MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
 
 
 class Incoming:
     """The samples of a streaming device, block by block.
 
     ``shape`` is that of a block. A gap of more than ``longest_gap`` samples is an error: the watchdog would have ended the
-    stream before.
+    stream before. In version 2 of the protocol a block in which an output was missing comes with a readback, or is a gap.
 
     Errors: `DaqTimeout`, `DaqProtocol`, `DaqReset`, `DaqWatchdog`, `DaqEmergencyStop`.
     """
@@ -35,9 +38,14 @@ class Incoming:
         self.blocks = 0
         self.lost_samples = 0
         self.repeated_blocks = 0
+        self.missing_readbacks = 0
+        self.put_out: np.ndarray | None = None
+        """Counts [n] that were put out during the block returned last; None where no output was missing."""
         self.misplaced_blocks = 0
         self.dropped = 0
         self._newer: Samples | None = None
+        self._readback: Readback | None = None
+        self._reads_back = dialogue.link.version > LOWEST_VERSION
         self._old_in_a_row = 0
         self._last_old = 0
         self._unarmed_beats = 0
@@ -50,6 +58,8 @@ class Incoming:
         if samples.first == self.expected:
             self._newer = None
             self.blocks += 1
+            readback = self._readback if samples.flags & MISSED else None
+            self.put_out = readback.counts if readback is not None else None
         else:
             self._newer = samples
             self.lost_samples += self._block
@@ -90,7 +100,7 @@ class Incoming:
                     "further than its watchdog lets it run alone"
                 )
             self._old_in_a_row = 0
-            return True
+            return self._is_told(samples)
         if first >= self.expected:
             self.misplaced_blocks += 1
             return False
@@ -104,8 +114,18 @@ class Incoming:
             )
         return False
 
+    def _is_told(self, samples: Samples) -> bool:
+        """Whether a block in which an output was missing came with what was put out instead; version 1 tells that never."""
+        readback = self._readback
+        if not self._reads_back or not samples.flags & MISSED or (readback and readback.first == samples.first):
+            return True
+        self.missing_readbacks += 1
+        return False
+
     def _other(self, message: Message) -> None:
-        if isinstance(message, Answer):
+        if isinstance(message, Readback):
+            self._readback = message
+        elif isinstance(message, Answer):
             self.on_answer(message)
         elif isinstance(message, Heartbeat):
             if message.boot != self._boot:

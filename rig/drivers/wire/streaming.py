@@ -1,16 +1,18 @@
 """One run over a wire: the parameters are set, then outputs go out and blocks come in, with pings in between."""
 
 import math
+from collections import deque
 
 import numpy as np
 
+from rig.continuation import period_steps, ramp_length
 from rig.daq import LOST
 from rig.drivers.wire.connection import Connection
 from rig.drivers.wire.dialogue import ANSWER_S
 from rig.drivers.wire.facts import DeviceFacts
 from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions, watchdog_s
-from rig.wire.messages import ARM_KEY, Answer, Command, DeviceFlag, Output, Parameter, Stream
+from rig.wire.messages import ARM_KEY, LOWEST_VERSION, Answer, Command, DeviceFlag, Output, Parameter, Stream
 
 __all__ = ["FLAG_NAMES", "Scaling", "Streaming"]
 
@@ -20,7 +22,7 @@ class Scaling:
 
     def __init__(self, facts: DeviceFacts, block: int) -> None:
         self._counts_per_v = np.full(block, 1.0 / facts.output_v_per_count)
-        self._v_per_count = facts.v_per_count.copy()
+        self._v_per_count, self._output_v_per_count = facts.v_per_count.copy(), facts.output_v_per_count
         beyond = 2.0 ** (facts.bits - 1)
         self._lowest, self._highest = np.full(block, -beyond), np.full(block, beyond - 1.0)
         self._dtype = np.dtype(f"<i{facts.bits // 8}")
@@ -38,6 +40,11 @@ class Scaling:
     def to_volts(self, counts: np.ndarray, inputs: np.ndarray) -> None:
         """Readings in volts, into ``inputs`` [n, n_channels]."""
         np.multiply(counts, self._v_per_count, out=inputs)
+
+    def in_place_of(self, sent: np.ndarray, put_out: np.ndarray, volts: np.ndarray) -> None:
+        """What was put out in place of other counts, into ``volts`` [n]; NaN where the counts [n] are those that were sent."""
+        np.multiply(put_out, self._output_v_per_count, out=volts)
+        volts[put_out == sent] = np.nan
 
 
 PINGS_PER_S = 20.0
@@ -71,6 +78,11 @@ class Streaming:
         """Samples by device flag."""
         self._scaling = Scaling(facts, stream.block)
         self._due = stream.queue * stream.block
+        self._has_periods = connection.link.version > LOWEST_VERSION
+        nothing = np.zeros(stream.block, int)  # before the first outputs are due
+        self._sent = deque([nothing] * (stream.queue + 1), stream.queue + 1)
+        """Counts of the blocks that are on their way, the one due first in front."""
+        self._has_put_out = False
         self._blocks_out = 0
         self._blocks_between_pings = max(1, round(1.0 / block_s / PINGS_PER_S))
         self._ping: tuple[int, float] | None = None
@@ -92,18 +104,36 @@ class Streaming:
         self._dialogue.forget_beats()  # those sent before the device was armed
         self._began = True
 
-    def exchange(self, voltages: np.ndarray, inputs: np.ndarray, flags: np.ndarray) -> None:
-        """Send a block of outputs [n]; fill ``inputs`` [n, n_channels] and ``flags`` [n] with the block received."""
+    def exchange(
+        self,
+        voltages: np.ndarray,
+        continuation: np.ndarray,
+        inputs: np.ndarray,
+        flags: np.ndarray,
+        put_out: np.ndarray,
+    ) -> None:
+        """Send a block of outputs [n], and how they go on (`rig.daq.CONTINUATION`).
+
+        Fills ``inputs`` [n, n_channels], ``flags`` [n] and ``put_out`` [n] with the block received.
+        """
         if not self._began:
             self._begin()
-        link = self._link
-        link.send(Output(self._due, self._scaling.to_counts(voltages), self._blocks_out & 0xFFFF))
+        link, counts = self._link, self._scaling.to_counts(voltages)
+        goes_on = (0, 0)
+        if self._has_periods:
+            period_samples, ramp_samples = continuation[0].item()
+            goes_on = period_steps(period_samples), ramp_length(ramp_samples)
+        link.send(Output(self._due, counts, self._blocks_out & 0xFFFF, *goes_on))
+        self._sent.append(counts)
         self._due += self._block
         self._blocks_out += 1
         if self._blocks_out % self._blocks_between_pings == 0:  # the answer to the last one may have been lost
             request = self._dialogue.next_request(Command.GET, Parameter.PING, self._blocks_out & 0xFF)
             self._ping = request.number, self._connection.clock()
             link.send(request)
+        if self._has_put_out:
+            put_out.fill(np.nan)
+            self._has_put_out = False
         samples = self.incoming.take()
         if samples is None:
             inputs.fill(np.nan)
@@ -111,6 +141,9 @@ class Streaming:
             return
         self._scaling.to_volts(samples.counts, inputs)
         flags.fill(samples.flags)
+        if self.incoming.put_out is not None:
+            self._scaling.in_place_of(self._sent[0], self.incoming.put_out, put_out)
+            self._has_put_out = True
         if samples.flags:
             for bit, name in enumerate(FLAG_NAMES):
                 if samples.flags & (1 << bit):

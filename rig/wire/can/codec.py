@@ -7,8 +7,22 @@ import numpy as np
 from rig.errors import DaqRefused
 from rig.wire.can.blocks import COUNT, Blocks, StreamFrames, check_stream
 from rig.wire.can.frames import Frame
+from rig.wire.can.periods import PeriodsHeard, PeriodsTold
 from rig.wire.can.protocol import FrameKind, Protocol
-from rig.wire.messages import Answer, DeviceState, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
+from rig.wire.can.readbacks import Readbacks
+from rig.wire.messages import (
+    LOWEST_VERSION,
+    Answer,
+    DeviceState,
+    EmergencyStop,
+    Heartbeat,
+    Message,
+    Output,
+    Readback,
+    Request,
+    Samples,
+    Stream,
+)
 
 __all__ = ["COUNTERS", "CanCodec"]
 
@@ -22,23 +36,30 @@ _NEVER = -(1 << 30)
 class CanCodec:
     """One end of the protocol on a bus: `encode` what it sends, `decode` what it receives.
 
-    ``device``: this is the device's end, which sends samples and receives outputs. Streams need `configure` first.
+    ``device``: this is the device's end, which sends samples and receives outputs. It begins with version 1; streams need
+    `configure` first.
     """
 
     def __init__(self, protocol: Protocol, device: bool, counters: dict[str, int]) -> None:
-        self.protocol = protocol
+        self._latest = protocol
         self._device = device
         self._shape = protocol.shape
         self._counters = counters
         counters.update(dict.fromkeys(COUNTERS, 0))
-        self._kinds = protocol.kinds
-        self._identifiers = protocol.identifiers
+        self.speak(LOWEST_VERSION)
         self._command = protocol.packing(FrameKind.REQUEST)
         self._beat = protocol.packing(FrameKind.HEARTBEAT)
         self._index = protocol.packing(FrameKind.OUTPUT_INDEX)
+        self._period = struct.Struct("<II")
         self._stream: Stream | None = None
         self._last_beat: Heartbeat | None = None
         self._flags_told = 0
+
+    def speak(self, version: int) -> None:
+        """Use a version of the protocol from now on, before `configure`."""
+        self.protocol = self._latest.speaking(version)
+        self._kinds, self._identifiers = self.protocol.kinds, self.protocol.identifiers
+        self._continues = version > LOWEST_VERSION
 
     def configure(self, stream: Stream) -> None:
         """Set the shape of samples and outputs; both start at index 0. Errors: those of `check_stream`."""
@@ -53,6 +74,10 @@ class CanCodec:
         self._incoming = Blocks(self._counters, self._received)
         if self._device:
             self._incoming.begin(stream.queue)
+        if self._continues:
+            self._told, self._heard = PeriodsTold(stream.rate_hz), PeriodsHeard()
+            identifier = self._identifiers[FrameKind.READBACK, 0]
+            self._readbacks, self._here = Readbacks(identifier, stream.block, self._shape.fd), 0
 
     def encode(self, message: Message) -> list[Frame]:
         """The frames of a message, in sending order."""
@@ -60,6 +85,8 @@ class CanCodec:
             return self._encode_samples(message)
         if isinstance(message, Output):
             return self._encode_output(message)
+        if isinstance(message, Readback):
+            return self._encode_readback(message)
         if isinstance(message, Request | Answer):
             kind = FrameKind.REQUEST if isinstance(message, Request) else FrameKind.ANSWER
             return [Frame(self._identifiers[kind, 0], self._command.pack(*message))]
@@ -85,11 +112,25 @@ class CanCodec:
 
     def _encode_output(self, message: Output) -> list[Frame]:
         frames = self._streaming().frames(message.first, message.counts, 0)
+        if self._continues and self._told.must_tell(message.first, message.period, message.ramp):
+            data = self._period.pack(message.period, message.ramp)
+            frames = [Frame(self._identifiers[FrameKind.OUTPUT_PERIOD, 0], data), *frames]
         if self._must_tell(message.first):
             self._reported = message.first // self._sent.block * self._sent.groups
             data = self._index.pack(message.first & 0xFFFFFFFF)
             return [Frame(self._identifiers[FrameKind.OUTPUT_INDEX, 0], data), *frames]
         return frames
+
+    def _encode_readback(self, message: Readback) -> list[Frame]:
+        self._streaming()
+        if not self._continues:
+            raise DaqRefused("a readback is sent in version 2 of the protocol")
+        return self._readbacks.frames(message.first, message.counts)
+
+    def forget_told(self) -> None:
+        """Note that frames of an output were not sent: what they told may not have arrived."""
+        if self._continues and self._stream is not None:
+            self._told.forget()
 
     def _must_tell(self, first: int) -> bool:
         """Whether a block would end more than half a wrap after the last index that the receiver was told."""
@@ -108,8 +149,10 @@ class CanCodec:
         if kind is (FrameKind.OUTPUT if self._device else FrameKind.SAMPLES):
             return self._decode_stream(frame, number)
         try:
+            if kind is FrameKind.READBACK and not self._device:
+                return self._decode_readback(frame)
             return self._decode_command(kind, frame.data)
-        except struct.error:
+        except (struct.error, ValueError):
             self._counters["damaged_frames"] += 1
             return None
 
@@ -119,6 +162,9 @@ class CanCodec:
                 return Request(*self._command.unpack(data))
             if kind is FrameKind.OUTPUT_INDEX and self._stream is not None:
                 self._incoming.mark(self._index.unpack(data)[0])
+                return None
+            if kind is FrameKind.OUTPUT_PERIOD and self._stream is not None:
+                self._heard.hear(*self._period.unpack(data))
                 return None
         elif kind is FrameKind.ANSWER:
             return Answer(*self._command.unpack(data))
@@ -130,6 +176,13 @@ class CanCodec:
             return Heartbeat(state, flags, boot, samples, dropped)
         self._counters["own_frames"] += 1  # some buses return the frames that one sends
         return None
+
+    def _decode_readback(self, frame: Frame) -> Readback | None:
+        if self._stream is None:
+            self._counters["foreign_frames"] += 1
+            return None
+        whole = self._readbacks.put(frame, self._here)
+        return None if whole is None else Readback(*whole, self._received.sequence_of(whole[0]))
 
     def _decode_stream(self, frame: Frame, number: int) -> Message | None:
         if self._stream is None:
@@ -157,7 +210,9 @@ class CanCodec:
         first = block * self._received.block
         sequence = self._received.sequence_of(first)
         if self._device:
-            return Output(first, counts[:, 0], sequence)
+            goes_on = self._heard.of(first) if self._continues else (0, 0)
+            return Output(first, counts[:, 0], sequence, *goes_on)
+        self._here = first + self._received.block
         return Samples(first, counts, flags, self._dropped, 0, sequence)
 
     def _streaming(self) -> StreamFrames:

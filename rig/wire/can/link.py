@@ -8,9 +8,11 @@ from rig.wire.can.blocks import check_stream
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import BusTiming, frame_seconds, padded_length
+from rig.wire.can.periods import TOLD_EVERY_S
 from rig.wire.can.protocol import Shape, protocol
-from rig.wire.link import Link, Load
-from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
+from rig.wire.can.readbacks import Readbacks
+from rig.wire.link import LATE_SHARE, Link, Load
+from rig.wire.messages import HEARTBEATS_HZ, LOWEST_VERSION, VERSION, Message, Output, Readback, Samples, Stream
 
 __all__ = ["CanLink", "Traffic", "bus_load", "frame_lengths", "traffic"]
 
@@ -37,8 +39,13 @@ def frame_lengths(shape: Shape, block: int, outputs: bool) -> list[int]:
     return out
 
 
-def traffic(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> list[Traffic]:
-    """Samples, outputs, heartbeats and output indices of a stream."""
+def traffic(
+    shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float, version: int = VERSION
+) -> list[Traffic]:
+    """Samples, outputs, heartbeats and output indices of a stream; from version 2 on also periods and readbacks.
+
+    Periods are told as often as they may be, and one block in twenty is counted as late, with its readback.
+    """
     blocks_hz = stream.rate_hz / stream.block
     out = []
     for name, outputs in (("samples", False), ("outputs", True)):
@@ -50,6 +57,12 @@ def traffic(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: 
     out.append(Traffic("heartbeats", beats_hz, beats_hz * frame_seconds(8, False, bit_rate_hz)))
     marks_hz = _marks_hz(blocks_hz, len(frame_lengths(shape, stream.block, True)), shape.output_wrap)
     out.append(Traffic("indices", marks_hz, marks_hz * frame_seconds(4, False, bit_rate_hz)))
+    if version > LOWEST_VERSION:
+        periods_hz = min(blocks_hz, 1.0 / TOLD_EVERY_S)
+        out.append(Traffic("periods", periods_hz, periods_hz * frame_seconds(8, False, bit_rate_hz)))
+        lengths, late_hz = Readbacks(0, stream.block, shape.fd).lengths(), LATE_SHARE * blocks_hz
+        seconds = sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
+        out.append(Traffic("readbacks", late_hz * len(lengths), late_hz * seconds))
     return out
 
 
@@ -58,9 +71,9 @@ def _marks_hz(blocks_hz: float, groups: int, wrap: int) -> float:
     return blocks_hz / max((wrap - wrap % groups) // 2 // groups, 1)
 
 
-def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float) -> Load:
+def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float, version: int = VERSION) -> Load:
     """Load of the bus in bits of its bit rate; the faster bits of CAN FD count by their duration."""
-    parts = traffic(shape, stream, bit_rate_hz, data_bit_rate_hz)
+    parts = traffic(shape, stream, bit_rate_hz, data_bit_rate_hz, version)
     share = sum(part.share for part in parts)
     terms = " + ".join(
         f"{part.name} {part.frames_hz:.0f}/s x {part.share / part.frames_hz * 1e6:.0f} us" for part in parts
@@ -104,6 +117,16 @@ class CanLink(Link):
         """Open the bus."""
         self._bus.open()
 
+    def speak(self, version: int) -> None:
+        """Use a version of the protocol from now on."""
+        super().speak(version)
+        self._codec.speak(version)
+
+    @property
+    def highest_version(self) -> int:
+        """Version of the definition."""
+        return self._protocol.version
+
     def configure(self, stream: Stream) -> None:
         """Agree on the stream; `DaqRefused` for a block that the frames' sequence numbers cannot tell apart."""
         self._codec.configure(stream)
@@ -111,14 +134,16 @@ class CanLink(Link):
 
     def send(self, message: Message) -> None:
         """Send one message; one that cannot be sent in time is dropped, because it would be out of date."""
-        left_s = self._deadline_s if isinstance(message, Samples | Output) else COMMAND_S
+        left_s = self._deadline_s if isinstance(message, Samples | Output | Readback) else COMMAND_S
         frames = self._codec.encode(message)
         if len(frames) == 1:
-            self._bus.send(frames[0], left_s)
+            if not self._bus.send(frames[0], left_s):
+                self._codec.forget_told()
             return
         deadline = time.monotonic() + left_s
         for frame in frames:
             if not self._bus.send(frame, max(deadline - time.monotonic(), 0.0)):
+                self._codec.forget_told()
                 return  # the rest of an incomplete block is useless
 
     def receive(self, timeout_s: float) -> Message | None:
@@ -142,12 +167,12 @@ class CanLink(Link):
         Raises `DaqRefused` for a stream that no frames can carry, however fast the bus.
         """
         check_stream(self._protocol.shape, stream)
-        return bus_load(self._protocol.shape, stream, *self._rates_hz)
+        return bus_load(self._protocol.shape, stream, *self._rates_hz, self.version)
 
     @property
     def layout_crc(self) -> int:
-        """CRC-32 of the compiled definition."""
-        return self._protocol.layout.crc
+        """CRC-32 of the compiled definition in the version in use."""
+        return self._codec.protocol.layout.crc
 
     @property
     def largest_block(self) -> int:

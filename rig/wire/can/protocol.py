@@ -6,11 +6,12 @@ An identifier of 11 bits is 16 times a function plus the node (0 to 15). The low
     0x010        Heartbeat
     0x020, 0x030 Request, Answer
     0x040        OutputIndex
+    0x050, 0x060 OutputPeriod, Readback (from version 2 on)
     0x100-0x2F0  Output (classical: 32 messages of one layout, the sequence is in the identifier)
     0x300-0x6F0  Samples (classical: up to 64 such messages; of each sequence one per part where a row needs several frames)
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +20,8 @@ from struct import Struct
 from rig.errors import ConfigurationError, DaqRefused
 from rig.wire.can.frames import padded_length
 from rig.wire.can.layout import Layout, compile_layout, compile_text
+from rig.wire.can.readbacks import COUNTS_A_FRAME
+from rig.wire.messages import LOWEST_VERSION, VERSION
 
 __all__ = [
     "CLASSICAL_OUTPUTS",
@@ -100,8 +103,8 @@ def shape_of(n_channels: int, fd: bool) -> Shape:
     return Shape(n_channels, fd, parts, channels, rows, FD_WRAP if fd else CLASSICAL_SAMPLES // parts)
 
 
-def definition(n_channels: int, fd: bool) -> str:
-    """The DBC file of the protocol for so many channels, as text, for node 0.
+def definition(n_channels: int, fd: bool, version: int = VERSION) -> str:
+    """The DBC file of a version of the protocol for so many channels, as text, for node 0.
 
     It is written here because the output of cantools changes with its version; the tests read it with cantools.
     """
@@ -114,6 +117,10 @@ def definition(n_channels: int, fd: bool) -> str:
         _message(0x040, "OutputIndex", "Host", _unsigned(first=32), False),
     ]
     outputs = [(f"sample_{row}", 16, True) for row in range(shape.output_rows)]
+    if version > LOWEST_VERSION:
+        messages.append(_message(0x050, "OutputPeriod", "Host", _unsigned(period=32, ramp=32), False))
+        counts = [(f"sample_{row}", 16, True) for row in range(COUNTS_A_FRAME[fd])]
+        messages.append(_message(0x060, "Readback", "Device", _unsigned(index=16) + counts, fd))
     if fd:
         messages.append(_message(0x100, "Output", "Host", _unsigned(sequence=8, reserved=8) + outputs, True))
     for index in range(0 if fd else CLASSICAL_OUTPUTS):
@@ -122,10 +129,15 @@ def definition(n_channels: int, fd: bool) -> str:
     for index in range(shape.parts if fd else shape.wrap * shape.parts):
         counts = _counts(shape, index % shape.parts)
         messages.append(_message(0x300 + 16 * index, f"Samples_{index:02d}", "Device", head + counts, fd))
-    return _HEAD + "\n".join(text for text, _ in messages) + _FORMATS + "".join(note for _, note in messages)
+    return (
+        _HEAD.format(version)
+        + "\n".join(text for text, _ in messages)
+        + _FORMATS
+        + "".join(note for _, note in messages)
+    )
 
 
-_HEAD = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: Host Device\n\n'
+_HEAD = 'VERSION "{}"\n\nNS_ :\n\nBS_:\n\nBU_: Host Device\n\n'
 _FD_FORMAT = 14  # place of StandardCAN_FD in the list of formats below
 _FORMATS = (
     '\nBA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG",'
@@ -164,13 +176,18 @@ class FrameKind(Enum):
     REQUEST = "Request"
     ANSWER = "Answer"
     OUTPUT_INDEX = "OutputIndex"
+    OUTPUT_PERIOD = "OutputPeriod"
+    READBACK = "Readback"
     OUTPUT = "Output"
     SAMPLES = "Samples"
 
 
+SINCE_VERSION_2 = (FrameKind.OUTPUT_PERIOD.value, FrameKind.READBACK.value)
+
+
 @dataclass(frozen=True)
 class Protocol:
-    """The definition for one node: shape, layout and identifiers."""
+    """The definition for one node, in one version of the protocol: shape, layout and identifiers."""
 
     shape: Shape
     layout: Layout
@@ -191,6 +208,18 @@ class Protocol:
         """The identifier of a kind and number."""
         return {meaning: identifier for identifier, meaning in self.kinds.items()}
 
+    @property
+    def version(self) -> int:
+        """The version that it defines."""
+        return VERSION if SINCE_VERSION_2[0] in self.layout.messages else LOWEST_VERSION
+
+    def speaking(self, version: int) -> "Protocol":
+        """The same definition in a version up to its own."""
+        if version == self.version:
+            return self
+        messages = self.layout.messages.items()
+        return replace(self, layout=Layout({name: one for name, one in messages if name not in SINCE_VERSION_2}))
+
     def packing(self, kind: FrameKind) -> Struct:
         """Packs the signals of a message without numbers."""
         return Struct(self.layout.messages[kind.value].format)
@@ -200,9 +229,10 @@ class Protocol:
 
 
 def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None) -> Protocol:
-    """The protocol for so many channels, by the shipped definition or that of a file.
+    """The latest version of the protocol for so many channels, by the shipped definition or that of a file.
 
-    A file may choose other identifiers, and nothing else: `ConfigurationError` names the message and what differs.
+    A file may choose other identifiers, and nothing else: `ConfigurationError` names the message and what differs. One
+    without the messages of version 2 defines version 1.
     """
     if not 0 <= node <= HIGHEST_NODE:
         raise ConfigurationError(f"driver.options.node = {node}: allowed is 0 to {HIGHEST_NODE}")
@@ -211,6 +241,8 @@ def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None
     if dbc is None:
         return Protocol(shape, ours, node)
     theirs = compile_layout(dbc)
+    if not any(name in theirs.messages for name in SINCE_VERSION_2):
+        ours = Protocol(shape, ours, node).speaking(LOWEST_VERSION).layout
     for name, message in ours.messages.items():
         if name not in theirs.messages:
             raise ConfigurationError(f"{dbc}: message {name} is missing")

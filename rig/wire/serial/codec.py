@@ -5,7 +5,19 @@ import struct
 import numpy as np
 
 from rig.errors import DaqRefused
-from rig.wire.messages import VERSION, Answer, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
+from rig.wire.messages import (
+    LOWEST_VERSION,
+    VERSION,
+    Answer,
+    EmergencyStop,
+    Heartbeat,
+    Message,
+    Output,
+    Readback,
+    Request,
+    Samples,
+    Stream,
+)
 
 __all__ = ["HEARTBEAT_BODY", "LARGEST_PAYLOAD", "Codec", "Damaged", "ForeignVersion", "Malformed", "Oversize"]
 
@@ -13,13 +25,19 @@ LARGEST_PAYLOAD = 65_536
 """Largest header and body of any message, bytes; it bounds a receiver's memory."""
 
 
-REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP = range(1, 7)  # second byte of a payload
+REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK = range(1, 8)  # second byte of a payload
 LASTING = (REQUEST, ANSWER, EMERGENCY_STOP)  # the same in every version, so that versions can be agreed on
+
+SPOKEN = range(
+    LOWEST_VERSION, VERSION + 1
+)  # their heartbeats are alike; a device that was reset begins with the lowest
 
 HEADER_SIZE = 4  # version, type, sequence: the first three fields of each of these
 COMMAND = struct.Struct("<BBHBBBBI")  # number; command or status; parameter; item; value
 SAMPLES_HEAD = struct.Struct("<BBHQQIHxx")  # first; clock_us; dropped; flags; two zeros that align the counts
 OUTPUT_HEAD = struct.Struct("<BBHQ")  # first
+PERIODIC_HEAD = struct.Struct("<BBHQII")  # first; period; ramp: an output from version 2 on
+READBACK_HEAD = struct.Struct("<BBHQ")  # first
 HEARTBEAT_BODY = struct.Struct("<BBHBBHII")  # state; boot; flags; dropped; samples
 STOP = struct.Struct("<BBHB")  # reason
 
@@ -51,12 +69,17 @@ class Oversize(Malformed):
 
 
 class Codec:
-    """Messages to payloads and back; its only state is the shape of the stream, so no payload depends on an earlier one."""
+    """Messages to payloads and back; its only state is the version and the shape of the stream.
+
+    So no payload depends on an earlier one.
+    """
 
     def __init__(self) -> None:
+        self.version = LOWEST_VERSION
+        """Version in use: that of what is sent."""
         self._counts = np.dtype("<i2")
         self._shape, self._output_shape = (0, 0), (0,)
-        self._samples_size = self._output_size = 0  # of no payload: nothing is understood before `configure`
+        self._samples_size = self._output_size = self._readback_size = 0  # of no payload: none before `configure`
 
     def configure(self, stream: Stream) -> None:
         """Agree on the shape of blocks.
@@ -65,7 +88,7 @@ class Codec:
         """
         if stream.bits not in (16, 32):
             raise DaqRefused(f"counts of {stream.bits} bits: allowed is 16 or 32")
-        samples_size, output_size = self.sizes(stream)
+        samples_size, output_size, readback_size = self.sizes(stream, self.version)
         if samples_size > LARGEST_PAYLOAD:
             raise DaqRefused(
                 f"a block of {stream.block} samples of {stream.n_channels} channels takes {samples_size} bytes: "
@@ -73,13 +96,16 @@ class Codec:
             )
         self._counts = np.dtype(f"<i{stream.bits // 8}")
         self._shape, self._output_shape = (stream.block, stream.n_channels), (stream.block,)
-        self._samples_size, self._output_size = samples_size, output_size
+        self._samples_size, self._output_size, self._readback_size = samples_size, output_size, readback_size
 
     @staticmethod
-    def sizes(stream: Stream) -> tuple[int, int]:
-        """Bytes of the payload of one block of samples, and of one of outputs."""
+    def sizes(stream: Stream, version: int) -> tuple[int, int, int]:
+        """Bytes of the payload of one block of samples, of outputs, and of a readback; 0 where a version has none."""
         width = stream.bits // 8
-        return SAMPLES_HEAD.size + width * stream.block * stream.n_channels, OUTPUT_HEAD.size + width * stream.block
+        samples = SAMPLES_HEAD.size + width * stream.block * stream.n_channels
+        if version == LOWEST_VERSION:
+            return samples, OUTPUT_HEAD.size + width * stream.block, 0
+        return samples, PERIODIC_HEAD.size + width * stream.block, READBACK_HEAD.size + width * stream.block
 
     @staticmethod
     def largest_block(n_channels: int, bits: int) -> int:
@@ -94,24 +120,32 @@ class Codec:
                 counts = self._fitted(counts, self._shape)
             if dropped > MOST_DROPPED:
                 dropped = MOST_DROPPED
-            head = SAMPLES_HEAD.pack(VERSION, SAMPLES, sequence & 0xFFFF, first, clock_us, dropped, flags)
+            head = SAMPLES_HEAD.pack(self.version, SAMPLES, sequence & 0xFFFF, first, clock_us, dropped, flags)
             return head + counts.tobytes()
-        if message.__class__ is Output:
-            first, counts, sequence = message
-            if counts.shape != self._output_shape or counts.dtype is not self._counts:
-                counts = self._fitted(counts, self._output_shape)
-            return OUTPUT_HEAD.pack(VERSION, OUTPUT, sequence & 0xFFFF, first) + counts.tobytes()
+        if isinstance(message, Output | Readback):
+            return self._head(message) + self._fitted(message.counts, self._output_shape).tobytes()
+        version = self.version
         if isinstance(message, Request):
-            return COMMAND.pack(VERSION, REQUEST, 0, *message)
+            return COMMAND.pack(version, REQUEST, 0, *message)
         if isinstance(message, Answer):
-            return COMMAND.pack(VERSION, ANSWER, 0, *message)
+            return COMMAND.pack(version, ANSWER, 0, *message)
         if isinstance(message, Heartbeat):
             state, flags, boot, samples, dropped = message
             dropped = min(dropped, MOST_DROPPED)
-            return HEARTBEAT_BODY.pack(VERSION, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples & 0xFFFFFFFF)
+            return HEARTBEAT_BODY.pack(version, HEARTBEAT, 0, state, boot & 0xFF, flags, dropped, samples & 0xFFFFFFFF)
         if isinstance(message, EmergencyStop):
-            return STOP.pack(VERSION, EMERGENCY_STOP, 0, message.reason)
+            return STOP.pack(version, EMERGENCY_STOP, 0, message.reason)
         raise TypeError(f"{message!r} is no message")
+
+    def _head(self, message: Output | Readback) -> bytes:
+        version, sequence = self.version, message.sequence & 0xFFFF
+        if isinstance(message, Output):
+            if version == LOWEST_VERSION:
+                return OUTPUT_HEAD.pack(version, OUTPUT, sequence, message.first)
+            return PERIODIC_HEAD.pack(version, OUTPUT, sequence, message.first, message.period, message.ramp)
+        if version == LOWEST_VERSION:
+            raise DaqRefused("a readback is sent in version 2 of the protocol")
+        return READBACK_HEAD.pack(version, READBACK, sequence, message.first)
 
     def decode(self, payload: bytes) -> Message:
         """Decode a payload into a message. Arrays of counts are views of the payload, not copies. Raises only `Malformed`."""
@@ -119,15 +153,17 @@ class Codec:
         if size < HEADER_SIZE:
             raise Malformed(f"{size} bytes")
         version, kind = payload[0], payload[1]
-        if version != VERSION and kind not in LASTING:
+        if version != self.version and kind not in LASTING and not (kind == HEARTBEAT and version in SPOKEN):
             raise ForeignVersion(f"version {version}")
         if kind == SAMPLES and size == self._samples_size:
             _, _, sequence, first, clock_us, dropped, flags = SAMPLES_HEAD.unpack_from(payload)
             counts = np.ndarray(self._shape, self._counts, payload, SAMPLES_HEAD.size)
             return Samples(first, counts, flags, dropped, clock_us, sequence)
         if kind == OUTPUT and size == self._output_size:
-            _, _, sequence, first = OUTPUT_HEAD.unpack_from(payload)
-            return Output(first, np.ndarray(self._output_shape, self._counts, payload, OUTPUT_HEAD.size), sequence)
+            return self._output(payload)
+        if kind == READBACK and size == self._readback_size and size:
+            _, _, sequence, first = READBACK_HEAD.unpack_from(payload)
+            return Readback(first, np.ndarray(self._output_shape, self._counts, payload, READBACK_HEAD.size), sequence)
         if kind == REQUEST and size == COMMAND.size:
             return Request(*COMMAND.unpack(payload)[3:])
         if kind == ANSWER and size == COMMAND.size:
@@ -139,7 +175,14 @@ class Codec:
             return EmergencyStop(STOP.unpack(payload)[3])
         raise Malformed(f"type {kind} with {size} bytes")
 
+    def _output(self, payload: bytes) -> Output:
+        head = OUTPUT_HEAD if self.version == LOWEST_VERSION else PERIODIC_HEAD
+        _, _, sequence, first, *goes_on = head.unpack_from(payload)
+        return Output(first, np.ndarray(self._output_shape, self._counts, payload, head.size), sequence, *goes_on)
+
     def _fitted(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        if counts.shape == shape and counts.dtype is self._counts and self._samples_size:
+            return counts
         if not self._samples_size:
             raise DaqRefused("samples and outputs are sent once their shape has been agreed on (configure)")
         if counts.shape != shape:

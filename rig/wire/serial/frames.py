@@ -52,7 +52,7 @@ class FrameReader:
     """
 
     def __init__(self, codec: Codec, counters: dict[str, int]) -> None:
-        self._decode = codec.decode
+        self._codec, self._decode = codec, codec.decode
         self._counters = counters
         self._rest = b""
         self._skipping = False  # inside a frame that is too long already
@@ -61,7 +61,7 @@ class FrameReader:
 
     def configure(self, stream: Stream) -> None:
         """Expect no frame longer than those of a stream."""
-        self._longest = largest_frame(max(*Codec.sizes(stream), 64))
+        self._longest = largest_frame(max(*Codec.sizes(stream, self._codec.version), 64))
 
     def feed(self, data: bytes) -> list[Message]:
         """Messages that are complete with these bytes, in order."""

@@ -10,8 +10,8 @@ from select import select
 from typing import Self
 
 from rig.errors import DaqDisconnected, DaqTimeout
-from rig.wire.link import Link, Load
-from rig.wire.messages import HEARTBEATS_HZ, Message, Output, Samples, Stream
+from rig.wire.link import LATE_SHARE, Link, Load
+from rig.wire.messages import HEARTBEATS_HZ, VERSION, Message, Output, Readback, Samples, Stream
 from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
 from rig.wire.serial.frames import FrameReader, frame, largest_frame
 from rig.wire.serial.port import is_pseudo_terminal
@@ -22,22 +22,28 @@ __all__ = ["SerialLink", "line_load"]
 BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
 
 
-def line_load(stream: Stream, baud: int | None) -> Load:
+def line_load(stream: Stream, baud: int | None, version: int = VERSION) -> Load:
     """Bits per second that a stream needs against the baud rate; None is a line without a rate.
 
-    Only the direction from the device counts: the line carries both at once, and outputs are always fewer than samples.
+    Only the direction from the device counts: the line carries both at once, and outputs are always fewer than samples. In
+    version 2 one block in twenty is counted as late, with its readback.
     """
     blocks_hz = stream.rate_hz / stream.block
-    samples = largest_frame(Codec.sizes(stream)[0])
+    samples_size, _, readback_size = Codec.sizes(stream, version)
+    samples = largest_frame(samples_size)
     heartbeat = largest_frame(HEARTBEAT_BODY.size) + 1  # and the zero before it
     needed = BITS_A_BYTE * (blocks_hz * samples + HEARTBEATS_HZ * heartbeat)
     terms = f"{blocks_hz:g}/s x {samples} bytes of samples + {HEARTBEATS_HZ}/s x {heartbeat} bytes of heartbeats"
+    if readback_size:
+        late_hz, readback = LATE_SHARE * blocks_hz, largest_frame(readback_size)
+        needed += BITS_A_BYTE * late_hz * readback
+        terms += f" + {late_hz:g}/s x {readback} bytes of readbacks"
     carried = "a pseudo-terminal carries any" if baud is None else f"{baud} baud carry {baud / 1e3:g} kbit/s"
     sum_text = f"({terms}) x {BITS_A_BYTE} bits = {needed / 1e3:.1f} kbit/s; {carried}"
     return Load(needed, math.inf if baud is None else float(baud), sum_text)
 
 
-STREAMED = (Samples, Output)
+STREAMED = (Samples, Output, Readback)
 PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
 
 
@@ -101,6 +107,11 @@ class SerialLink(Link):
             self._held = held.pop_all()
         self._reader = FrameReader(self._codec, self.counters)
 
+    def speak(self, version: int) -> None:
+        """Use a version of the protocol from now on."""
+        super().speak(version)
+        self._codec.version = version
+
     def configure(self, stream: Stream) -> None:
         """Agree on the shape of samples and outputs."""
         self._codec.configure(stream)
@@ -142,7 +153,7 @@ class SerialLink(Link):
     def load(self, stream: Stream) -> Load:
         """Bits per second of the busier direction, ten a byte, against the baud rate; once open."""
         unlimited = not self._baud or is_pseudo_terminal(self._descriptor)
-        return line_load(stream, None if unlimited else self._baud)
+        return line_load(stream, None if unlimited else self._baud, self.version)
 
     def largest_block_of(self, n_channels: int, bits: int) -> int:
         """Largest number of samples in a block: the payload of a frame is bounded."""

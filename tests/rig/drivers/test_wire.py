@@ -185,7 +185,8 @@ def test_a_device_that_calls_its_channels_otherwise_is_refused() -> None:
         ({"SIMULATED": 3}, DaqProtocol, ("SIMULATED = 3", "0, 1 or 2")),
         ({"SIMULATED": 2**32 - 1}, DaqProtocol, ("SIMULATED = 4294967295",)),
         ({"CHANNEL_V_PER_COUNT__0": float_word(math.nan)}, DaqProtocol, ("not positive",)),
-        ({"LOWEST_VERSION": 2, "HIGHEST_VERSION": 3}, DaqProtocol, ("versions 2 to 3", "speaks 1")),
+        ({"LOWEST_VERSION": 3, "HIGHEST_VERSION": 4}, DaqProtocol, ("versions 3 to 4", "speaks 1 to 2")),
+        ({"LOWEST_VERSION": 0, "HIGHEST_VERSION": 0}, DaqProtocol, ("versions 0 to 0", "speaks 1 to 2")),
     ],
 )
 def test_a_device_that_is_not_the_benchs_is_refused_with_what_differs(

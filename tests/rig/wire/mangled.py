@@ -24,6 +24,10 @@ class MangledLink(MemoryLink):
         self._blocks = 0
         self._read: deque[Message] = deque()
 
+    def speak(self, version: int) -> None:
+        super().speak(version)
+        self._codec.version = version
+
     def configure(self, stream: Stream) -> None:
         super().configure(stream)
         self._codec.configure(stream)

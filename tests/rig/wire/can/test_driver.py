@@ -69,7 +69,7 @@ def test_a_rate_that_the_bus_cannot_carry_is_refused_with_the_sum() -> None:
     channel = uuid4().hex
     with (
         device_on(virtual_bus(channel, False), False),
-        pytest.raises(DaqRefused, match=r"samples 5000/s x 135 us.*: 110%"),
+        pytest.raises(DaqRefused, match=r"samples 5000/s x 135 us.*: 115%"),
     ):
         CanDAQ(bench_on("virtual", channel, 1, fd=False)).open()
 

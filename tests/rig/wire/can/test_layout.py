@@ -13,8 +13,11 @@ from rig.errors import ConfigurationError, DaqRefused
 from rig.wire.can.layout import compile_layout, compile_text
 from rig.wire.can.protocol import definition, protocol, shape_of
 
+FOLDER = Path(rig.wire.can.__file__).parent
 SHIPPED = {
-    fd: Path(rig.wire.can.__file__).parent / f"vibrolock-4-{'fd' if fd else 'classical'}.dbc" for fd in (True, False)
+    (fd, version): FOLDER / f"vibrolock-4-{'fd' if fd else 'classical'}{'-v2' if version == 2 else ''}.dbc"
+    for fd in (True, False)
+    for version in (1, 2)
 }
 
 FOREIGN = """VERSION ""
@@ -36,9 +39,21 @@ def message(signal: str) -> str:
     return f'VERSION ""\n\nBU_: A B\n\nBO_ 7 M: 8 A\n SG_ {signal} (1,0) [0|0] "" B\n'
 
 
+@pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("fd", [True, False])
-def test_the_shipped_files_are_what_the_generator_writes_for_four_channels(fd: bool) -> None:
-    assert SHIPPED[fd].read_text() == definition(4, fd)
+def test_the_shipped_files_are_what_the_generator_writes_for_four_channels(fd: bool, version: int) -> None:
+    assert SHIPPED[fd, version].read_text() == definition(4, fd, version)
+
+
+@pytest.mark.parametrize(("n_channels", "fd"), [(4, True), (4, False), (7, False), (100, True)])
+def test_version_1_is_version_2_without_periods_and_readbacks(n_channels: int, fd: bool) -> None:
+    latest = protocol(n_channels, fd, 3)
+    assert compile_text(definition(n_channels, fd, 1)).crc == latest.speaking(1).layout.crc
+    assert latest.speaking(2).layout.crc == compile_text(definition(n_channels, fd, 2)).crc
+    assert {latest.kinds[one][0].value for one in set(latest.kinds) - set(latest.speaking(1).kinds)} == {
+        "OutputPeriod",
+        "Readback",
+    }
 
 
 @pytest.mark.parametrize(
@@ -115,11 +130,15 @@ def test_the_crc_sees_what_a_receiver_must_know_and_nothing_else() -> None:
 
 def test_a_definition_of_ones_own_may_move_identifiers_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "own.dbc"
-    path.write_text(definition(4, True).replace("BO_ 64 OutputIndex", "BO_ 80 OutputIndex"))
-    assert 0x53 in protocol(4, True, 3, path).kinds
+    path.write_text(definition(4, True).replace("BO_ 64 OutputIndex", "BO_ 112 OutputIndex"))
+    assert 0x73 in protocol(4, True, 3, path).kinds
+    assert protocol(4, True, 3, path).version == 2
+    path.write_text(definition(4, True, 1).replace("BO_ 64 OutputIndex", "BO_ 80 OutputIndex"))
+    assert protocol(4, True, 3, path).version == 1
     for old, new, said in (
+        ("BO_ 80 OutputPeriod", "BO_ 80 Other", "message OutputPeriod is missing"),
         ("BO_ 64 OutputIndex", "BO_ 65 OutputIndex", "message OutputIndex: .* multiples of 16"),
-        ("sample_3 :", "sample_x :", "message Output: is .*sample_x"),
+        ("sample_3 :", "sample_x :", "message Readback: is .*sample_x"),
         ("BO_ 64 OutputIndex", "BO_ 64 Other", "message OutputIndex is missing"),
     ):
         path.write_text(definition(4, True).replace(old, new))

@@ -7,7 +7,7 @@ from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import frame_seconds
 from rig.wire.can.link import bus_load, frame_lengths, traffic
 from rig.wire.can.protocol import protocol, shape_of
-from rig.wire.messages import Heartbeat, Output, Samples, Stream
+from rig.wire.messages import Heartbeat, Output, Readback, Samples, Stream
 
 
 def stuffed(bits: str) -> int:
@@ -31,7 +31,7 @@ def test_no_classical_frame_can_be_longer_than_the_worst_case(n_bytes: int) -> N
 
 @pytest.mark.parametrize(("rate_hz", "share"), [(1000.0, 0.21), (5000.0, 1.05)])
 def test_four_channels_and_an_output_load_classical_can_as_documented(rate_hz: float, share: float) -> None:
-    parts = traffic(shape_of(4, False), Stream(4, 1, rate_hz), 1e6, 0.0)
+    parts = traffic(shape_of(4, False), Stream(4, 1, rate_hz), 1e6, 0.0, 1)
     assert sum(part.share for part in parts[:2]) == pytest.approx(share, abs=1e-12)
     assert sum(part.share for part in parts[2:]) < 0.1 * share  # heartbeats and indices
 
@@ -63,18 +63,25 @@ def test_the_sum_is_said() -> None:
     assert load.available_bit_s == 1e6
 
 
+@pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize(
     ("n_channels", "fd", "n"), [(4, True, 1), (4, True, 10), (4, False, 1), (4, False, 5), (9, False, 3)]
 )
-def test_the_sum_counts_the_frames_that_a_device_and_a_host_send(n_channels: int, fd: bool, n: int) -> None:
+def test_the_sum_counts_the_frames_that_a_device_and_a_host_send(
+    n_channels: int, fd: bool, n: int, version: int
+) -> None:
     shape, stream = shape_of(n_channels, fd), Stream(n_channels, n, 1000.0)
     device, host = (CanCodec(protocol(n_channels, fd, 1), end, {}) for end in (True, False))
-    device.configure(stream), host.configure(stream)
+    for end in (device, host):
+        end.speak(version)
+        end.configure(stream)
     device.encode(Heartbeat(2, 0, 0, 0))
     frames = []
     for j in range(4000 // n):
+        if version == 2 and j % 20 == 19:
+            frames += device.encode(Readback(j * n, np.zeros(n, np.int16)))
         frames += device.encode(Samples(j * n, np.zeros((n, n_channels), np.int16)))
-        frames += host.encode(Output((j + 1) * n, np.zeros(n, np.int16)))
+        frames += host.encode(Output((j + 1) * n, np.zeros(n, np.int16), 0, (7 << 16) + j))
     seconds = sum(frame_seconds(len(frame.data), frame.fd, 1e6, 2e6) for frame in frames) / 4.0
     beats = 10.0 * frame_seconds(8, False, 1e6)  # the device's own
-    assert bus_load(shape, stream, 1e6, 2e6).share == pytest.approx(seconds + beats, rel=0.01)
+    assert bus_load(shape, stream, 1e6, 2e6, version).share == pytest.approx(seconds + beats, rel=0.01)

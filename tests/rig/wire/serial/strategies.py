@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output, Request, Samples, Stream
+from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Message, Output, Readback, Request, Samples, Stream
 
 U8, U16, U32, U64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
 
@@ -22,13 +22,16 @@ def counts(stream: Stream, *shape: int) -> st.SearchStrategy[np.ndarray]:
     return arrays(dtype, shape, elements=st.integers(np.iinfo(dtype).min, np.iinfo(dtype).max))
 
 
-def messages(stream: Stream) -> st.SearchStrategy[Message]:
+def messages(stream: Stream, version: int) -> st.SearchStrategy[Message]:
     samples = counts(stream, stream.block, stream.n_channels)
+    later = (U32, U32) if version > 1 else (st.just(0), st.just(0))
+    of_version_2 = [st.builds(Readback, U64, counts(stream, stream.block), U16)] if version > 1 else []
     return st.one_of(
+        *of_version_2,
         st.builds(Request, U8, U8, U8, U8, U32),
         st.builds(Answer, U8, U8, U8, U8, U32),
         st.builds(Samples, U64, samples, U16, U32, U64, U16),
-        st.builds(Output, U64, counts(stream, stream.block), U16),
+        st.builds(Output, U64, counts(stream, stream.block), U16, *later),
         st.builds(Heartbeat, U8, U16, U8, U32, U32),
         st.builds(EmergencyStop, U8),
     )

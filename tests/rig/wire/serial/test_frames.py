@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rig.wire.messages import Request, Stream
+from rig.wire.messages import VERSION, Request, Stream
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec
 from rig.wire.serial.frames import FrameReader, frame, largest_frame
 from rig.wire.serial.frames import payload_of as product_payload_of
@@ -21,6 +21,7 @@ PING = Request(1, 1, 65)
 
 def reader(stream=STREAM):
     codec = Codec()
+    codec.version = VERSION
     codec.configure(stream)
     out = FrameReader(codec, {})
     out.configure(stream)
@@ -56,7 +57,7 @@ mutations = st.tuples(st.sampled_from(["flip", "cut", "repeat", "garbage"]), st.
 
 
 @given(
-    st.lists(messages(STREAM), min_size=1, max_size=12),
+    st.lists(messages(STREAM, VERSION), min_size=1, max_size=12),
     st.lists(mutations, max_size=8),
     st.lists(st.integers(0, 10**6)),
 )
@@ -73,7 +74,11 @@ def test_of_a_damaged_stream_all_that_is_intact_comes_through_and_nothing_else(s
     assert changes or not any(counters.values())
 
 
-@given(st.binary(max_size=600), st.lists(messages(STREAM), min_size=1, max_size=4), st.lists(st.integers(0, 10**6)))
+@given(
+    st.binary(max_size=600),
+    st.lists(messages(STREAM, VERSION), min_size=1, max_size=4),
+    st.lists(st.integers(0, 10**6)),
+)
 def test_frames_behind_garbage_come_through_from_the_next_zero_on(garbage, sent, cuts):
     codec, _ = reader()
     got, counters = fed(garbage + b"\0" + b"".join(frame(codec.encode(message)) for message in sent), cuts)
@@ -107,7 +112,7 @@ def test_what_is_skipped_is_counted_by_its_reason():
     damaged = bytearray(frame(good))
     damaged[5] ^= 0x10
     foreign = frame(b"\x09\x05" + bytes(14))
-    unknown = frame(b"\x01\x63" + bytes(10))
+    unknown = frame(b"\x02\x63" + bytes(10))
     got, counters = fed(bytes(damaged) + foreign + unknown + b"\x05" * 3000 + b"\0" + frame(good))
     assert got == [PING]
     assert counters == {

@@ -274,11 +274,14 @@ def test_a_line_that_takes_no_more_is_said_in_bounded_time_and_frames_stay_whole
     assert not any(host.counters.values())
 
 
-def test_the_load_is_that_of_frames_at_ten_bits_a_byte():
-    load = line_load(STREAM, BAUD)
+@pytest.mark.parametrize("version", [1, 2])
+def test_the_load_is_that_of_frames_at_ten_bits_a_byte(version):
+    load = line_load(STREAM, BAUD, version)
     samples = 4 + 24 + 5 * 4 * 2 + 4 + 1 + 1  # header, body, CRC, COBS, zero
     heartbeats = 10 * (4 + 12 + 4 + 1 + 2)
-    assert load.needed_bit_s == 10 * (1000 * samples + heartbeats)
+    readbacks = 50 * (4 + 8 + 5 * 2 + 4 + 1 + 1) if version == 2 else 0  # of one block in twenty
+    assert load.needed_bit_s == 10 * (1000 * samples + heartbeats + readbacks)
+    assert ("readbacks" in load.sum_text) == (version == 2)
     assert load.share == load.needed_bit_s / BAUD
     assert f"1000/s x {samples} bytes of samples" in load.sum_text
     assert "3000000 baud carry 3000 kbit/s" in load.sum_text
