@@ -129,7 +129,7 @@ def cautions_of(bench: Bench, memory: BenchMemory, what: str, identity: Mapping[
         return ()
     out = list(cautions_of_limits(bench))
     if check is None:
-        return (f"the bench was never checked: rig check --bench {bench.name}", *out)
+        return ("the bench was never checked: run `rig check` with it", *out)
     if check.failed:
         out.append(f"the last check failed: {', '.join(check.failed)}")
     age_h = _age_h(check.at)

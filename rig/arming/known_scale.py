@@ -30,7 +30,7 @@ def known_scale(
         return check.scale, ""
     return None, (
         f"the scale of force and motion is unproven: {why}; a sensitivity that is wrong by a factor would not be seen "
-        f"(rig check --bench {bench.name})"
+        "(run `rig check` with this bench)"
     )
 
 

@@ -1,6 +1,5 @@
 """Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from rig.campaigns.running.device_remarks import with_device_remarks
 from rig.campaigns.running.evaluation_thread import EvaluationThread
 from rig.campaigns.running.measured_before import MeasuredBefore, before_another
 from rig.campaigns.running.row_buffer import RowBuffer
-from rig.campaigns.running.start_judgement import PERIODS as START_PERIODS
+from rig.campaigns.running.start import Start
 from rig.campaigns.running.start_judgement import StartJudgement
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
@@ -124,10 +123,8 @@ class Execution:
         self.kept = RowBuffer(loop.tick.row_dtype, folder)
         self.stored = StoredRows(plan, loop.tick.arrays.segments, self._evaluated(), bench.sample_rate_hz)
         self.evaluations = EvaluationThread()
-        self.start = StartJudgement(bench, plan, checked)
-        kinds = loop.tick.arrays.segments["kind"]
-        self.start_segment = int(np.argmax(kinds == SegmentKind.START)) if (kinds == SegmentKind.START).any() else None
-        self.start_judgements = 0
+        self.scale = StartJudgement(bench, plan, checked)
+        self.start = Start(self.scale, loop)
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
@@ -249,38 +246,12 @@ class Execution:
                 self._report(point)
 
     def _judge_start(self) -> None:
-        """Request the judgement of the vibration at the start voltage when it is due; the start lasts until then."""
-        due = self.tick.start_judgements
-        if self.start_segment is None or due <= self.start_judgements:
-            return
-        end, begin = self.tick.sample, int(self.tick.outcomes[self.start_segment]["first_sample"])
-        rows = self.kept.take(max(end - self._start_samples(), begin), end)
-        self.start_judgements = due
-        last = self.tick.start_late_periods >= self.start.longest_periods
-        self.evaluations.ask(self._judged_start, rows, due, last)
-
-    def _start_samples(self) -> int:
-        return math.ceil((START_PERIODS + 0.5) / self.tick.frequency_hz * self.bench.sample_rate_hz)
-
-    def _judged_start(self, rows: Rows, number: int, last: bool) -> list[Point[Any]]:
-        """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused.
-
-        ``number`` of the judgement, from 1; ``last``: it is the last one.
-        """
-        try:
-            refusal = self.start.refusal_of_rows(rows)
-        except BaseException:
-            self.loop.request_stop()  # a loop in lockstep waits for an answer
-            raise
-        if refusal:
-            self.loop.request_stop(f"before the first level: {refusal}")
-        elif last or not self.start.pending:
-            self.loop.release_start()
-        else:
-            self.loop.go_on_starting(number)
-            return []
-        self.start_segment = None
-        return []
+        """Request the judgement of the vibration at the start voltage when it is due, and say if it ended undecided."""
+        if (due := self.start.due_rows(self.kept)) is not None:
+            self.evaluations.ask(self.start.judge, *due)
+        if remark := self.start.take_remark():
+            self._write("event", {"sample": self.tick.sample, "what": "remark", "text": remark})
+            self.progress.remark(remark)
 
     def _note_refused(self) -> None:
         """Keep what the sequencer has refused and measures again."""
@@ -353,8 +324,8 @@ class Execution:
         index = self.next_segment
         if index >= outcomes.size:
             return self.tick.sample
-        if self.start_segment is not None:
-            return self.tick.sample - self._start_samples()
+        if (first := self.start.first_needed()) is not None:
+            return first
         running = int(outcomes[index]["outcome"]) == Outcome.RUNNING
         of_a_point = int(segments[index]["point"]) >= 0
         if self.in_one_go and of_a_point:
@@ -383,7 +354,7 @@ class Execution:
     def _report(self, point: Point[Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan does not alter."""
         point = with_plausibility(self.bench, self.plan, point, self.known)
-        point, refusal = self.start.applied(point)
+        point, refusal = self.scale.applied(point)
         if refusal:
             self.loop.request_stop(refusal)
         if self.watch is not None:
@@ -439,7 +410,7 @@ class Execution:
 
     def _end(self) -> dict[str, Any]:
         reason = EndReason(int(self.tick.guard["reason"][0]))
-        if self.start.refused and reason is EndReason.STOP_REQUESTED:
+        if self.scale.refused and reason is EndReason.STOP_REQUESTED:
             reason = EndReason.START_REFUSED
         if self.loop.failure is not None and not reason.is_trip:
             reason = end_reason_of(self.loop.failure)  # the driver failed when it was stopped, after ramp-down

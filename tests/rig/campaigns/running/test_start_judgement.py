@@ -148,3 +148,18 @@ def test_a_judgement_that_fails_ends_the_run_and_leaves_no_loop_waiting(tmp_path
     monkeypatch.setattr(StartJudgement, "refusal_of_rows", fail)
     with emulated(bench_for("m"), "serial") as far, pytest.raises(RuntimeError, match="for a test"):
         carry_out(plan_for("m"), far, tmp_path / "run.h5", RunOptions())
+
+
+@pytest.mark.parametrize("with_check", [True, False])
+def test_a_start_that_cannot_be_compared_with_the_check_says_so_and_the_first_point_is(
+    tmp_path, monkeypatch, scale, with_check
+):
+    rewire(monkeypatch, scaled("force", 2.0))
+    monkeypatch.setattr(StartJudgement, "refusal_of_rows", lambda judgement, rows: "")  # none can be evaluated
+    options = RunOptions(seed=3, check=scale if with_check else None)
+    with carry_out(plan_for("m"), bench_for("m"), tmp_path / "run.h5", options) as recording:
+        points = list(recording.points)
+        remarks = [event["text"] for event in recording.parts[0].events if event["what"] == "remark"]
+    assert len(points) == 3
+    assert sum("not steady enough to compare its scale" in remark for remark in remarks) == with_check
+    assert all(any("channel force: " in line for line in point["warnings"]) for point in points) is with_check
