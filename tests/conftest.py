@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import gc
 import os
 
 # One thread for linear algebra, before numpy is imported. The matrices of the tests are small: on a busy machine threads that
@@ -32,6 +33,17 @@ settings.load_profile("repeatable")
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers():
     return workers()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect without looking for garbage: what is made stays to the end. The tests' garbage is then sought beside it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(trylast=True)

@@ -22,16 +22,21 @@ class Case(NamedTuple):
     @property
     def is_left_to_the_command(self) -> bool:
         """Whether only the command that writes the page looks at it, because another cell nearly shows it."""
+        fault, middle = self.fault, self.fault.onset == "middle"
         if self.device == "virtual":
-            return self.levels in ("N linear", "m") and self.fault.part in ("response", "driver")  # as in volts
-        return (
-            self.levels != "V"
-            if self.fault.part == "driver"
-            else self.levels != EMULATED or self.fault.onset == "start"
-        )
+            if self.levels == "N linear":  # another law of the force loop; the rest is as with the logarithmic one
+                return not (middle and fault.part in ("force", *BEHIND_THE_OUTPUT))
+            return self.levels == "m" and fault.part not in ("drive", *BEHIND_THE_OUTPUT)  # the others as in volts
+        if fault.part == "driver":
+            return self.levels != "V"
+        of_the_device = fault.part in ("force", *BEHIND_THE_OUTPUT) or fault.kind in AT_THE_CONVERTER
+        return self.levels != EMULATED or not (middle and of_the_device)  # the others as in the process
 
 
 EMULATED = "N logarithmic"
+BEHIND_THE_OUTPUT = ("amplifier", "structure")
+AT_THE_CONVERTER = ("stuck", "over-range")
+"""Faults of a sensor that the device's converter makes another of."""
 FRICTION = (
     "stuck",
     "open",

@@ -29,6 +29,9 @@ def test_the_matrix_has_faults_of_every_part_at_every_kind_of_level_on_both_devi
     assert {case.device for case in CASES} == {"virtual", "emulated"}
     assert len({case.name for case in CASES}) == len(CASES)
     assert {case.fault for case in TESTED} == {case.fault for case in CASES}
+    assert {(case.levels, case.device) for case in TESTED} == {(levels, "virtual") for levels in LEVELS} | {
+        (levels, "emulated") for levels in ("V", "N logarithmic")
+    }
 
 
 def test_each_bound_can_be_broken():
