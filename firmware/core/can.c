@@ -200,7 +200,8 @@ static bool has_expired(void)
 
 /* -- receiving -------------------------------------------------------------------------------------------------------------- */
 
-enum { OPEN_BLOCKS = 4 };             /* blocks that may be incomplete at the same time */
+enum { OPEN_BLOCKS = 4 };             /* blocks that frames may belong to: the newest and those right before it */
+enum { NONE = -1 };
 enum { MOST_GROUPS = FD_WRAP / 2 };   /* frames of a block of outputs */
 
 struct open {
@@ -211,19 +212,21 @@ struct open {
     uint8_t counts[VL_LARGEST_BLOCK * COUNT_BYTES];
 };
 
-static struct open opened[OPEN_BLOCKS + 1];
+static struct open opened[OPEN_BLOCKS];
 static int64_t oldest;                /* the first block that may still come */
+static int64_t early;                 /* one that has come before the one right before it; NONE: there is no such block */
 static int64_t next_group;            /* the one after the newest */
 static bool has_mark;
 static int64_t mark;                  /* a group that OutputIndex has told of, half the sequence numbers ahead or more */
 static bool is_configured;
 
-/* Give up what is incomplete before a block. */
+/* Give up blocks before one. */
 static void give_up_before(int64_t number)
 {
-    oldest = number;
-    for (uint32_t i = 0; i <= OPEN_BLOCKS; i++) {
-        if (opened[i].is_used && opened[i].number < number) {
+    if (number > oldest)
+        oldest = number;
+    for (uint32_t i = 0; i < OPEN_BLOCKS; i++) {
+        if (opened[i].is_used && opened[i].number < oldest) {
             opened[i].is_used = false;
             vl_counters.incomplete_blocks++;
         }
@@ -252,37 +255,13 @@ static int64_t group_of(uint32_t number)
 
 static struct open *find(int64_t number)
 {
-    for (uint32_t i = 0; i <= OPEN_BLOCKS; i++)
+    for (uint32_t i = 0; i < OPEN_BLOCKS; i++)
         if (opened[i].is_used && opened[i].number == number)
             return &opened[i];
     return NULL;
 }
 
-static uint32_t n_open(void)
-{
-    uint32_t n = 0;
-    for (uint32_t i = 0; i <= OPEN_BLOCKS; i++)
-        n += opened[i].is_used;
-    return n;
-}
-
-/* Number of the second oldest block; all places are in use. */
-static int64_t second_oldest(void)
-{
-    int64_t first = INT64_MAX, second = INT64_MAX;
-    for (uint32_t i = 0; i <= OPEN_BLOCKS; i++) {
-        int64_t number = opened[i].number;
-        if (number < first) {
-            second = first;
-            first = number;
-        } else if (number < second) {
-            second = number;
-        }
-    }
-    return second;
-}
-
-/* Open a block; one too many ends the oldest. NULL where that is the block itself. */
+/* Open a block. There is room: older blocks than the OPEN_BLOCKS newest have been given up. */
 static struct open *open_block(int64_t number)
 {
     struct open *block_opened = opened;
@@ -292,13 +271,17 @@ static struct open *open_block(int64_t number)
     block_opened->is_used = true;
     block_opened->number = number;
     block_opened->missing = received.groups;
-    if (n_open() > OPEN_BLOCKS)
-        give_up_before(second_oldest());
-    return number < oldest ? NULL : block_opened;
+    return block_opened;
 }
 
+/* Once a block is whole, the one right before it may still come, and none before that. */
 static void hand_over(int64_t number, const uint8_t *counts)
 {
+    int64_t before = number - 1;
+    if (before < oldest || before == early)
+        before = number + 1 == early ? number + 2 : number + 1;
+    early = before < number ? number : NONE;
+    give_up_before(before);
     vl_take_output((uint64_t)number * vl_in_force.block, counts);
 }
 
@@ -307,8 +290,6 @@ static void add_to_block(int64_t number, uint32_t place, const uint8_t *counts, 
     struct open *into = find(number);
     if (!into)
         into = open_block(number);
-    if (!into)
-        return;
     uint8_t *at = into->counts + place * received.rows * COUNT_BYTES;
     if (into->seen[place]) {
         vl_counters.repeated_frames++;
@@ -320,7 +301,6 @@ static void add_to_block(int64_t number, uint32_t place, const uint8_t *counts, 
     if (--into->missing || into->is_spoilt)
         return;
     into->is_used = false;
-    give_up_before(number + 1);
     hand_over(number, into->counts);
 }
 
@@ -331,13 +311,14 @@ static void take_group(int64_t taken, const uint8_t *counts, uint32_t n_bytes)
         give_up_before(mark / received.groups);
     }
     has_mark = false;
-    if (taken >= next_group)
-        next_group = taken + 1;
     int64_t number = taken < 0 ? -1 : taken / received.groups;
-    if (number < oldest) {
+    if (taken >= next_group) {
+        next_group = taken + 1;
+        give_up_before(number - OPEN_BLOCKS + 1);
+    }
+    if (number < oldest || number == early) {
         vl_counters.repeated_frames++;
     } else if (received.groups == 1) {
-        give_up_before(number + 1);
         hand_over(number, counts);
     } else {
         add_to_block(number, (uint32_t)(taken % received.groups), counts, n_bytes);
@@ -455,9 +436,10 @@ static void configure(void)
     received = stream_of(shape.output_rows, shape.output_wrap);
     block = NULL;
     was_told = has_mark = was_given_up = false;
-    for (uint32_t i = 0; i <= OPEN_BLOCKS; i++)
+    for (uint32_t i = 0; i < OPEN_BLOCKS; i++)
         opened[i].is_used = false;
     oldest = vl_in_force.queue;
+    early = NONE;
     next_group = oldest * received.groups;
     is_configured = true;
 }

@@ -13,6 +13,7 @@ from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
 from rig.text.console import number, print_table
+from rig.text.disorder import LATE_BLOCKS, OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, disorder_text
 from rig.text.message_pages import where_explained
 from rig.text.printable import printable, printable_strings
 
@@ -43,11 +44,38 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
         print(
             f"what was accepted is kept; `rig resume {path}` measures the rest, with --plan PLAN.toml by a changed plan"
         )
-    for name, count in summary["counters"].items():
+    for line in _counted(summary["counters"]):
+        print(line)
+
+
+def _counted(counters: Mapping[str, int]) -> list[str]:
+    """Return what a driver has counted, one line for each counter; frames out of order are one line."""
+    order = (OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, LATE_BLOCKS)
+    out = []
+    for name, count in counters.items():
         if count and name == CONTINUED:
-            print(f"note: outputs came too late in {count} samples; the device went on with the vibration")
-        elif count:
-            print(f"warning: {name.replace('_', ' ')}: {count} samples")
+            out.append(f"note: outputs came too late in {count} samples; the device went on with the vibration")
+        elif count and name not in order:
+            out.append(f"warning: {name.replace('_', ' ')}: {count}{_unit(name)}")
+    disorder = disorder_text(counters)
+    return [*out, f"warning: {disorder}"] if disorder else out
+
+
+def _unit(name: str) -> str:
+    """Return the unit of a counter: its name says it, or it counts samples."""
+    said = (
+        "frames",
+        "blocks",
+        "lines",
+        "bytes",
+        "errors",
+        "answers",
+        "retries",
+        "versions",
+        "malformed",
+        "resynchronised",
+    )
+    return "" if name.endswith(said) else " samples"
 
 
 def _pace(loop: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """What the device says of the samples of a point: its flags, lost samples, and outputs that came too late."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,10 +11,11 @@ from rig.campaigns.evaluation.lost_samples import lost_rows, lost_warnings
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows, stretches
 from rig.daq import CONTINUED, HELD, flag_names
+from rig.text.disorder import LATE_BLOCKS, disorder_text
 from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD
 
-__all__ = ["with_device_remarks"]
+__all__ = ["with_device_remarks", "with_disorder"]
 
 
 def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) -> Point[Any]:
@@ -42,3 +43,14 @@ def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) 
     if faults.held and not point.accepted:
         return replace(out, reason=f"{faults.text()}; {point.reason}")
     return out
+
+
+def with_disorder(point: Point[Any], counters: Mapping[str, int]) -> Point[Any]:
+    """Name the order of frames where a point lacks samples and blocks came too late to be put in their place.
+
+    ``counters`` are those of the driver, so far.
+    """
+    if not point.lost_samples or not counters.get(LATE_BLOCKS, 0):
+        return point
+    text = disorder_text(counters)
+    return point.warned(text) if point.accepted else replace(point, reason=f"{point.reason}; {text}")

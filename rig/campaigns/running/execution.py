@@ -24,7 +24,7 @@ from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.attempts import RefusedRecords, after_attempts
-from rig.campaigns.running.device_remarks import with_device_remarks
+from rig.campaigns.running.device_remarks import with_device_remarks, with_disorder
 from rig.campaigns.running.evaluation_thread import EvaluationThread
 from rig.campaigns.running.measured_before import MeasuredBefore, before_another
 from rig.campaigns.running.row_buffer import RowBuffer
@@ -38,6 +38,7 @@ from rig.errors import RecordingError
 from rig.live.publisher import Live, Unpublished
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.system.stop_signals import asking, held
+from rig.text.disorder import disorder_text
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
@@ -136,8 +137,7 @@ class Execution:
         flags = {"points_done": self.done, "device_flags": flag_names(self.loop.counters)}
         self._write("part", {**information, **flags})
         for remark in self.loop.remarks:
-            self._write("event", {"sample": 0, "what": "remark", "text": remark})
-            self._attempt(self.progress.remark, remark)
+            self._remark(remark)
         with one_thread(), held():  # signals: until the end record is in the journal
             with asking(self.loop.request_stop), self.live.heeding(self.loop.request_stop):
                 try:
@@ -151,11 +151,18 @@ class Execution:
             self._report_rest()
             self._attempt(self._mark_unlocked)
             self.evaluations.close()
+            self._remark(disorder_text(self.loop.counters))
             self._write("end", self._end())
         if self.failure is not None:
             raise self.failure
         if self.write_error is not None:
             raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
+
+    def _remark(self, text: str) -> None:
+        """Record and print a remark of the driver, if there is one."""
+        if text:
+            self._write("event", {"sample": self.tick.sample, "what": "remark", "text": text})
+            self._attempt(self.progress.remark, text)
 
     def _take(self, rows: np.ndarray) -> None:
         """Record and evaluate a chunk of rows."""
@@ -282,6 +289,7 @@ class Execution:
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
+        points = [with_disorder(point, self.loop.counters) for point in points]
         if not self.in_one_go:
             left_alone = int(told[0]["left_alone"])
             points = [with_force_harmonics(self.bench, self.plan, target, point, left_alone) for point in points]

@@ -14,6 +14,7 @@ from rig.drivers.wire.dialogue import latched_text
 from rig.drivers.wire.facts import DeviceFacts, remarks_on
 from rig.drivers.wire.options import LARGEST_QUEUE, WireOptions, raised_remark, watchdog_range_s, watchdog_s
 from rig.drivers.wire.streaming import FLAG_NAMES, Streaming
+from rig.text.disorder import LATE_BLOCKS, REORDERED_BLOCKS, disorder_text
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 
@@ -108,7 +109,8 @@ class WireDAQ(DAQ):
             out.append("the device was still running from an earlier run and was stopped first")
         if connection.cleared:
             out.append(f"{latched_text(connection.cleared)} in an earlier run and was cleared")
-        return tuple(out)
+        disorder = disorder_text(self.counters)
+        return (*out, disorder) if disorder else tuple(out)
 
     @property
     def latched(self) -> str:
@@ -158,7 +160,15 @@ class WireDAQ(DAQ):
         """Samples by device flag, then what was lost, repeated or damaged on the way."""
         streaming, connection = self._streaming, self._connection
         out = dict(streaming.flag_counts) if streaming else dict.fromkeys(FLAG_NAMES, 0)
-        for name in ("lost_samples", "repeated_blocks", "misplaced_blocks", "missing_readbacks"):
+        counted = (
+            "lost_samples",
+            "repeated_blocks",
+            REORDERED_BLOCKS,
+            LATE_BLOCKS,
+            "misplaced_blocks",
+            "missing_readbacks",
+        )
+        for name in counted:
             out[name] = getattr(streaming.incoming, name) if streaming else 0
         out["dropped_by_device"] = streaming.incoming.dropped if streaming else 0
         if connection is not None:

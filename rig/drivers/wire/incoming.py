@@ -1,5 +1,6 @@
-"""Blocks from the wire, in order: lost blocks are reported as gaps; repeated and late blocks are counted and skipped."""
+"""Blocks from the wire, put in order: lost blocks are reported as gaps; repeated and late blocks are counted and skipped."""
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -13,6 +14,8 @@ __all__ = ["Incoming"]
 OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must have started to count anew
 UNARMED_BEATS = 2  # the first may have been sent before the device was armed
 UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
+REMEMBERED = 4  # blocks that were given up (one of them that comes after all is late, not repeated), and readbacks
+MOST_LOOKED_AT = 64  # messages that are looked through for a block that another has overtaken
 STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
 MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
 
@@ -22,16 +25,24 @@ class Incoming:
 
     ``shape`` is that of a block. A gap of more than ``longest_gap`` samples is an error: the watchdog would have ended the
     stream before. In version 2 of the protocol a block in which an output was missing comes with a readback, or is a gap.
+    A block that the next one has overtaken is put in its place if it is there or comes within ``patience_s``, and before a
+    third one.
 
     Errors: `DaqTimeout`, `DaqProtocol`, `DaqReset`, `DaqWatchdog`, `DaqEmergencyStop`.
     """
 
     def __init__(
-        self, dialogue: Dialogue, shape: tuple[int, int], longest_gap: int, timeout_s: float, boot: int
+        self,
+        dialogue: Dialogue,
+        shape: tuple[int, int],
+        longest_gap: int,
+        timeout_s: float,
+        boot: int,
+        patience_s: float = 0.0,
     ) -> None:
         self._dialogue, self._link, self._clock = dialogue, dialogue.link, dialogue.clock
         self._shape, self._block, self._longest_gap = shape, shape[0], longest_gap
-        self._boot, self._timeout_s = boot & 0xFF, timeout_s
+        self._boot, self._timeout_s, self._patience_s = boot & 0xFF, timeout_s, patience_s
         self.on_answer: Callable[[Answer], None] = dialogue.note_stray
         self.expected = 0
         """Index of the first sample of the next block."""
@@ -41,10 +52,16 @@ class Incoming:
         self.missing_readbacks = 0
         self.put_out: np.ndarray | None = None
         """Counts [n] that were put out during the block returned last; None where no output was missing."""
+        self.reordered_blocks = 0
+        """Blocks that the next one had overtaken, and that were put in their place."""
+        self.late_blocks = 0
+        """Blocks that came after they had been given up."""
         self.misplaced_blocks = 0
         self.dropped = 0
-        self._newer: Samples | None = None
-        self._readback: Readback | None = None
+        self._newer: deque[Samples] = deque()
+        self._given_up: deque[int] = deque(maxlen=REMEMBERED)
+        self._readbacks: dict[int, Readback] = {}
+        self._untold: dict[int, Samples] = {}
         self._reads_back = dialogue.link.version > LOWEST_VERSION
         self._old_in_a_row = 0
         self._last_old = 0
@@ -52,28 +69,65 @@ class Incoming:
 
     def take(self) -> Samples | None:
         """The next block; None if it was lost, which shows when a newer block arrives."""
-        samples = self._newer
-        if samples is None:
-            samples = self._wait()
-        if samples.first == self.expected:
-            self._newer = None
+        newer = self._newer
+        if not newer:
+            newer.append(self._wait())
+        if len(newer) == 1 and newer[0].first == self.expected + self._block:
+            self._look_for_the_one_before(newer[0].first)
+        samples: Samples | None = newer[0]
+        if newer[0].first == self.expected:
+            newer.popleft()
             self.blocks += 1
-            readback = self._readback if samples.flags & MISSED else None
+            readback = self._readbacks.get(samples.first) if samples.flags & MISSED else None
             self.put_out = readback.counts if readback is not None else None
         else:
-            self._newer = samples
             self.lost_samples += self._block
+            self.missing_readbacks += self.expected in self._untold
+            self._given_up.append(self.expected)
             samples = None
+        self._readbacks.pop(self.expected, None)
+        self._untold.pop(self.expected, None)
         self.expected += self._block
         return samples
+
+    def _look_for_the_one_before(self, first: int) -> None:
+        """Wait a little for the expected block, which that at ``first`` may have overtaken, and not beyond a further one."""
+        until = self._clock() + self._patience_s
+        left_s = self._patience_s
+        for _ in range(MOST_LOOKED_AT):
+            message = self._next(left_s)
+            if message is None:
+                return
+            if not isinstance(message, Samples):
+                self._other(message)
+            elif message.first == first:
+                self.repeated_blocks += 1
+            elif self._is_good(message):
+                if message.first == self.expected:
+                    self._newer.appendleft(message)
+                    self.reordered_blocks += 1
+                else:
+                    self._newer.append(message)
+                return
+            left_s = max(until - self._clock(), 0.0) if left_s else 0.0
+
+    def _next(self, timeout_s: float) -> Message | None:
+        """The next message; a block in which an output was missing comes again once its readback is there."""
+        early = self._dialogue.early
+        message = early.popleft() if early else self._link.receive(timeout_s)
+        if not isinstance(message, Readback):
+            return message
+        if len(self._readbacks) >= REMEMBERED:
+            del self._readbacks[next(iter(self._readbacks))]
+        self._readbacks[message.first] = message
+        return self._untold.pop(message.first, message)
 
     def _wait(self) -> Samples:
         """Wait for a block that is not older than the expected one."""
         until = 0.0
         left_s = self._timeout_s
         while True:
-            early = self._dialogue.early
-            message: Message | None = early.popleft() if early else self._link.receive(left_s)
+            message = self._next(left_s)
             if message.__class__ is Samples and self._is_good(message):
                 return message
             if message is not None and message.__class__ is not Samples:
@@ -104,6 +158,10 @@ class Incoming:
         if first >= self.expected:
             self.misplaced_blocks += 1
             return False
+        if first in self._given_up:
+            self._given_up.remove(first)
+            self.late_blocks += 1
+            return False
         self.repeated_blocks += 1
         follows = first == self._last_old + block
         self._old_in_a_row = self._old_in_a_row + 1 if follows and self._old_in_a_row else 1
@@ -116,16 +174,15 @@ class Incoming:
 
     def _is_told(self, samples: Samples) -> bool:
         """Whether a block in which an output was missing came with what was put out instead; version 1 tells that never."""
-        readback = self._readback
-        if not self._reads_back or not samples.flags & MISSED or (readback and readback.first == samples.first):
+        if not self._reads_back or not samples.flags & MISSED or samples.first in self._readbacks:
             return True
-        self.missing_readbacks += 1
+        if len(self._untold) >= REMEMBERED:
+            del self._untold[next(iter(self._untold))]
+        self._untold[samples.first] = samples
         return False
 
     def _other(self, message: Message) -> None:
-        if isinstance(message, Readback):
-            self._readback = message
-        elif isinstance(message, Answer):
+        if isinstance(message, Answer):
             self.on_answer(message)
         elif isinstance(message, Heartbeat):
             if message.boot != self._boot:

@@ -48,6 +48,7 @@ class Scaling:
 
 
 PINGS_PER_S = 20.0
+WAITED = 0.5  # of the time that the queue leaves once the next block has come, for one that this has overtaken
 FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
 
 
@@ -72,7 +73,8 @@ class Streaming:
         self._dialogue.early.clear()
         longest_gap = math.ceil((wait_s + timeout_s) * stream.rate_hz) + stream.block
         shape = stream.block, stream.n_channels
-        self.incoming = Incoming(self._dialogue, shape, longest_gap, timeout_s, facts.boot)
+        patience_s = block_s * (1.0 if facts.repeatable else min(1.0, WAITED * (stream.queue - 1)))
+        self.incoming = Incoming(self._dialogue, shape, longest_gap, timeout_s, facts.boot, patience_s)
         self.incoming.on_answer = self._take_answer
         self.flag_counts = dict.fromkeys(FLAG_NAMES, 0)
         """Samples by device flag."""

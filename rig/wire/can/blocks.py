@@ -97,8 +97,7 @@ class StreamFrames:
 
 
 OPEN_BLOCKS = 4
-"""Blocks that may be incomplete at the same time; the oldest is dropped for a further one."""
-
+"""Blocks that frames may belong to: the newest and those right before it. Older ones are given up."""
 
 _NEVER = 1 << 30
 INDICES = 1 << 32  # a frame has 32 bits for the index of a sample
@@ -118,7 +117,8 @@ class Blocks:
     """Puts blocks together from frames that may be lost, doubled or swapped.
 
     A frame carries its sequence number, modulo ``wrap``, and its part. The number is taken as the nearest group ahead of the
-    last one if that is less than half a wrap away, else as one behind. A complete block ends all older ones. After a loss of
+    last one if that is less than half a wrap away, else as one behind. Blocks are returned as they become whole: one may come
+    right after the next one, of which frames have overtaken its own; all older ones are given up. After a loss of
     half a wrap or more, an index from another message (`mark`) corrects the numbering once a frame agrees with it.
     """
 
@@ -130,13 +130,20 @@ class Blocks:
         self._open: dict[int, _Open] = {}
         self._oldest = 0
         """The first block that may still come."""
+        self._early: int | None = None
+        """A block that has come before the one right before it, which may still come."""
         self._next = 0
         """The group after the newest one."""
+        self._newest = -1
+        """The newest frame, counted from the start: group times parts, plus part."""
+        self._came = [-1] * (self._wrap * self._parts)
+        """The last frame that came with each sequence number and part, counted likewise."""
         self._mark: int | None = None
 
     def begin(self, block: int) -> None:
         """Set the first block to come, if it is not block 0."""
         self._oldest, self._next = block, block * self._per_block
+        self._newest = self._next * self._parts - 1
 
     def mark(self, sample: int) -> None:
         """Note that ``sample``, modulo 2^32, is next; used only if it is half a wrap or more ahead of the sequence numbers."""
@@ -161,15 +168,29 @@ class Blocks:
             self._count("resynchronised")
             self._drop(group // self._per_block)
         self._mark = None
-        self._next = max(self._next, group + 1)
         block, place = divmod(group, self._per_block)
-        if block < self._oldest:
+        self._note_order(block, group * self._parts + part)
+        if group >= self._next:
+            self._next = group + 1
+            self._drop(block - OPEN_BLOCKS + 1)
+        if block < self._oldest or block == self._early:
             self._count("repeated_frames")
             return None
         if self._per_block * self._parts == 1:
-            self._drop(block + 1)
+            self._finish(block)
             return block, counts, flags
         return self._add(block, place * self._parts + part, piece, counts, flags)
+
+    def _note_order(self, block: int, frame: int) -> None:
+        """Count a frame that has not come before if it comes after a later one, and that is of one of the newest blocks."""
+        slot = frame % len(self._came)
+        if self._came[slot] >= frame:
+            return
+        newest_block = self._newest // (self._per_block * self._parts)
+        if frame < self._newest and block > newest_block - OPEN_BLOCKS:
+            self._count("out_of_order_frames")
+        self._came[slot] = frame
+        self._newest = max(self._newest, frame)
 
     def _add(
         self, block: int, frame: int, piece: Piece, counts: np.ndarray, flags: int
@@ -177,10 +198,6 @@ class Blocks:
         held = self._open.get(block)
         if held is None:
             held = self._open[block] = _Open(self._shape, self._per_block * self._parts)
-            if len(self._open) > OPEN_BLOCKS:
-                self._drop(sorted(self._open)[1])
-                if block < self._oldest:
-                    return None
         into = held.counts[piece.rows, piece.columns]
         if held.seen[frame]:
             self._count("repeated_frames")
@@ -194,15 +211,21 @@ class Blocks:
         if held.missing:
             return None
         del self._open[block]
-        self._drop(block + 1)
+        self._finish(block)
         return block, held.counts, held.flags
 
+    def _finish(self, block: int) -> None:
+        """Note that a block has come whole: the one right before it may still come, and none before that."""
+        oldest = block - 1
+        if oldest < self._oldest or oldest == self._early:
+            oldest = block + 1 if block + 1 != self._early else block + 2
+        self._early = block if oldest < block else None
+        self._drop(oldest)
+
     def _drop(self, oldest: int) -> None:
-        """Drop incomplete blocks before ``oldest``."""
-        self._oldest = oldest
-        if not self._open:
-            return
-        for block in [block for block in self._open if block < oldest]:
+        """Give up blocks before ``oldest``."""
+        self._oldest = max(self._oldest, oldest)
+        for block in [block for block in self._open if block < self._oldest]:
             del self._open[block]
             self._count("incomplete_blocks")
 

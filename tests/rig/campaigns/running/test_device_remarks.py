@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.campaigns.evaluation.point import Quality
-from rig.campaigns.running.device_remarks import with_device_remarks
+from rig.campaigns.running.device_remarks import with_device_remarks, with_disorder
 from rig.tick.layout import DEVICE_SHIFT, SAMPLE_LOST, recorded_row
 from tests.rig.campaigns.made_points import made_point
 
@@ -59,3 +59,19 @@ def test_overloads_warn_and_lost_samples_are_counted() -> None:
     point = with_device_remarks(made_point(), rows_with(SAMPLE_LOST, 7), COUNTERS)
     assert point.lost_samples == 7
     assert point.warnings == ("7 of 1000 samples were lost on their way",)
+
+
+LATE = {"lost_samples": 9, "late_blocks": 3, "reordered_blocks": 0, "out_of_order_frames": 3}
+
+
+def test_where_blocks_came_too_late_for_their_place_the_order_is_named() -> None:
+    said = "frames arrive out of order: 3 frames after a later one, 3 blocks too late"
+    point = with_device_remarks(made_point(), rows_with(SAMPLE_LOST, 7), COUNTERS)
+    accepted = with_disorder(point, LATE)
+    assert accepted.accepted
+    assert accepted.warnings[-1].startswith(said)
+    refused = with_disorder(point.refused("7 of 1000 samples were lost on their way"), LATE)
+    assert refused.reason.startswith(f"7 of 1000 samples were lost on their way; {said}")
+    assert with_disorder(point, LATE | {"late_blocks": 0}) == point
+    whole = with_device_remarks(made_point(), rows_with(0, 0), COUNTERS)
+    assert with_disorder(whole, LATE) == whole
