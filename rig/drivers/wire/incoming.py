@@ -74,9 +74,9 @@ class Incoming:
             newer.append(self._wait())
         if len(newer) == 1 and newer[0].first == self.expected + self._block:
             self._look_for_the_one_before(newer[0].first)
-        samples: Samples | None = newer[0]
+        samples = None
         if newer[0].first == self.expected:
-            newer.popleft()
+            samples = newer.popleft()
             self.blocks += 1
             readback = self._readbacks.get(samples.first) if samples.flags & MISSED else None
             self.put_out = readback.counts if readback is not None else None
@@ -84,7 +84,6 @@ class Incoming:
             self.lost_samples += self._block
             self.missing_readbacks += self.expected in self._untold
             self._given_up.append(self.expected)
-            samples = None
         self._readbacks.pop(self.expected, None)
         self._untold.pop(self.expected, None)
         self.expected += self._block

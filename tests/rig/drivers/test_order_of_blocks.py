@@ -13,7 +13,7 @@ from rig.drivers.wire.incoming import Incoming
 from rig.emulator import Faults
 from rig.errors import DaqReset, DaqTimeout
 from rig.wire.link import Link, Load
-from rig.wire.messages import Answer, DeviceState, Heartbeat, Message, Samples, Stream
+from rig.wire.messages import Answer, DeviceFlag, DeviceState, Heartbeat, Message, Readback, Samples, Stream
 from tests.rig.drivers.test_wire import answers, virtual
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ
@@ -49,8 +49,11 @@ def block(number: int) -> Samples:
     return Samples(number * N, np.full((N, 1), number))
 
 
-def incoming(coming: list[tuple[float, Message]], patience_s: float = PATIENCE_S) -> tuple[Incoming, TimedLink]:
+def incoming(
+    coming: list[tuple[float, Message]], patience_s: float = PATIENCE_S, version: int = 1
+) -> tuple[Incoming, TimedLink]:
     link = TimedLink(coming)
+    link.speak(version)
     dialogue = Dialogue(link, lambda: link.now_s)
     return Incoming(dialogue, (N, 1), 100 * N, 10.0, 7, patience_s), link
 
@@ -158,3 +161,44 @@ def test_silence_after_a_gap_is_a_time_out_as_ever() -> None:
     with pytest.raises(DaqTimeout, match="sample 12 has not come"):
         found.take()
     assert link.now_s == pytest.approx(12.5)
+
+
+def missed(number: int) -> Samples:
+    return block(number)._replace(flags=int(DeviceFlag.OUTPUT_HELD))
+
+
+def told(number: int) -> Readback:
+    return Readback(number * N, np.full(N, -number))
+
+
+def test_a_readback_may_come_after_its_block_and_beside_that_of_another() -> None:
+    coming: list[Message] = [
+        told(0),
+        missed(0),
+        missed(1),
+        told(1),
+        told(3),
+        missed(3),
+        told(2),
+        missed(2),
+        block(4),
+        missed(5),
+        block(6),
+    ]
+    found, _ = incoming([(1.0 + 0.1 * at, message) for at, message in enumerate(coming)], version=2)
+    put_out = []
+    for number in range(7):
+        samples = found.take()
+        assert (samples is None) == (number == 5)
+        put_out.append(None if samples is None or found.put_out is None else int(found.put_out[0]))
+    assert put_out == [0, -1, -2, -3, None, None, None]
+    assert (found.missing_readbacks, found.reordered_blocks, found.lost_samples) == (1, 1, N)
+
+
+def test_readbacks_without_blocks_take_no_memory() -> None:
+    coming: list[Message] = [told(number) for number in range(10, 50)] + [
+        missed(number) for number in range(50, 90) if number % 2
+    ]
+    found, _ = incoming([(1.0, message) for message in [*coming, told(0), missed(0), block(1)]], version=2)
+    assert taken(found, 2) == [0, 1]
+    assert len(found._readbacks) + len(found._untold) <= 8
