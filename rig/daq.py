@@ -87,6 +87,8 @@ class Adjustable(NamedTuple):
     """Part of the wire's capacity that the stream takes at the bench's sample rate, by samples a block; 0 without a limit."""
     largest_wire_share: float
     """Part of the wire's capacity that a stream may take."""
+    automatic: bool = False
+    """Whether the bench leaves the queue to what is measured before a run (`rig.loop.worker.queue_choice`)."""
 
 
 class State(Enum):
@@ -218,6 +220,13 @@ class DAQ(ABC):
     def adjustable(self) -> Adjustable | None:
         """What the driver's options set against late outputs; known once open, None where there is nothing to set."""
         return None
+
+    def adjust(self, queue_blocks: int, watchdog_s: float | None = None) -> None:
+        """Take another queue, and another watchdog than the bench's if one is given, from the next `start` on.
+
+        A driver overrides this if it has `adjustable`. It is called while the device is open and not running.
+        """
+        raise DaqRefused(f"queue_blocks = {queue_blocks}: this driver has no queue that can be set")
 
     @property
     def identity(self) -> dict[str, str]:

@@ -108,8 +108,17 @@ class HarmonicsSettings(Settings):
         if margin < SMALLEST_MARGIN_DEG:
             raise ValueError(
                 f"harmonics.integral = {self.integral:g}: its phase margin {at} is {margin:.0f} deg with {lead_samples:g} "
-                f"samples from output to input, allowed is at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks"
+                f"samples from output to input, allowed is at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks, or a "
+                "shorter queue"
             )
+
+    def longest_delay_s(self, highest_hz: float) -> float:
+        """Return the delay with which the phase margin at ``highest_hz`` is the smallest allowed, s."""
+        spare_deg = self.phase_margin_deg(0.0) - SMALLEST_MARGIN_DEG
+        a_turn_deg = self.phase_margin_deg(0.0) - self.phase_margin_deg(
+            2.0 * math.pi
+        )  # the margin is linear in the delay
+        return spare_deg / a_turn_deg / highest_hz
 
     def phase_margin_deg(self, delay_rad: float) -> float:
         """Return the phase margin of every loop on a plant that is constant near its harmonic, deg.

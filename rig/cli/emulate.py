@@ -145,7 +145,7 @@ def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> st
     from rig.emulator.emulated import driver_options
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
-    options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware)
+    options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware) | {"queue_blocks": "auto"}
     lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
     head = [
         WRITTEN,

@@ -22,7 +22,19 @@ from typing import NamedTuple
 
 from rig.daq import Adjustable
 
-__all__ = ["BUSY", "REACHED", "Recommendation", "Settings", "Timing", "answer_s", "complaints", "recommend"]
+__all__ = [
+    "BUSY",
+    "REACHED",
+    "Recommendation",
+    "Settings",
+    "Timing",
+    "answer_s",
+    "complaints",
+    "milliseconds",
+    "queue_reason",
+    "recommend",
+    "shortest_queue",
+]
 
 RESERVE = 1.5  # of the largest lateness: one or two seconds do not see the largest of a test
 BUSY = 0.5  # of a block for the driver's computing; controller and recorder need the rest
@@ -78,11 +90,11 @@ def recommend(
     """
     largest_queue = allowed.largest_queue if allowed else max(1, now.queue_blocks)
     block, why_block = _block(timing, now, rate_hz, allowed, largest_block)
-    queue = _queue(timing, block, rate_hz, allowed)
+    queue = shortest_queue(timing, block, rate_hz, allowed)
     longer = [size for size in _sizes(now.block, allowed, largest_block) if size > block]
     while queue > largest_queue and longer:
         block = longer.pop(0)
-        queue = _queue(timing, block, rate_hz, allowed)
+        queue = shortest_queue(timing, block, rate_hz, allowed)
         why_block = f"a queue of {largest_queue} shorter blocks does not last"
     holds = queue <= largest_queue
     needed, queue = queue, min(queue, largest_queue)
@@ -90,19 +102,24 @@ def recommend(
         queue = now.queue_blocks
     watchdog, why_watchdog = _watchdog(timing, now, allowed)
     rate, why_rate = _rate(timing, block, rate_hz, allowed, largest_queue)
-    block_s = block / rate_hz
-    answered = answer_s(timing, _wire_s(block, rate_hz, allowed))
-    why_queue = (
-        f"lasts {_ms(max(1, queue) * block_s)}; {_ms(answered + (1.0 - BUSY) * block_s)} are needed: blocks came up to "
-        f"{_ms(timing.late_s)} late (counted {RESERVE:g} times), a round trip takes {_ms(timing.round_trip_s)}, the "
-        f"controller has {_ms((1.0 - BUSY) * block_s)}"
-    )
+    why_queue = queue_reason(timing, queue, block, rate_hz, allowed)
     if not holds:
         why_queue += f"; that would be {needed} blocks, and more than {largest_queue} cannot be set"
     reasons = {"block": why_block, "queue_blocks": why_queue, "watchdog_s": why_watchdog, "largest_rate_hz": why_rate}
     if watchdog is None:
         del reasons["watchdog_s"]
     return Recommendation(Settings(block, queue, watchdog), rate, holds, reasons)
+
+
+def queue_reason(timing: Timing, queue: int, block: int, rate_hz: float, allowed: Adjustable | None) -> str:
+    """Return in one line how long a queue lasts, and how long it must by the rule."""
+    block_s = block / rate_hz
+    answered = answer_s(timing, _wire_s(block, rate_hz, allowed))
+    return (
+        f"lasts {milliseconds(max(1, queue) * block_s)}; {milliseconds(answered + (1.0 - BUSY) * block_s)} are needed: "
+        f"blocks came up to {milliseconds(timing.late_s)} late (counted {RESERVE:g} times), a round trip takes "
+        f"{milliseconds(timing.round_trip_s)}, the controller has {milliseconds((1.0 - BUSY) * block_s)}"
+    )
 
 
 def complaints(
@@ -115,8 +132,8 @@ def complaints(
     seen_s = timing.late_s + timing.round_trip_s + _wire_s(now.block, rate_hz, allowed)
     if seen_s > lasts_s:
         out.append(
-            f"outputs answer a block up to {_ms(seen_s)} after it (lateness and round trip), and the queue of "
-            f"{now.queue_blocks} blocks lasts {_ms(lasts_s)}: outputs come too late and are held"
+            f"outputs answer a block up to {milliseconds(seen_s)} after it (lateness and round trip), and the queue of "
+            f"{now.queue_blocks} blocks lasts {milliseconds(lasts_s)}: outputs come too late and are held"
         )
     if now.watchdog_s is not None and now.watchdog_s < timing.gap_s:
         out.append(
@@ -134,10 +151,10 @@ def _block(
     timing: Timing, now: Settings, rate_hz: float, allowed: Adjustable | None, largest_block: int
 ) -> tuple[int, str]:
     """Return the shortest block, that of the bench or longer, which driver and wire can carry, and why."""
-    busy = f"the driver computes {_ms(timing.busy_s)} a block"
+    busy = f"the driver computes {milliseconds(timing.busy_s)} a block"
     for size in _sizes(now.block, allowed, largest_block):
         if timing.busy_s <= BUSY * size / rate_hz and _fits_wire(size, allowed):
-            lasts = f"{busy}, which lasts {_ms(size / rate_hz)}"
+            lasts = f"{busy}, which lasts {milliseconds(size / rate_hz)}"
             return size, lasts if size == now.block else f"{lasts}: at most {BUSY:.0%} are allowed, or the wire is full"
     return now.block, f"{busy}, and no longer block would help"
 
@@ -157,7 +174,7 @@ def _wire_s(block: int, rate_hz: float, allowed: Adjustable | None) -> float:
     return block / rate_hz * (allowed.wire_share.get(block, 0.0) if allowed else 0.0)
 
 
-def _queue(timing: Timing, block: int, rate_hz: float, allowed: Adjustable | None) -> int:
+def shortest_queue(timing: Timing, block: int, rate_hz: float, allowed: Adjustable | None) -> int:
     """Return the shortest queue, blocks, that lasts for the answer time and the controller's part of a block."""
     answered = answer_s(timing, _wire_s(block, rate_hz, allowed)) * rate_hz / block
     return max(1, math.ceil(answered + 1.0 - BUSY - 1e-9))
@@ -167,7 +184,7 @@ def _watchdog(timing: Timing, now: Settings, allowed: Adjustable | None) -> tupl
     if allowed is None or now.watchdog_s is None:
         return None, ""
     shortest_s, longest_s = allowed.watchdog_range_s
-    why = f"the longest time between two blocks was {_ms(timing.gap_s)} (counted {GAPS:g} times)"
+    why = f"the longest time between two blocks was {milliseconds(timing.gap_s)} (counted {GAPS:g} times)"
     wanted_s = GAPS * timing.gap_s
     if wanted_s <= now.watchdog_s:
         return now.watchdog_s, why
@@ -181,11 +198,11 @@ def _rate(
     """Return the largest sample rate (Hz) with a block, rounded down to two digits, and what bounds it."""
     bounds = {}
     if timing.busy_s > 0.0:
-        bounds[f"the driver computes {_ms(timing.busy_s)} a block"] = BUSY * block / timing.busy_s
+        bounds[f"the driver computes {milliseconds(timing.busy_s)} a block"] = BUSY * block / timing.busy_s
     waits_s = answer_s(timing, _wire_s(block, rate_hz, allowed))
     if waits_s > 0.0:
         room = (largest_queue - 1.0 + BUSY) * block
-        bounds[f"the longest queue, {largest_queue} blocks, must last for {_ms(waits_s)}"] = room / waits_s
+        bounds[f"the longest queue, {largest_queue} blocks, must last for {milliseconds(waits_s)}"] = room / waits_s
     if allowed is not None:
         share = allowed.wire_share.get(block, 0.0)
         if share > 0.0:
@@ -216,5 +233,6 @@ def _rounded_down(value: float) -> float:
     return float(f"{math.floor(value / step + 1e-9) * step:.2g}")
 
 
-def _ms(seconds: float) -> str:
+def milliseconds(seconds: float) -> str:
+    """Return a time in ms with three digits."""
     return f"{1e3 * seconds:.3g} ms"

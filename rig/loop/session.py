@@ -3,6 +3,7 @@
 A virtual rig runs in this process, as fast as the machine allows. A rig with a clock runs in `rig.loop.worker`.
 """
 
+import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,6 +15,7 @@ from rig.daq import DAQ, Capabilities
 from rig.drivers import make_daq
 from rig.errors import RigError
 from rig.loop.loop import Loop, RunningLoop
+from rig.loop.worker.queue_choice import QueueChoice, settle_queue
 from rig.tick.tick import TickSettings
 
 __all__ = ["Session", "open_session"]
@@ -31,26 +33,44 @@ class Session(Protocol):
     latched: str
     """What the device had latched when it was opened, in words; empty if nothing."""
 
+    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
+        """Set the queue of the device for the run, once in a session and before `start`; return the choice.
+
+        With ``queue_blocks = "auto"`` 0 V is exchanged with the device for a second and a half, see
+        `rig.loop.worker.queue_choice.settle_queue`. ``feedback``: whether the plan's outputs answer what is measured;
+        ``delay_s``: the longest delay that its gains bear. None if the driver has no queue to set. Conditions that the device
+        had latched when it was opened are reset, so the caller must be armed if there are any. Raises `rig.errors.DaqError`.
+        """
+
     def start(self, settings: TickSettings) -> RunningLoop:
         """Start the device and a loop over it, once in a session; the loop runs when its rows are requested.
 
-        Conditions that the device had latched when it was opened are reset, so the caller must be armed.
+        The queue is settled as for feedback unless that was done. Conditions that the device had latched when it was opened
+        are reset, so the caller must be armed.
         """
 
 
 class LocalSession:
     """A session in this process."""
 
-    def __init__(self, daq: DAQ, *, realtime: bool) -> None:
-        self._daq, self._realtime = daq, realtime
+    def __init__(self, daq: DAQ, bench: Bench, *, realtime: bool) -> None:
+        self._daq, self._bench, self._realtime = daq, bench, realtime
         self._loop: Loop | None = None
+        self._settled = False
         self.capabilities = daq.capabilities
         self.identity = daq.identity
         self.latched = daq.latched
 
+    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
+        """Settle the queue of the device, see `Session.settle_queue`."""
+        self._daq.clear()
+        self._settled = True
+        return settle_queue(self._daq, self._bench, feedback=feedback, delay_s=delay_s)
+
     def start(self, settings: TickSettings) -> RunningLoop:
         """Start the device; the loop runs while its rows are taken."""
-        self._daq.clear()
+        if not self._settled:
+            self.settle_queue()
         self._daq.start(settings.bench.block)
         loop = Loop(self._daq, settings.build(self._daq.latency_samples), paced=self._realtime)
         if self._realtime or self._daq.wall_clock:
@@ -83,7 +103,7 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
         return
     try:
         daq.open()
-        local = LocalSession(daq, realtime=realtime)
+        local = LocalSession(daq, bench, realtime=realtime)
         try:
             yield local
         finally:

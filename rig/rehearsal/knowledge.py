@@ -137,7 +137,9 @@ def _recording(found: _Found, bench: Bench, name: str, recording: Recording) -> 
     for one in names:
         density = 0.5 * float(np.mean(measured.noise_variance[:, measured.index(one)])) / step
         found.noise[one] = float(np.sqrt(0.5 * density * bench.sample_rate_hz))
-    lead = recording.parts[-1].information.get("about", {}).get("lead_samples")
+    about = recording.parts[-1].information.get("about", {})
+    as_a_loop = about.get("queue", {}).get("how") != "open loop"  # whose queue a test in closed loop does not have
+    lead = about.get("lead_samples") if as_a_loop else None
     found.lead = None if lead is None else float(lead)
     found.shape = True
     _start_from(found, bench, found.responses)

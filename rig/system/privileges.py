@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-__all__ = ["CPU_VARIABLE", "PRIORITY", "prepare"]
+__all__ = ["CPU_VARIABLE", "PRIORITY", "ordinary_scheduling", "prepare"]
 
 PRIORITY = 80
 """Priority of SCHED_FIFO: above the interrupt threads of the kernel (50)."""
@@ -42,15 +42,26 @@ def prepare(*, privileged: bool = True, priority: int = PRIORITY) -> dict[str, s
     return {"memory": "not asked for", "scheduling": "not asked for"} | out
 
 
+def ordinary_scheduling() -> None:
+    """Give back real-time scheduling, for work that nobody waits for; a no-op where there is none."""
+    if hasattr(os, "sched_setscheduler"):
+        for thread in _threads():
+            os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
+
+
 def _schedule(priority: int) -> str:
     """Set SCHED_FIFO for all existing threads; new threads inherit it."""
     if not hasattr(os, "sched_setscheduler"):
         return NO_SUCH
-    folder = Path("/proc/self/task")
-    threads = [int(path.name) for path in folder.iterdir()] if folder.exists() else [0]
-    for thread in threads:
+    for thread in _threads():
         os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     return f"SCHED_FIFO {priority}"
+
+
+def _threads() -> list[int]:
+    """Return the numbers of all threads of this process; 0, the calling one, where the system does not tell."""
+    folder = Path("/proc/self/task")
+    return [int(path.name) for path in folder.iterdir()] if folder.exists() else [0]
 
 
 def _lock_memory() -> str:

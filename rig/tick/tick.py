@@ -17,7 +17,7 @@ from rig.tick.safety.kernels import is_over
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
 from rig.tick.sequencer.judgement import SETTLING
 from rig.tick.sequencer.layout import PROGRESS, SegmentKind
-from rig.tick.sequencer.segments import Segment, SettleRule, segment_table
+from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
 
 __all__ = ["Tick", "TickSettings"]
 
@@ -252,5 +252,4 @@ def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment], lead_s
     """Raise ValueError if the harmonics loop cannot follow the highest frequency of the run."""
     if law.harmonics is None:
         return
-    tones = (segment.excitation.frequency_hz for segment in segments if segment.excitation is not None)
-    law.harmonics.check_frequency(bench.sample_rate_hz, max((law.highest_frequency_hz, *tones)), lead_samples)
+    law.harmonics.check_frequency(bench.sample_rate_hz, highest_frequency_hz(law, segments), lead_samples)

@@ -51,6 +51,25 @@ class LockedPlan(KnownPlant, Plan):
         self.check_plant(bench, self.controller, self.asked_lags_deg)
         self._check_loop(bench)
 
+    def longest_delay_s(self, bench: Bench, at_most_s: float) -> float:
+        """Return the longest delay that the gains bear, s: on the known plant, or without one by a bound."""
+        longest_s = super().longest_delay_s(bench, at_most_s)
+        if self.plant is not None:
+            return self.longest_delay_on_plant_s(bench, self.controller, self.asked_lags_deg, longest_s)
+        return min(longest_s, self.controller.longest_delay_s(self.amplitude_law))
+
+    def check_delay(self, bench: Bench, lead_samples: float) -> None:
+        """Refuse gains that do not bear the delay."""
+        super().check_delay(bench, lead_samples)
+        delay_s = lead_samples / bench.sample_rate_hz
+        if self.plant is not None:
+            self.check_delay_on_plant(bench, self.controller, self.asked_lags_deg, delay_s)
+            return
+        try:
+            self.controller.check_delay(delay_s, self.amplitude_law)
+        except ValueError as error:
+            raise ConfigurationError(f"controller.{error}; or shorter blocks or queue") from None
+
     def _check_loop(self, bench: Bench) -> None:
         """Refuse a window without the tested mode or beyond the bench's limits, and harmonics beyond the sample rate."""
         window, allowed = self.controller.frequency_window_hz, bench.limits.frequency_hz

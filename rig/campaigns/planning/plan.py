@@ -13,7 +13,7 @@ from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.campaigns.planning.levels import Levels
 from rig.errors import ConfigurationError
-from rig.tick.sequencer.segments import Segment, SettleRule
+from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz
 
 __all__ = ["MOST_POINTS", "Column", "OpenLoopPlan", "Plan", "Target", "TonePlan", "with_first_repeated"]
 
@@ -181,9 +181,37 @@ class Plan(Configured):
                 f"harmonics = {harmonics}: allowed is up to {most} of {highest_hz:g} Hz at {rate_hz:g} samples/s"
             )
 
+    @property
+    def feedback(self) -> bool:
+        """Whether outputs answer what is measured; otherwise all of them are known in advance."""
+        return True
+
     @abstractmethod
     def check(self, bench: Bench) -> None:
         """Raise `ConfigurationError`, before anything moves, for what the bench cannot do."""
+
+    def longest_delay_s(self, bench: Bench, at_most_s: float) -> float:
+        """Return the longest delay, up to ``at_most_s``, from an output to the input that shows it that the gains bear, s."""
+        return at_most_s if self.law.harmonics is None else min(at_most_s, self._harmonics_bear_s(bench))
+
+    def _harmonics_bear_s(self, bench: Bench) -> float:
+        """Return the delay with which the harmonics loop has the smallest phase margin allowed, s."""
+        assert self.law.harmonics is not None
+        segments = self.segments(bench.sample_rate_hz)
+        return self.law.harmonics.longest_delay_s(highest_frequency_hz(self.law, segments))
+
+    def check_delay(self, bench: Bench, lead_samples: float) -> None:
+        """Raise `ConfigurationError` for gains that do not bear ``lead_samples`` from an output to the input that shows it.
+
+        These are known once a device has its queue: block, queue, hold and filters.
+        """
+        loop, rate_hz = self.law.harmonics, bench.sample_rate_hz
+        if loop is None:
+            return
+        try:
+            loop.check_frequency(rate_hz, highest_frequency_hz(self.law, self.segments(rate_hz)), lead_samples)
+        except ValueError as error:
+            raise ConfigurationError(f"controller.{error}") from None
 
 
 class OpenLoopPlan(Plan):
@@ -197,6 +225,11 @@ class OpenLoopPlan(Plan):
     def law(self) -> Law:
         """The control law, which has no phase feedback."""
         return self.controller
+
+    @property
+    def feedback(self) -> bool:
+        """Whether a level in newtons or metres is held, or the harmonics loop is on."""
+        return self.amplitude_law is not AmplitudeLaw.VOLTAGE or self.controller.harmonics is not None
 
     def check_frequencies(self, bench: Bench, **frequencies_hz: float) -> None:
         """Refuse a frequency outside the bench's limits."""

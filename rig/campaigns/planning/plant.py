@@ -25,6 +25,9 @@ from rig.errors import ConfigurationError
 
 __all__ = ["KnownPlant", "PlantFacts"]
 
+DELAY_RESERVE = 1.5  # of the delay at which the gains must still be stable
+DELAY_STEP = 1.25  # between delays that are tried
+BISECTIONS = 5  # of the last step: to a percent
 CLOSEST_DEG = 0.5  # spacing of the lags that are checked on the plant: at most a few hundred, each takes milliseconds
 
 
@@ -138,6 +141,48 @@ class KnownPlant(Levels):
             check_motion(self, plant, lags_deg, bench, self.ratios_to_drive(bench))
         except ValueError as error:
             raise ConfigurationError(f"plant: {error}") from None
+
+    def check_delay_on_plant(
+        self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float], delay_s: float
+    ) -> None:
+        """Refuse gains that do not bear a delay on the known plant (`longest_delay_on_plant_s`)."""
+        longest_s = self.longest_delay_on_plant_s(bench, law, lags_deg, delay_s)
+        if delay_s <= longest_s:
+            return
+        given = ", ".join(f"{name} = {getattr(law, name):g}" for name in law.gain_names(self.amplitude_law))
+        raise ConfigurationError(
+            f"controller: {given}: unstable on the known plant ([plant]) with {DELAY_RESERVE:g} times {1e3 * delay_s:.3g} ms "
+            f"from output to input; allowed is up to {1e3 * longest_s:.3g} ms: shorter blocks or queue, smaller gains, or "
+            "those that `rig tune` finds with this delay"
+        )
+
+    def longest_delay_on_plant_s(
+        self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float], at_most_s: float
+    ) -> float:
+        """Return the longest delay, up to ``at_most_s``, that the gains bear: with `DELAY_RESERVE` times it they are stable.
+
+        That of the plan itself is always allowed. ``at_most_s`` if the plant is not known.
+        """
+        known = self.known_plant
+        if known is None or law.detector == "sign" or at_most_s <= known.delay_s:
+            return at_most_s
+        lags_deg = _apart(lags_deg)
+
+        def unstable(seconds: float) -> bool:
+            plant = replace(known, latency_samples=DELAY_RESERVE * seconds * known.sample_rate_hz)
+            return any(unstable_poles(loop) > 0 for loop in self._loops(plant, law, lags_deg, bench))
+
+        low = high = max(known.delay_s, 1e-6)  # stability is not monotone in the delay: the first limit is looked for
+        while high < at_most_s:
+            low, high = high, min(DELAY_STEP * high, at_most_s)
+            if unstable(high):
+                break
+        else:
+            return at_most_s
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if unstable(middle) else (middle, high)
+        return low
 
     def _loops(
         self, plant: PlantModel, law: PhaseLockedLoop, lags_deg: Sequence[float], bench: Bench

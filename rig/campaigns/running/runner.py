@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import vibrolock
-from rig.arming.arming import armed
 from rig.arming.bench_memory import RememberedTrip, memory_of, now, remember
 from rig.arming.checked_scale import CheckedScale
 from rig.arming.known_scale import known_scale, unproven_phase
@@ -24,12 +23,13 @@ from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.continuation import what_is_left
+from rig.campaigns.running.device_queue import armed_with_queue, settled_queue, with_queue
 from rig.campaigns.running.execution import Execution, nothing_left
 from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
 from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.campaigns.running.watched import watched_facts
-from rig.errors import RigError
+from rig.errors import ConfigurationError, RigError
 from rig.live.publisher import Live, published
 from rig.loop.loop import RunningLoop
 from rig.loop.session import Session, open_session
@@ -215,7 +215,12 @@ def _with_further_attempts(
                 return Recording(output)
             names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
             progress.remark(f"measured again, for what was in the way may have passed: point {names}")
-            about = {**facts, "device": session.identity}
+            try:
+                choice = settled_queue(plan, bench, session, options)
+            except ConfigurationError as error:
+                progress.remark(f"nothing is measured again: {error}")
+                return Recording(output)
+            about = with_queue({**facts, "device": session.identity}, choice)
             information = {"first_sample": first_sample, "seed": seed, "about": about}
             segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
             settings = tick_settings(plan, bench, segments, _checked(facts))
@@ -276,18 +281,19 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
     virtual = session.capabilities.virtual
     scale, unproven = known_scale(bench, session.identity, options.check, virtual=virtual)
     missing = [unproven, unproven_phase(bench, virtual=virtual)] if isinstance(plan, LockedPlan) else []
+    arming, choice = armed_with_queue(plan, bench, session, options)
     facts = {
         **options.about.facts(),
         **({} if scale is None else {"checked": asdict(scale)}),
         **({"rehearsal": rehearsed} if rehearsed else {}),
-        "armed": armed(bench, session, purpose or plan.kind, options.arm),
+        "armed": arming,
         "device": session.identity,
         "remarks": [*calibration_remarks(bench, datetime.now(UTC).date()), *filter(None, missing)],
         "code": imported_code(bench),
     }
     for remark in facts["remarks"]:
         options.progress.remark(remark)
-    return facts
+    return with_queue(facts, choice)
 
 
 def _checked(facts: Mapping[str, Any]) -> CheckedScale | None:

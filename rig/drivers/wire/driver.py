@@ -40,7 +40,7 @@ class WireDAQ(DAQ):
     def __init__(self, bench: Bench, seed: int, options: WireOptions) -> None:
         super().__init__(bench.channels, bench.sample_rate_hz, bench.output_range_v)
         self._bench = bench
-        self._options = options
+        self._given = self._options = options
         self._connection: Connection | None = None
         self._streaming: Streaming | None = None
 
@@ -72,7 +72,7 @@ class WireDAQ(DAQ):
     @property
     def latency_samples(self) -> float:
         """Queue, half a sample of hold, and the delay of the converters' filters that the device tells."""
-        return self._options.queue_blocks * self.block + HOLD_SAMPLES + self.filter_delay_samples
+        return self._options.queue * self.block + HOLD_SAMPLES + self.filter_delay_samples
 
     @property
     def filter_delay_samples(self) -> float:
@@ -130,7 +130,7 @@ class WireDAQ(DAQ):
             return None
         block_s = bench.block / bench.sample_rate_hz
         largest = self.capabilities.largest_block
-        queue = self._options.queue_blocks
+        queue = self._options.queue
         shares = {}
         for block in sorted({bench.block, *(size for size in BLOCKS if size <= largest)}):
             stream = Stream(len(bench.channels), block, bench.sample_rate_hz, facts.bits, queue)
@@ -142,7 +142,13 @@ class WireDAQ(DAQ):
             rate_range_hz=facts.rate_hz,
             wire_share=shares,
             largest_wire_share=MOST_LOAD,
+            automatic=self._given.queue_blocks == "auto",
         )
+
+    def adjust(self, queue_blocks: int, watchdog_s: float | None = None) -> None:
+        """Take another queue, and the watchdog given or that of the bench, from the next start on."""
+        chosen = {"queue_blocks": queue_blocks, "watchdog_s": watchdog_s or self._given.watchdog_s}
+        self._options = self._given.model_copy(update=chosen)
 
     @property
     def statistics(self) -> dict[str, float]:
@@ -181,7 +187,7 @@ class WireDAQ(DAQ):
         try:
             connection.link.open()
             self._connection, self._streaming = connection, None
-            connection.meet(self._bench, self._options.queue_blocks)
+            connection.meet(self._bench, self._options.queue)
         except BaseException:
             connection.let_go()  # also a port whose adapter did not answer
             raise
@@ -190,7 +196,7 @@ class WireDAQ(DAQ):
         connection, facts = self._connection, self._facts
         assert connection is not None
         assert facts is not None
-        queue = self._options.queue_blocks
+        queue = self._options.queue
         stream = Stream(len(self.channels), self.block, self.sample_rate_hz, facts.bits, queue)
         self._streaming = Streaming(connection, stream, self._options)
 

@@ -1,5 +1,7 @@
 """Options that all wires share, and the watchdog time that follows from them."""
 
+from typing import Annotated, Literal
+
 from pydantic import Field
 
 from rig.bench.configuration import Configured
@@ -15,8 +17,10 @@ MOST_S = 4000.0  # microseconds in an unsigned word of four bytes
 class WireOptions(Configured):
     """Options that all wires share; each driver adds those that locate the device."""
 
-    queue_blocks: int = Field(1, ge=1, le=LARGEST_QUEUE)
-    """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop."""
+    queue_blocks: Annotated[int, Field(ge=1, le=LARGEST_QUEUE)] | Literal["auto"] = "auto"
+    """q: blocks between handing over an output and its conversion. A longer one tolerates a later host and delays the loop.
+    ``"auto"``: before a run, at 0 V, lateness is measured for a second and a half, and the shortest queue taken that covers it;
+    without a closed loop one of up to 0.1 s; 1 where the device waits for the host."""
     watchdog_s: float | None = Field(None, gt=0, le=MOST_S)
     """Time without an output after which the device brings its own to 0 V, s; by default 0.1 s or 4 blocks, or the shortest
     that the device can do, whichever is longest. Where something moves, at most 1 s, or 10 blocks if longer."""
@@ -24,6 +28,11 @@ class WireOptions(Configured):
     """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
     timeout_s: float | None = Field(None, gt=0, le=MOST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
+
+    @property
+    def queue(self) -> int:
+        """Number of blocks; 1 until ``"auto"`` was replaced by a number (`rig.daq.DAQ.adjust`)."""
+        return 1 if self.queue_blocks == "auto" else self.queue_blocks
 
 
 DEFAULT_S, DEFAULT_BLOCKS = 0.1, 4

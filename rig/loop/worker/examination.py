@@ -11,6 +11,7 @@ from rig.drivers import make_daq
 from rig.errors import DaqRefused, DaqWatchdog, RigError
 from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, complaints, recommend
 from rig.loop.worker.probe import round_trips, timing_of
+from rig.loop.worker.queue_choice import covering_queue
 
 __all__ = ["bench_lines", "examine_device", "with_settings"]
 
@@ -42,7 +43,10 @@ def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> dict
     facts = round_trips(opened, seed, seconds)
     if "latched" not in facts and "failure" not in facts:
         if by_device:
-            examination = _Examination(bench, seed, now._replace(block=bench.block), allowed, facts)
+            now = now._replace(block=bench.block)
+            if allowed is not None and allowed.automatic:
+                now = now._replace(queue_blocks=covering_queue(timing_of(facts), bench, allowed)[0])
+            examination = _Examination(bench, seed, now, allowed, facts)
             facts = examination.report(refusal)
         else:
             facts = _without_clock(facts)
@@ -138,6 +142,11 @@ class _Examination:
         differs = {
             name: value for name, value in advice.settings._asdict().items() if value != getattr(self._now, name)
         }
+        if self._allowed is not None and self._allowed.automatic:
+            if "block" in differs:
+                differs.pop("queue_blocks", None)
+            if "queue_blocks" not in differs:
+                reasons["queue_blocks"] = f'as "auto" takes it before a run: {reasons["queue_blocks"]}'
         told = {
             "settings": {name: value for name, value in chosen.items() if value is not None},
             "differs": differs,

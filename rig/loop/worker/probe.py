@@ -2,7 +2,7 @@
 
 import gc
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
 
-__all__ = ["probe", "round_trips", "smallest_steps_v", "timing_of"]
+__all__ = ["measured_timing", "probe", "round_trips", "smallest_steps_v", "timing_of"]
 
 SETTLE_BLOCKS = 10
 ROUNDING = 1e-9  # of the largest reading: a smaller difference is none
@@ -75,6 +75,20 @@ def timing_of(facts: dict[str, Any]) -> Timing:
     )
 
 
+def measured_timing(daq: DAQ, block: int, seconds: float, asked: Callable[[], str] = str) -> Timing:
+    """Exchange blocks of 0 V with an open device that has a clock, as it is set, for some seconds; return the times.
+
+    The device is stopped afterwards. ``asked`` returns why that is to end early, or an empty text. Raises
+    `rig.errors.DaqError`, also in that case; then it is left to the caller to close the device.
+    """
+    daq.start(block)
+    seen = _exchanged(daq, seconds, asked)
+    if seen.failure is not None:
+        raise seen.failure
+    daq.stop()
+    return timing_of(_report(daq, seen, by_device=True))
+
+
 class _Exchanged(NamedTuple):
     """Blocks of 0 V that were exchanged with a running device."""
 
@@ -88,25 +102,27 @@ class _Exchanged(NamedTuple):
     """Blocks that were lost."""
     readings_v: np.ndarray
     """float64[m, n_channels]: the first of the readings."""
-    failure: str
-    """Error that ended it; empty if there was none."""
+    failure: DaqError | None
+    """Error that ended it, if one did."""
 
 
-def _exchanged(daq: DAQ, seconds: float) -> _Exchanged:
-    """Exchange blocks of 0 V for a time."""
+def _exchanged(daq: DAQ, seconds: float, asked: Callable[[], str] = str) -> _Exchanged:
+    """Exchange blocks of 0 V for a time, or until ``asked`` returns why not."""
     block, names = daq.block, flag_names(daq.counters)
     held_flag = 1 << names.index(HELD) if HELD in names else 0
     zeros = np.zeros(block)
     arrivals: list[float] = []
     readings: list[np.ndarray] = []
     held = lost = 0
-    failure = ""
+    failure: DaqError | None = None
     began_s, computed_s = time.monotonic(), time.thread_time()
     try:
         for _ in range(SETTLE_BLOCKS):
             daq.exchange(zeros)
         began_s, computed_s = time.monotonic(), time.thread_time()
         while not arrivals or arrivals[-1] - began_s < seconds:
+            if why := asked():
+                raise DaqError(why)
             inputs = daq.exchange(zeros)
             arrivals.append(time.monotonic())
             if daq.flags.any():
@@ -116,7 +132,7 @@ def _exchanged(daq: DAQ, seconds: float) -> _Exchanged:
             if len(readings) * block < KEPT_ROWS:
                 readings.append(inputs)
     except DaqError as error:
-        failure = f"{type(error).__name__}: {error}"
+        failure = error
     kept = np.vstack(readings) if readings else np.empty((0, len(daq.channels)))
     times = np.array([began_s, *arrivals])
     return _Exchanged(times, time.thread_time() - computed_s, held, lost, kept, failure)
@@ -133,7 +149,7 @@ def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> dict[str, Any]:
     )
     out |= {"queue_blocks": daq.queue_blocks, "blocks": blocks, "held_blocks": seen.held, "lost_blocks": seen.lost}
     out["smallest_step_v"] = smallest_steps_v([channel.name for channel in daq.channels], seen.readings_v)
-    out |= {"failure": seen.failure} if seen.failure else {}
+    out |= {"failure": f"{type(seen.failure).__name__}: {seen.failure}"} if seen.failure else {}
     out |= {"statistics": dict(daq.statistics), "counters": dict(daq.counters)}
     out["remarks"] = [*daq.remarks]
     return out

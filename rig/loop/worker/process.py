@@ -19,7 +19,8 @@ from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, packed
 from rig.loop.worker.pace import pacing_of
 from rig.loop.worker.probe import probe, round_trips
-from rig.system.privileges import prepare
+from rig.loop.worker.queue_choice import QueueChoice, presumed_latency, settle_queue
+from rig.system.privileges import ordinary_scheduling, prepare
 from rig.tick.kernels import tick_block
 from rig.tick.tick import TickSettings
 
@@ -72,20 +73,21 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
     """Open the driver, and run one loop over it if the campaign says so."""
     with make_daq(bench, seed) as daq:
         facts.send(("opened", daq.capabilities, dict(daq.identity), daq.latched, daq.remarks, dict(daq.counters)))
+        _, of_plan = _told(commands)
+        choice = _queue_choice(daq, bench, commands, of_plan, privileged)
+        facts.send(("queue", choice))
         _, settings, ring_s = _told(commands)
-        presumed = _presumed_latency(daq, bench)
+        presumed = _presumed_latency(daq, bench, choice)
         layout, memory = _shared(daq, settings, presumed, ring_s, descriptor)
         _load_kernels(daq, bench, settings)
-        came = _listen()
+        came, _ = _listen()
         said = prepare(
             privileged=privileged and pacing_of(daq) != "lockstep"
         )  # lockstep: no deadlines, and it never sleeps
-        daq.clear()
         daq.start(bench.block)
         if daq.latency_samples > presumed:
             layout, memory = _shared(daq, settings, daq.latency_samples, ring_s, descriptor)
-        released = select.poll()  # `Connection.poll` makes one anew at every call, which takes as long as a block
-        released.register(commands, select.POLLIN)
+        released = _released(commands)
         loop = _begin(daq, settings, memory, facts, lambda: _asked(came, released))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
         try:
@@ -97,11 +99,34 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
     facts.send(("ended", failure, loop.cause, loop.counters, statistics))
 
 
-def _presumed_latency(daq: DAQ, bench: Bench) -> float:
-    """Return the latency in samples as far as known before the device is started: queue, hold and filters."""
+def _queue_choice(
+    daq: DAQ, bench: Bench, commands: Connection, of_plan: dict[str, Any], privileged: bool
+) -> QueueChoice | None:
+    """Settle the queue under the loop's own priority; a signal, or a campaign that is gone, ends the measurement.
+
+    ``of_plan``: ``feedback`` and ``delay_s`` of `settle_queue`.
+    """
+    daq.clear()
+    allowed = daq.adjustable
+    if allowed is None or not allowed.automatic or pacing_of(daq) == "lockstep":
+        return settle_queue(daq, bench, **of_plan)
+    came, before = _listen()
+    released = _released(commands)
+    prepare(privileged=privileged)
+    try:
+        return settle_queue(daq, bench, **of_plan, asked=lambda: _asked(came, released))
+    finally:
+        ordinary_scheduling()  # kernels may have to be compiled before the loop begins
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _presumed_latency(daq: DAQ, bench: Bench, choice: QueueChoice | None = None) -> float:
+    """Return the latency in samples as far as known before the device is started."""
+    if choice is not None:
+        return choice.latency_samples
     queue = bench.driver.options.get("queue_blocks", 1)
-    queue = queue if isinstance(queue, int) else 1
-    return queue * bench.block + 1.0 + daq.filter_delay_samples
+    return presumed_latency(daq, bench, queue if isinstance(queue, int) else 1)
 
 
 def _shared(
@@ -136,17 +161,26 @@ def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
         daq.stop()
 
 
-def _listen() -> list[str]:
-    """Let signals only request the ramp from now on; return a list that collects their names."""
+def _listen() -> tuple[list[str], dict[int, Any]]:
+    """Let signals only be noted from now on; return a list that collects their names, and the handlers of before."""
     came: list[str] = []
+    before: dict[int, Any] = {}
 
     def note(number: int, frame: FrameType | None) -> None:
         came.append(signal.Signals(number).name)
 
     for name in SIGNALS:
         if hasattr(signal, name):
-            signal.signal(getattr(signal, name), note)
-    return came
+            number = getattr(signal, name)
+            before[number] = signal.signal(number, note)
+    return came, before
+
+
+def _released(commands: Connection) -> select.poll:
+    """Return a poll on the campaign's end of a pipe, because `Connection.poll` makes one at every call, as long as a block."""
+    out = select.poll()
+    out.register(commands, select.POLLIN)
+    return out
 
 
 def _asked(came: list[str], released: select.poll) -> str:

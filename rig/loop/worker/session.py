@@ -1,5 +1,6 @@
 """The campaign's side of a bench whose driver and loop run in another process."""
 
+import math
 import pickle
 import warnings
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from rig.loop.driven_loop import end_by_driver
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.loop.worker.loop import CHUNK_DONE
 from rig.loop.worker.memory import TIMES, Layout, SharedMemory, packed
+from rig.loop.worker.queue_choice import QueueChoice
 from rig.loop.worker.spawn import Worker, rebuilt
 from rig.tick.tick import TickSettings
 
@@ -172,7 +174,7 @@ class WorkerSession:
     latched: str
 
     def __init__(self, bench: Bench, seed: int = 0, *, privileged: bool = True, ring_s: float = RING_S) -> None:
-        self._bench, self._ring_s = bench, ring_s
+        self._bench, self._ring_s, self._settled = bench, ring_s, False
         self._loop: WorkerLoop | None = None
         self._worker = Worker()
         try:
@@ -188,8 +190,17 @@ class WorkerSession:
         """Number of the loop's process."""
         return self._worker.pid
 
+    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
+        """Settle the queue of the device in its process, see `rig.loop.session.Session.settle_queue`."""
+        self._worker.send("queue", {"feedback": feedback, "delay_s": delay_s})
+        choice: QueueChoice | None = self._worker.receive("queue")[0]
+        self._settled = True
+        return choice
+
     def start(self, settings: TickSettings) -> RunningLoop:
         """Start the device and the loop, which runs from now on; its rows wait in the ring until they are taken."""
+        if not self._settled:
+            self.settle_queue()
         self._worker.send("start", settings, self._ring_s)
         latency_samples, layout, remarks = self._worker.receive("started")
         self._loop = WorkerLoop(self._worker, settings, latency_samples, layout, self._counters, remarks)

@@ -8,13 +8,13 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from controller import AmplitudeLaw
+from controller import AmplitudeLaw, Law
 from controller.harmonics.settings import harmonic_ratios
 from rig.bench.configuration import Configured
 from rig.tick.sequencer.judgement import LONGEST_AVERAGE, SETTLE_RULE
 from rig.tick.sequencer.layout import OUTCOME, SEGMENT, Drive, OnFailure, SegmentKind
 
-__all__ = ["Excitation", "Segment", "SettleRule", "segment_table"]
+__all__ = ["Excitation", "Segment", "SettleRule", "highest_frequency_hz", "segment_table"]
 
 
 class SettleRule(Configured):
@@ -93,6 +93,12 @@ class Segment:
     geometric: bool = False
     duration_s: float | None = None
     harmonics: Mapping[int, tuple[float, float]] | None = None
+
+
+def highest_frequency_hz(law: Law, segments: Sequence[Segment]) -> float:
+    """Return the highest frequency of a run, Hz: of the law's window and of the tones that segments give."""
+    tones = (segment.excitation.frequency_hz for segment in segments if segment.excitation is not None)
+    return max((law.highest_frequency_hz, *tones))
 
 
 def segment_table(

@@ -353,7 +353,7 @@ def test_a_session_clears_what_its_device_had_latched_and_a_probe_does_not(monke
     assert "block_us" not in facts
     assert daq.device.state is DeviceState.LATCHED
     with daq:
-        session = LocalSession(daq, realtime=False)
+        session = LocalSession(daq, bench, realtime=False)
         assert session.latched == "the device's emergency stop had latched"
         assert daq.device.state is DeviceState.LATCHED
         session.start(tone(bench, 1.0))

@@ -1,6 +1,7 @@
 """A plan that knows its plant refuses what cannot be on it, before anything moves."""
 
 import math
+import re
 
 import pytest
 
@@ -284,3 +285,61 @@ def test_a_frequency_too_high_for_any_harmonic_is_named_with_the_highest_allowed
         plan.check_evaluated(7, bench, highest_hz, spare)
     allowed_hz = float(str(refused.value).split()[-2])
     plan.check_evaluated(1, bench, allowed_hz, spare)
+
+
+@pytest.mark.parametrize("name", LINEAR_HZ)
+def test_gains_that_do_not_bear_a_longer_delay_are_refused_with_the_longest_that_they_bear(name):
+    plan, bench = plan_for(name)
+    known_s = plan.plant.model.delay_s
+    plan.check_delay(bench, known_s * bench.sample_rate_hz)
+    with pytest.raises(ConfigurationError, match=r"^controller: frequency_proportional = 0, ") as caught:
+        plan.check_delay(bench, 10.0 * bench.sample_rate_hz / LINEAR_HZ[name])
+    said = str(caught.value)
+    assert "response_integral_per_s = " in said
+    longest_s = 1e-3 * float(re.search(r"allowed is up to ([\d.]+) ms", said).group(1))
+    assert known_s < longest_s < 10.0 / LINEAR_HZ[name]
+    assert plan.longest_delay_s(bench, 1.0) == pytest.approx(longest_s, rel=0.01)
+    assert plan.longest_delay_s(bench, known_s) == known_s
+    plan.check_delay(bench, 0.98 * longest_s * bench.sample_rate_hz)
+    with pytest.raises(ConfigurationError):
+        plan.check_delay(bench, 1.03 * longest_s * bench.sample_rate_hz)
+
+
+def test_a_plan_as_tuned_is_not_judged_anew_at_its_own_delay():
+    shape = 3.5 * plant_of("magnet-beam").drive_shape  # unstable, which `check` says
+    plan, bench = plan_for("magnet-beam", controller={"drive_mode_shape": shape})
+    plan.check_delay(bench, plan.plant.model.delay_s * bench.sample_rate_hz)
+
+
+def test_without_a_plant_the_bound_of_the_gains_holds():
+    plan, bench = plan_for("friction-beam", plant=False)
+    longest_s = plan.longest_delay_s(bench, 1.0)
+    assert longest_s == plan.controller.longest_delay_s(plan.amplitude_law)
+    plan.check_delay(bench, 0.999 * longest_s * bench.sample_rate_hz)
+    refused = r"^controller\.response_integral_per_s = .* ms from output .*; or shorter blocks or queue$"
+    with pytest.raises(ConfigurationError, match=refused):
+        plan.check_delay(bench, 1.001 * longest_s * bench.sample_rate_hz)
+
+
+def test_the_harmonics_loop_is_judged_at_the_delay_of_the_device():
+    plan = load_plan("friction-beam/backbone-pure")
+    bench = load_bench(plan.bench)
+    longest_s = plan.longest_delay_s(bench, 1.0)
+    plan.check_delay(bench, 0.999 * longest_s * bench.sample_rate_hz)
+    refused = r"^controller\.harmonics\.integral = 0\.04: its phase margin .* 35 deg"
+    with pytest.raises(ConfigurationError, match=refused):
+        plan.check_delay(bench, 1.001 * longest_s * bench.sample_rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("name", "feedback"),
+    [
+        ("magnet-beam/backbone", True),
+        ("magnet-beam/multisine-1", False),
+        ("magnet-beam/sweep-1", False),
+        ("magnet-beam/controlled-sweep-up", True),
+        ("magnet-beam/decay", True),
+    ],
+)
+def test_plans_without_feedback_are_those_whose_outputs_answer_nothing(name, feedback):
+    assert load_plan(name).feedback is feedback

@@ -92,6 +92,7 @@ def test_a_campaign_interrupted_while_the_loop_starts_leaves_nothing_driven(tmp_
     monkeypatch.setattr(rig.loop.worker.session, "PATIENCE_S", 2.0 * LONG_S)  # after which it would be told to
     log = tmp_path / "outputs"
     with WorkerSession(slow_bench(log=str(log))) as session:
+        session.settle_queue()
         session._worker.send("start", tone(slow_bench(), 60.0), 10.0)
         assert session._worker.facts.poll(LONG_S)  # it runs, and the campaign was interrupted before it knew
         while not log.exists() or log.stat().st_size < 8 * 800:

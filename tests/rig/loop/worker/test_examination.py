@@ -19,7 +19,8 @@ from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ
 
 BLOCK_S = 0.002
-BENCH = bench_with({"block": 10})
+AUTO = bench_with({"block": 10})
+BENCH = bench_with({"block": 10}, queue_blocks=1)
 
 
 @pytest.fixture
@@ -93,6 +94,35 @@ def test_held_outputs_and_a_queue_that_is_too_short_are_remarked(examined):
     assert "the queue of 1 blocks lasts 2 ms" in short
 
 
+def test_a_bench_that_leaves_its_queue_to_the_run_needs_no_lines_and_is_tried_with_what_it_would_take(examined):
+    late(examined, 0.020)
+    facts = examine_device(AUTO, 0)
+    advice = facts["recommendation"]
+    assert advice["settings"]["queue_blocks"] == 16  # 30 ms and half of 2 ms, and the round trip
+    assert advice["differs"] == {}
+    assert advice["bench_lines"] == []
+    assert advice["reasons"]["queue_blocks"].startswith('as "auto" takes it before a run: lasts 32 ms; ')
+    assert facts["remarks"] == []
+    assert facts["held_blocks"] == 0
+    assert facts["queue_blocks"] == 16
+
+
+def test_where_what_auto_would_take_does_not_hold_a_number_is_recommended(examined):
+    """Nothing is late while it is measured; from then on blocks are late by 5 ms."""
+    examined.faults = [Faults(), Faults(), Faults(late_every=100, late_s=0.005)]
+    advice = examine_device(AUTO, 0)["recommendation"]
+    assert advice["bench_lines"] == ["[driver.options]", "queue_blocks = 4"]
+    assert advice["reasons"]["queue_blocks"].startswith("lasts")
+
+
+def test_a_longer_block_leaves_the_queue_to_the_run(examined):
+    """A wire that cannot carry blocks of one sample."""
+    examined.keys |= {"available_bit_s": 0.85e6, "faults": Faults(late_every=100, late_s=0.005)}
+    advice = examine_device(bench_with({"block": 1}), 0)["recommendation"]
+    assert advice["bench_lines"] == ["block = 2"]
+    assert advice["settings"]["queue_blocks"] > 1
+
+
 def test_the_lines_for_the_bench_make_a_bench_with_the_recommended_settings(examined, tmp_path):
     late(examined, 0.060)
     advice = examine_device(BENCH, 0)["recommendation"]
@@ -112,10 +142,10 @@ def test_a_run_with_the_recommended_settings_holds_none_and_one_with_those_of_th
     for queue in (settings["queue_blocks"], 1):
         options = WireOptions(queue_blocks=queue, watchdog_s=settings["watchdog_s"])
         with MemoryDAQ(BENCH, 0, options, **examined.keys) as daq:
-            loop = LocalSession(daq, realtime=False).start(tone(BENCH, 1.0))
+            loop = LocalSession(daq, BENCH, realtime=False).start(tone(BENCH, 1.0))
             rows = sum(chunk.size for chunk in loop.run())
             assert rows > 5000
-            counted.append(daq.counters["output_held"])
+            counted.append(daq.counters["output_held"] + daq.counters["output_continued"])
     assert counted[0] == 0
     assert counted[1] > 100
 

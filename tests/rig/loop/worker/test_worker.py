@@ -76,7 +76,7 @@ def test_the_start_is_released_across_the_processes():
 def test_rows_and_state_are_those_of_a_loop_in_this_process_bit_for_bit():
     bench = slow_bench("virtual", block=4)
     with make_daq(bench, 3) as daq:
-        fused, _ = ran(LocalSession(daq, realtime=False), tone(bench, 0.3))
+        fused, _ = ran(LocalSession(daq, bench, realtime=False), tone(bench, 0.3))
     with make_daq(bench, 3) as daq:
         daq.start(bench.block)
         local = Loop(daq, tone(bench, 0.3).build(daq.latency_samples), fused=False)

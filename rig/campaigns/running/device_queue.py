@@ -1,0 +1,51 @@
+"""The queue of a run's device: settled before the run is armed, checked against the plan's gains, recorded."""
+
+from typing import Any
+
+from rig.arming.arming import armed
+from rig.arming.run_options import RunOptions
+from rig.bench import Bench
+from rig.campaigns.planning.plan import Plan
+from rig.loop.session import Session
+from rig.loop.worker.queue_choice import QueueChoice, usual_delay_s
+
+__all__ = ["armed_with_queue", "settled_queue", "with_queue"]
+
+
+def armed_with_queue(
+    plan: Plan, bench: Bench, session: Session, options: RunOptions
+) -> tuple[dict[str, Any], QueueChoice | None]:
+    """Arm the bench and settle the queue of its device; return both.
+
+    The queue is settled before, so that a person arms what will run; where the device has something latched, which only an
+    armed run clears, after. Raises `ConfigurationError` for gains that do not bear the delay.
+    """
+    first = not session.latched
+    choice = settled_queue(plan, bench, session, options) if first else None
+    arming = armed(bench, session, options.about.purpose or plan.kind, options.arm)
+    return arming, choice if first else settled_queue(plan, bench, session, options)
+
+
+def settled_queue(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> QueueChoice | None:
+    """Settle the queue of a session's device, say which, and check the plan's gains against the delay.
+
+    A multisine of a check or a tuning measures the delay that a closed loop will have, and gets the queue of one.
+    """
+    feedback = plan.feedback or bool(options.about.purpose)
+    usual_s = usual_delay_s(bench)
+    delay_s = plan.longest_delay_s(bench, usual_s) if plan.feedback else usual_s
+    choice = session.settle_queue(feedback=feedback, delay_s=delay_s)
+    if choice is not None:
+        if choice.remark:
+            options.progress.remark(choice.remark)
+        plan.check_delay(bench, bench.block + choice.latency_samples)
+    return choice
+
+
+def with_queue(facts: dict[str, Any], choice: QueueChoice | None) -> dict[str, Any]:
+    """Return what is recorded of a part, with the queue and the line on it in place of those of an earlier part."""
+    if choice is None:
+        return facts
+    before = facts.get("queue", {}).get("text")
+    remarks = [remark for remark in facts["remarks"] if remark != before]
+    return {**facts, "queue": choice._asdict(), "remarks": [*filter(None, [choice.remark]), *remarks]}
