@@ -3,7 +3,7 @@
 RUNS ?= 10000000
 FUZZER = clang
 FUZZ = $(filter-out core/can_layout.c,$(CORE)) boards/script/bench.c checks/fuzz.c # a checksum of constants takes most of the time
-FUZZ_LIMITS = -DVL_LARGEST_BLOCK=100 -DVL_MOST_BLOCKS=8
+FUZZ_LIMITS = -DVL_LARGEST_BLOCK=100 -DVL_MOST_BLOCKS=8 -DVL_LONGEST_PERIOD=64
 SEED ?= 0
 FUZZ_FLAGS = -max_len=256 -print_final_stats=1 -seed=$(SEED)
 

@@ -17,6 +17,7 @@ enum { CLASSICAL_ROWS = 4, CLASSICAL_WRAP = 32, FD_ROWS = 31, FD_WRAP = 256 };
 static const uint8_t *at, *end;
 static uint64_t now_us;
 static uint8_t n_channels, bits, node, number;
+static uint32_t period, ramp;
 static bool range_is_less; /* than what a count can say */
 
 static uint8_t byte(void)
@@ -33,9 +34,9 @@ static uint32_t four_bytes(void)
 }
 
 /* In place of can_layout.c. */
-uint32_t vl_can_layout_crc(const struct vl_can_shape *shape)
+uint32_t vl_can_layout_crc(const struct vl_can_shape *shape, uint32_t version)
 {
-    return shape->n_channels;
+    return shape->n_channels + version;
 }
 
 /* -- what the device does ---------------------------------------------------------------------------------------------------- */
@@ -163,7 +164,7 @@ static void send_index(uint64_t first)
 
 static void send_request(uint8_t command, uint8_t parameter, uint8_t item, uint32_t value)
 {
-    uint8_t payload[12 + 4] = {VL_VERSION, REQUEST, 0, 0, number, command, parameter, item};
+    uint8_t payload[12 + 4] = {(uint8_t)vl_settings.version, REQUEST, 0, 0, number, command, parameter, item};
     vl_put(payload + 8, value, 4);
     if (FUZZ_WIRE == BENCH_SERIAL)
         send_payload(payload, 12);
@@ -182,11 +183,23 @@ static void send_any_request(void)
 
 static void send_setting(void)
 {
-    static const uint8_t settings[] = {VL_P_RATE_MHZ, VL_P_BLOCK, VL_P_QUEUE, VL_P_WATCHDOG_US, VL_P_RAMP_US};
-    uint8_t which = byte() % 5;
+    static const uint8_t settings[] = {VL_P_RATE_MHZ, VL_P_BLOCK, VL_P_QUEUE, VL_P_WATCHDOG_US, VL_P_RAMP_US, VL_P_VERSION, VL_P_VERSION};
+    uint8_t which = byte() % 7;
     uint32_t value = byte() | (uint32_t)byte() << 8;
     number++;
-    send_request(VL_SET, settings[which], 0, which == 0 || which > 2 ? 40 * value : which == 1 && value & 0x8000 ? value % 20 : value);
+    value = which > 4 ? 1 + value % 2 : value;
+    send_request(VL_SET, settings[which], 0, which == 0 || which == 3 || which == 4 ? 40 * value : which == 1 && value & 0x8000 ? value % 20 : value);
+}
+
+/* Half of the hosts begin as a good one does, with outputs that can go on. */
+static void begin_well(void)
+{
+    number += 3;
+    send_request(VL_SET, VL_P_VERSION, 0, 2);
+    number++;
+    send_request(VL_START, 0, 0, 0);
+    number++;
+    send_request(VL_ARM, 0, 0, VL_ARM_KEY);
 }
 
 static void send_command(void)
@@ -197,25 +210,59 @@ static void send_command(void)
     send_request(command, 0, 0, command == VL_ARM ? VL_ARM_KEY : 0);
 }
 
-static void send_output(void)
+/* Period and ramp of the outputs that follow; some that are soon complete, some at the bounds. */
+static void choose_period(void)
 {
-    static uint8_t payload[12 + VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES + 4];
-    uint8_t ahead = byte(), how = byte(), level = byte();
-    uint32_t block = vl_settings.block, size = bits / 8u;
-    uint64_t block_number = (vl_present() / block + ahead % 80) - (ahead & 0x80 ? 40 : 0);
+    uint8_t what = byte();
+    period = (what & 7) == 0   ? (uint32_t)(what >> 3) << 28
+             : (what & 7) == 1 ? (4u << 16) - 1 + (what >> 3)
+             : (what & 7) == 2 ? ((uint32_t)VL_LONGEST_PERIOD << 16) - 16 + (what >> 3)
+                               : (uint32_t)what << 11 | byte();
+    ramp = what & 0x80 ? (uint32_t)byte() * byte() : 0;
+    if (FUZZ_WIRE == BENCH_SERIAL)
+        return;
+    uint8_t data[8];
+    vl_put(vl_put(data, period, 4), ramp, 4);
+    send_frame(0x050u + node, data, what == 77 ? 7 : 8, false);
+}
+
+static void send_block(uint64_t block_number, uint8_t how, uint8_t level)
+{
+    static uint8_t payload[20 + VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES + 4];
+    uint32_t block = vl_settings.block, size = bits / 8u, head = vl_settings.version == 1 ? 12 : 20;
     uint64_t first = block_number * block + (how == 255 ? 1 : 0);
     for (uint32_t i = 0; i < block; i++)
-        vl_put(payload + 12 + i * size, ((uint32_t)level << (bits - 8)) + (i & 0xFF), size);
+        vl_put(payload + head + i * size, ((uint32_t)level << (bits - 8)) + (i & 0xFF), size);
     if (FUZZ_WIRE == BENCH_SERIAL) {
-        uint8_t head[4] = {VL_VERSION, OUTPUT, 0, 0};
-        memcpy(payload, head, sizeof head);
+        uint8_t header[4] = {(uint8_t)vl_settings.version, OUTPUT, 0, 0};
+        memcpy(payload, header, sizeof header);
         vl_put(payload + 4, first, 8);
-        send_payload(payload, 12 + block * size - (how == 254 ? 1 : 0));
+        if (head == 20)
+            vl_put(vl_put(payload + 12, period, 4), ramp, 4);
+        send_payload(payload, head + block * size - (how == 254 ? 1 : 0));
         return;
     }
     if (how & 64)
         send_index(first);
-    send_groups(block_number, payload + 12, how & 128 ? how & 127 : 0);
+    send_groups(block_number, payload + head, how & 128 ? how & 127 : 0);
+}
+
+static void send_output(void)
+{
+    uint8_t ahead = byte(), how = byte(), level = byte();
+    send_block((vl_present() / vl_settings.block + ahead % 80) - (ahead & 0x80 ? 40 : 0), how, level);
+}
+
+/* Some blocks in order, in time but where time goes too fast. */
+static void drive(void)
+{
+    uint8_t blocks = byte() % 32, level = byte();
+    uint64_t block_us = 1000000000ull * vl_settings.block / vl_settings.rate_mhz, first = vl_present() / vl_settings.block + vl_settings.queue;
+    for (uint32_t i = 0; i < blocks; i++) {
+        send_block(first + i, 0, (uint8_t)(level + 37 * i));
+        now_us += level & 1 ? block_us : block_us / 2;
+        bench_pass(now_us);
+    }
 }
 
 static void stop(void)
@@ -256,9 +303,9 @@ static void act(uint8_t kind)
     case 6: send_setting(); break;
     case 7:
     case 8: send_command(); break;
-    case 9:
-    case 10: send_output(); break;
-    case 11:
+    case 9: send_output(); break;
+    case 10: drive(); break;
+    case 11: choose_period(); break;
     case 12: send_raw(); break;
     case 13:
         if (byte() & 1)
@@ -294,11 +341,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *input, size_t n)
     node = what >> 4;
     range_is_less = what % 3 != 2;
     number = 0;
+    period = ramp = 0;
     now_us = 1000000;
     struct bench_choice choice = {FUZZ_WIRE, n_channels, bits, node, what % 3, 0, what & 8, 1000, 20000000, 1000, 4000000000, 1};
     bench_limit(MOST_INSTANTS);
     if (!bench_begin(&choice, now_us))
         return 0;
+    if (what & 2)
+        begin_well();
     while (at < end)
         act(byte());
     return 0;

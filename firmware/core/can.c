@@ -7,9 +7,9 @@
 
 #include "bytes.h"
 
-enum { STOP_ID = 0x000, BEAT_ID = 0x010, REQUEST_ID = 0x020, ANSWER_ID = 0x030, INDEX_ID = 0x040, OUTPUT_ID = 0x100, SAMPLES_ID = 0x300 };
+enum { STOP_ID = 0x000, BEAT_ID = 0x010, REQUEST_ID = 0x020, ANSWER_ID = 0x030, INDEX_ID = 0x040, PERIOD_ID = 0x050, READBACK_ID = 0x060, OUTPUT_ID = 0x100, SAMPLES_ID = 0x300 };
 enum { FUNCTION = 16, NODE_MASK = 0x00F, HIGHEST_ID = 0x7FF, HIGHEST_NODE = 15 };
-enum { COMMAND_SIZE = 8, INDEX_SIZE = 4, FD_HEADER = 2, COUNT_BYTES = 2 };
+enum { COMMAND_SIZE = 8, INDEX_SIZE = 4, PERIOD_SIZE = 8, FD_HEADER = 2, COUNT_BYTES = 2, READBACK_HEAD = 2, CLASSICAL_READBACK = 3 };
 enum { FD_WRAP = 256, CLASSICAL_SAMPLES = 64, CLASSICAL_OUTPUTS = 32, CLASSICAL_CHANNELS = 4, FD_COUNTS = 31 };
 enum { CONTROL_US = 100000, SHORTEST_EXPIRY_US = 5000, MOST_DROPPED = 255, FRAMES_AT_A_TIME = 16 };
 
@@ -73,6 +73,7 @@ static uint16_t identifier(uint32_t base, uint32_t number)
 static struct vl_frame control;         /* an answer or a heartbeat, before all else */
 static bool has_control;
 static const struct vl_samples *block;  /* under way; NULL: none */
+static uint32_t read_back;              /* outputs of it that were read back */
 static uint32_t group, part;            /* of its next frame */
 static uint32_t sequence;               /* of its next group */
 static uint64_t expires_us;
@@ -127,6 +128,7 @@ static void send_samples(const struct vl_samples *samples)
         was_told = true;
     }
     block = samples;
+    read_back = samples->put_out ? 0 : vl_in_force.block;
     group = part = 0;
     sequence = (uint32_t)(first_group % sent.wrap);
     was_given_up = false;
@@ -144,7 +146,25 @@ static uint8_t *put_rows(uint8_t *into, uint32_t first_channel, uint32_t width)
     return into;
 }
 
-static void make_frame(struct vl_frame *frame)
+/* Outputs of the next frame of what was put out. */
+static uint32_t outputs_read_back(void)
+{
+    const uint32_t most = shape.fd ? FD_COUNTS : CLASSICAL_READBACK, left = vl_in_force.block - read_back;
+    return left < most ? left : most;
+}
+
+static void make_readback(struct vl_frame *frame)
+{
+    const uint32_t n_bytes = outputs_read_back() * COUNT_BYTES;
+    memset(frame, 0, sizeof *frame);
+    vl_put(frame->data, block->first + read_back, READBACK_HEAD);
+    memcpy(frame->data + READBACK_HEAD, block->put_out + read_back * COUNT_BYTES, n_bytes);
+    frame->fd = shape.fd;
+    frame->length = shape.fd ? vl_can_padded(READBACK_HEAD + n_bytes) : 8;
+    frame->identifier = identifier(READBACK_ID, 0);
+}
+
+static void make_samples(struct vl_frame *frame)
 {
     uint32_t first_channel = part * shape.channels, rest = shape.n_channels - first_channel;
     memset(frame, 0, sizeof *frame);
@@ -159,8 +179,20 @@ static void make_frame(struct vl_frame *frame)
     frame->identifier = identifier(SAMPLES_ID, shape.fd ? part : sequence * shape.parts + part);
 }
 
+static void make_frame(struct vl_frame *frame)
+{
+    if (read_back < vl_in_force.block)
+        make_readback(frame);
+    else
+        make_samples(frame);
+}
+
 static void next_frame(void)
 {
+    if (read_back < vl_in_force.block) {
+        read_back += outputs_read_back();
+        return;
+    }
     if (++part < shape.parts)
         return;
     part = 0;
@@ -218,6 +250,9 @@ static int64_t early;                 /* one that has come before the one right 
 static int64_t next_group;            /* the one after the newest */
 static bool has_mark;
 static int64_t mark;                  /* a group that OutputIndex has told of, half the sequence numbers ahead or more */
+static uint32_t period, ramp;         /* as OutputPeriod has told them, */
+static uint64_t told_first;           /* of the block from this sample on, */
+static bool is_told_anew;             /* which is the next one */
 static bool is_configured;
 
 /* Give up blocks before one. */
@@ -274,6 +309,21 @@ static struct open *open_block(int64_t number)
     return block_opened;
 }
 
+/* The outputs of a block with what it is the last of. A ramp that is over leaves nothing to go on with. */
+static void take_block(uint64_t first, const uint8_t *counts)
+{
+    if (is_told_anew)
+        told_first = first;
+    is_told_anew = false;
+    const uint64_t passed = first > told_first ? first - told_first : 0;
+    if (ramp == 0)
+        vl_take_output(first, counts, period, 0);
+    else if (passed < ramp)
+        vl_take_output(first, counts, period, (uint32_t)(ramp - passed));
+    else
+        vl_take_output(first, counts, 0, 0);
+}
+
 /* Once a block is whole, the one right before it may still come, and none before that. */
 static void hand_over(int64_t number, const uint8_t *counts)
 {
@@ -282,7 +332,7 @@ static void hand_over(int64_t number, const uint8_t *counts)
         before = number + 1 == early ? number + 2 : number + 1;
     early = before < number ? number : NONE;
     give_up_before(before);
-    vl_take_output((uint64_t)number * vl_in_force.block, counts);
+    take_block((uint64_t)number * vl_in_force.block, counts);
 }
 
 static void add_to_block(int64_t number, uint32_t place, const uint8_t *counts, uint32_t n_bytes)
@@ -359,6 +409,17 @@ static void take_output_index(const struct vl_frame *frame)
         take_index(vl_u32(frame->data));
 }
 
+static void take_period(const struct vl_frame *frame)
+{
+    if (frame->length != PERIOD_SIZE) {
+        vl_counters.damaged_frames++;
+        return;
+    }
+    period = vl_u32(frame->data);
+    ramp = vl_u32(frame->data + 4);
+    is_told_anew = true;
+}
+
 static void take(const struct vl_frame *frame)
 {
     uint32_t function = frame->identifier & ~(uint32_t)NODE_MASK, outputs = shape.fd ? 1 : CLASSICAL_OUTPUTS;
@@ -370,6 +431,8 @@ static void take(const struct vl_frame *frame)
         take_command(frame);
     else if (function == INDEX_ID)
         take_output_index(frame);
+    else if (is_configured && vl_in_force.version > 1 && function == PERIOD_ID)
+        take_period(frame);
     else if (is_configured && function >= OUTPUT_ID && function < OUTPUT_ID + FUNCTION * outputs)
         take_outputs(frame, (function - OUTPUT_ID) / FUNCTION);
     else
@@ -407,9 +470,9 @@ static uint32_t largest_block(void)
     return samples < outputs ? samples : outputs;
 }
 
-static uint32_t layout_crc(void)
+static uint32_t layout_crc(uint32_t version)
 {
-    return vl_can_layout_crc(&shape);
+    return vl_can_layout_crc(&shape, version);
 }
 
 static void begin_with(bool fd)
@@ -441,6 +504,9 @@ static void configure(void)
     oldest = vl_in_force.queue;
     early = NONE;
     next_group = oldest * received.groups;
+    period = ramp = 0;
+    is_told_anew = false;
+    told_first = 0;
     is_configured = true;
 }
 

@@ -22,7 +22,7 @@ struct vl_can_shape vl_can_shape(uint32_t n_channels, bool fd);
 /* The smallest length of a CAN FD frame that holds so many bytes, up to 64. */
 uint8_t vl_can_padded(uint32_t length);
 
-/* CRC-32 of the definition, as the protocol's page defines it. */
-uint32_t vl_can_layout_crc(const struct vl_can_shape *shape);
+/* CRC-32 of the definition in a version of the protocol, as its page defines it. */
+uint32_t vl_can_layout_crc(const struct vl_can_shape *shape, uint32_t version);
 
 #endif

@@ -60,6 +60,13 @@ static void byte(const char *name)
     end_signal("uint8", 1);
 }
 
+static void half_word(const char *name)
+{
+    text(" ");
+    text(name);
+    end_signal("uint16", 2);
+}
+
 static void word(const char *name)
 {
     text(" ");
@@ -83,6 +90,21 @@ static void commands(void)
     begin_message(0x040, "OutputIndex");
     begin_signals(4, false);
     word("first");
+}
+
+/* Since version 2: what outputs are the last of, and what was put out. */
+static void continuation(const struct vl_can_shape *shape)
+{
+    begin_message(0x050, "OutputPeriod");
+    begin_signals(8, false);
+    word("period"), word("ramp");
+    begin_message(0x060, "Readback");
+    begin_signals(shape->fd ? 64 : 8, shape->fd);
+    half_word("index");
+    for (uint32_t row = 0; row < (shape->fd ? 31u : 3u); row++) {
+        text(" sample_"), number(row, false, 1);
+        end_signal("int16", 2);
+    }
 }
 
 static void outputs(const struct vl_can_shape *shape)
@@ -130,10 +152,12 @@ static void samples(const struct vl_can_shape *shape)
     }
 }
 
-uint32_t vl_can_layout_crc(const struct vl_can_shape *shape)
+uint32_t vl_can_layout_crc(const struct vl_can_shape *shape, uint32_t version)
 {
     crc = VL_CRC_START;
     commands();
+    if (version > 1)
+        continuation(shape);
     outputs(shape);
     samples(shape);
     return crc;

@@ -185,7 +185,7 @@ void vl_take_request(const struct vl_command *request)
     queue_control(&(struct control){.answer = last_answer});
 }
 
-void vl_take_output(uint64_t first, const uint8_t *counts)
+void vl_take_output(uint64_t first, const uint8_t *counts, uint32_t period, uint32_t ramp)
 {
     if (!vl_is_sampling()) {
         vl_counters.outputs_while_idle++;
@@ -196,6 +196,7 @@ void vl_take_output(uint64_t first, const uint8_t *counts)
         vl_counters.bad_outputs++;
         return;
     }
+    vl_keep_period(first, counts, period, ramp);
     vl_note_an_output();
     if (in_time > 0)
         vl_feed();

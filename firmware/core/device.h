@@ -12,13 +12,13 @@
 
 /* -- the protocol's numbers, as on its page ------------------------------------------------------------------------ */
 
-enum { VL_VERSION = 1, VL_HEARTBEAT_US = 100000 };
+enum { VL_LOWEST_VERSION = 1, VL_VERSION = 2, VL_HEARTBEAT_US = 100000 };
 enum { VL_ARM_KEY = 0x41524D21 };
 
 enum vl_request_code { VL_GET = 1, VL_SET, VL_START, VL_STOP, VL_ARM, VL_DISARM, VL_CLEAR };
 enum vl_status { VL_DONE, VL_UNKNOWN, VL_NOT_ALLOWED, VL_WRONG_STATE, VL_IS_LATCHED };
 enum vl_state { VL_IDLE, VL_RUNNING, VL_ARMED, VL_LATCHED };
-enum vl_flag { VL_OVERLOAD = 1, VL_OUTPUT_CLIPPED = 2, VL_OUTPUT_HELD = 4, VL_WATCHDOG = 8, VL_EMERGENCY_STOP = 16 };
+enum vl_flag { VL_OVERLOAD = 1, VL_OUTPUT_CLIPPED = 2, VL_OUTPUT_HELD = 4, VL_WATCHDOG = 8, VL_EMERGENCY_STOP = 16, VL_OUTPUT_CONTINUED = 32 };
 
 enum vl_parameter {
     VL_P_LOWEST_VERSION = 1,
@@ -47,6 +47,7 @@ enum vl_parameter {
     VL_P_FILTER_DELAY_NS = 38,
     VL_P_SKEW_NS = 39,
     VL_P_FILTER_DELAY_S = 40,
+    VL_P_LONGEST_PERIOD = 41,
     VL_P_RATE_MHZ = 48,
     VL_P_BLOCK = 49,
     VL_P_QUEUE = 50,
@@ -73,6 +74,7 @@ struct vl_samples {
     uint32_t dropped;
     uint8_t flags;
     const uint8_t *counts;
+    const uint8_t *put_out; /* counts of the converter, where an output was missing; NULL: as handed over */
 };
 
 /* -- device.c: what happens to it, and when ------------------------------------------------------------------------- */
@@ -80,7 +82,9 @@ struct vl_samples {
 extern const struct vl_description *vl_about;
 
 void vl_take_request(const struct vl_command *request);
-void vl_take_output(uint64_t first, const uint8_t *counts);
+/* The outputs of a block, what period they are the last of (1/65536 sample; 0: none), and how many samples their end is away from the
+ * end of a ramp to 0 V (0: none). */
+void vl_take_output(uint64_t first, const uint8_t *counts, uint32_t period, uint32_t ramp);
 void vl_take_emergency_stop(void);
 
 /* -- parameters.c: the dictionary ------------------------------------------------------------------------------------ */
@@ -130,6 +134,15 @@ bool vl_has_next_block(void);
 uint64_t vl_present(void);
 uint64_t vl_next_instant(void);
 
+/* -- continuation.c: the vibration goes on where an output is missing ------------------------------------------------------ */
+
+/* Forget all that could be repeated: ARM is at this instant. */
+void vl_forget_period_locked(uint64_t instant);
+/* Keep the outputs of a valid block, late or not, so that they can be repeated. */
+void vl_keep_period(uint64_t first, const uint8_t *counts, uint32_t period, uint32_t ramp);
+/* In the sampling interrupt: the count with which the vibration goes on, beyond the converter's range or not; false if it cannot. */
+bool vl_continue(uint64_t index, int32_t *count);
+
 /* -- sampling.c: sample instants, and blocks until they are sent -------------------------------------------------------- */
 
 void vl_begin_sampling(void);
@@ -151,7 +164,7 @@ void vl_forget_oldest_block(bool was_sent);
 struct vl_wire {
     bool (*fits)(const struct vl_description *about);
     uint32_t (*largest_block)(void);
-    uint32_t (*layout_crc)(void);
+    uint32_t (*layout_crc)(uint32_t version);
     void (*begin)(void);      /* after a reset */
     void (*configure)(void);  /* at START: block and queue are known */
     void (*receive)(void);    /* take some of what has come */
@@ -159,7 +172,7 @@ struct vl_wire {
     bool (*has_expired)(void);/* whether the block that was given was given up */
     void (*send_answer)(const struct vl_command *answer);
     void (*send_heartbeat)(const struct vl_heartbeat *beat);
-    void (*send_samples)(const struct vl_samples *samples);
+    void (*send_samples)(const struct vl_samples *samples); /* and before them what was put out, if they have it */
 };
 
 /* -- crc32.c, bytes.h ------------------------------------------------------------------------------------------------------ */

@@ -115,6 +115,7 @@ enum vl_status vl_arm(uint32_t key, uint32_t *value)
     if (state == VL_RUNNING) {
         fed_us = board_clock_us();
         is_down = false;
+        vl_forget_period_locked(vl_next_instant());
         become_locked(VL_ARMED);
     } else {
         status = state == VL_LATCHED ? VL_IS_LATCHED : VL_WRONG_STATE;

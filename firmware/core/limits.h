@@ -36,6 +36,12 @@
 #define VL_MOST_BLOCKS 64
 #endif
 
+/* The longest period of a vibration that goes on where outputs are missing, samples; at most 65535, and 0 where they are held. The core
+ * keeps twice as many outputs for it. */
+#ifndef VL_LONGEST_PERIOD
+#define VL_LONGEST_PERIOD 2048
+#endif
+
 /* The largest payload of the protocol on a serial line, bytes. */
 #define VL_LARGEST_PAYLOAD 65536
 

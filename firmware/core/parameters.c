@@ -8,7 +8,7 @@ enum { TEXT_WORDS = 8 };
 struct vl_settings vl_settings, vl_in_force;
 uint32_t vl_boot;
 
-static uint32_t layout_crc;
+static uint32_t layout_crcs[1 + VL_VERSION]; /* by version */
 
 uint32_t vl_count_bytes(void)
 {
@@ -18,7 +18,7 @@ uint32_t vl_count_bytes(void)
 uint32_t vl_largest_block(void)
 {
     uint32_t of_the_wire = vl_about->wire->largest_block();
-    uint32_t of_the_memory = VL_SAMPLE_BYTES / 2 / (vl_about->n_channels * vl_count_bytes());
+    uint32_t of_the_memory = VL_SAMPLE_BYTES / 2 / ((vl_about->n_channels + 1) * vl_count_bytes()); /* with what was put out */
     uint32_t largest = of_the_wire < of_the_memory ? of_the_wire : of_the_memory;
     return largest < VL_LARGEST_BLOCK ? largest : VL_LARGEST_BLOCK;
 }
@@ -42,9 +42,10 @@ static uint32_t nearest_rate(uint32_t rate_mhz)
 void vl_begin_parameters(uint32_t boot)
 {
     vl_boot = boot;
-    layout_crc = vl_about->wire->layout_crc();
+    for (uint32_t version = VL_LOWEST_VERSION; version <= VL_VERSION; version++)
+        layout_crcs[version] = vl_about->wire->layout_crc(version);
     vl_settings = (struct vl_settings){
-        .version = VL_VERSION,
+        .version = VL_LOWEST_VERSION,
         .rate_mhz = nearest_rate(vl_about->highest_rate_mhz),
         .block = 1,
         .queue = 1,
@@ -82,7 +83,7 @@ static uint32_t text_word(const char *text, uint32_t word)
 static bool get_single(uint8_t parameter, uint32_t *value)
 {
     switch (parameter) {
-    case VL_P_LOWEST_VERSION:
+    case VL_P_LOWEST_VERSION: *value = VL_LOWEST_VERSION; break;
     case VL_P_HIGHEST_VERSION: *value = VL_VERSION; break;
     case VL_P_VERSION: *value = vl_settings.version; break;
     case VL_P_BOOT: *value = vl_boot; break;
@@ -99,12 +100,13 @@ static bool get_single(uint8_t parameter, uint32_t *value)
     case VL_P_SHORTEST_WATCHDOG_US: *value = vl_about->shortest_watchdog_us; break;
     case VL_P_LONGEST_WATCHDOG_US: *value = vl_about->longest_watchdog_us; break;
     case VL_P_FILTER_DELAY_NS: *value = vl_about->filter_delay_ns; break;
+    case VL_P_LONGEST_PERIOD: *value = VL_LONGEST_PERIOD; break;
     case VL_P_RATE_MHZ: *value = vl_settings.rate_mhz; break;
     case VL_P_BLOCK: *value = vl_settings.block; break;
     case VL_P_QUEUE: *value = vl_settings.queue; break;
     case VL_P_WATCHDOG_US: *value = vl_settings.watchdog_us; break;
     case VL_P_RAMP_US: *value = vl_settings.ramp_us; break;
-    case VL_P_LAYOUT_CRC: *value = layout_crc; break;
+    case VL_P_LAYOUT_CRC: *value = layout_crcs[vl_settings.version]; break;
     default: return false;
     }
     return true;

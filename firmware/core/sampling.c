@@ -14,10 +14,12 @@ static int32_t lowest_count, highest_count; /* of the converter's range */
 static uint64_t first_expected;  /* no output exists for samples before it */
 static uint8_t seen;             /* flags of the block under way */
 static bool is_spoilt;           /* an instant of the block under way was missed */
+static uint8_t put_out[VL_LARGEST_BLOCK * VL_MOST_COUNT_BYTES]; /* counts of the block under way */
 
 static uint8_t memory[VL_SAMPLE_BYTES];
 static struct vl_samples blocks[VL_MOST_BLOCKS];
 static uint32_t n_blocks, block_bytes;
+static uint32_t readback_bytes;  /* of them, for what was put out: none in version 1 */
 static _Atomic uint32_t written, read; /* blocks, modulo 2^32 */
 static uint32_t write_at, read_at; /* their places in the ring */
 static uint64_t first;           /* of the block under way */
@@ -55,7 +57,8 @@ void vl_restart_sampling(void)
     first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
     is_spoilt = false;
-    block_bytes = vl_in_force.block * vl_about->n_channels * vl_count_bytes();
+    readback_bytes = vl_in_force.version > 1 ? vl_in_force.block * vl_count_bytes() : 0;
+    block_bytes = vl_in_force.block * vl_about->n_channels * vl_count_bytes() + readback_bytes;
     n_blocks = VL_SAMPLE_BYTES / block_bytes < VL_MOST_BLOCKS ? VL_SAMPLE_BYTES / block_bytes : VL_MOST_BLOCKS;
     atomic_store(&written, 0);
     atomic_store(&read, 0);
@@ -126,14 +129,23 @@ static int32_t clipped(int32_t count)
     return count < 0 ? lowest_count : highest_count;
 }
 
-/* The output of an armed device: the one that is due, or the one before. */
+/* The output of an armed device: the one that is due, or the vibration's next one, or the one before. */
 static int32_t armed_output(bool has_come, int32_t count, uint64_t index)
 {
     if (has_come)
         return clipped(count);
+    bool goes_on = vl_continue(index, &count);
     if (has_output && index >= first_expected)
-        seen |= VL_OUTPUT_HELD;
-    return held;
+        seen |= goes_on ? VL_OUTPUT_CONTINUED : VL_OUTPUT_HELD;
+    return goes_on ? clipped(count) : held;
+}
+
+/* The counts of a block that was put out, for the host if an output was missing. */
+static void note_put_out(uint64_t index)
+{
+    const uint32_t n_bytes = vl_count_bytes();
+    if (readback_bytes && index - first < vl_in_force.block)
+        vl_put_count(put_out + (uint32_t)(index - first) * n_bytes, held, n_bytes);
 }
 
 int32_t vl_output(void)
@@ -151,6 +163,7 @@ int32_t vl_output(void)
         held = armed_output(has_come, count, index);
     else
         held = vl_ramp(&count) ? count : 0;
+    note_put_out(index);
     return held;
 }
 
@@ -166,10 +179,20 @@ static void begin_block(void)
     into = waiting < n_blocks ? memory + write_at * block_bytes : NULL;
 }
 
+/* Behind the samples of a block, what was put out if it is not all that was handed over; else NULL. */
+static const uint8_t *keep_readback(uint8_t *end)
+{
+    if (!readback_bytes || !(seen & (VL_OUTPUT_HELD | VL_OUTPUT_CONTINUED)))
+        return NULL;
+    return memcpy(end - readback_bytes, put_out, readback_bytes);
+}
+
 static void end_block(void)
 {
     if (seen & VL_OUTPUT_HELD)
         vl_counters.held_blocks++;
+    if (seen & VL_OUTPUT_CONTINUED)
+        vl_counters.continued_blocks++;
     if (into && !is_spoilt) {
         blocks[write_at] = (struct vl_samples){
             .first = first,
@@ -177,6 +200,7 @@ static void end_block(void)
             .dropped = atomic_load_explicit(&dropped, memory_order_relaxed),
             .flags = (uint8_t)(seen | vl_latched()),
             .counts = memory + write_at * block_bytes,
+            .put_out = keep_readback(memory + (write_at + 1) * block_bytes),
         };
         write_at = after(write_at);
         atomic_fetch_add_explicit(&written, 1, memory_order_release);

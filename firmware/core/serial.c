@@ -3,8 +3,9 @@
 #include "bytes.h"
 #include "device.h"
 
-enum { REQUEST = 1, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP };
-enum { HEADER = 4, COMMAND_SIZE = 12, SAMPLES_HEAD = 28, OUTPUT_HEAD = 12, STOP_SIZE = 5, CRC_SIZE = 4 };
+enum { REQUEST = 1, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK };
+enum { HEADER = 4, COMMAND_SIZE = 12, SAMPLES_HEAD = 28, READBACK_HEAD = 12, STOP_SIZE = 5, CRC_SIZE = 4 };
+enum { FIRST_OUTPUT_HEAD = 12, OUTPUT_HEAD = 20 }; /* in version 1, and since then with the period and the ramp */
 enum { AT_A_TIME = 128 }; /* bytes read at a call */
 
 /* -- sending ---------------------------------------------------------------------------------------------------------------- */
@@ -21,6 +22,7 @@ static size_t n_line, n_sent; /* bytes of the frame, and those that the line has
 static size_t code_at;        /* where the length of the present piece goes */
 static bool was_cut;          /* the piece before had 254 bytes, so that the present one may be left out */
 static uint32_t crc;
+static const struct vl_samples *next; /* to be sent after what was put out; NULL: none */
 
 static void end_piece(void)
 {
@@ -49,16 +51,16 @@ static void put(const uint8_t *bytes, size_t n)
     stuff(bytes, n);
 }
 
-/* A zero before what is no sample ends a false frame that noise on an idle line may have begun. */
+/* A zero before what is no part of a stream ends a false frame that noise on an idle line may have begun. */
 static void begin_frame(uint8_t type, uint16_t number)
 {
     n_line = n_sent = 0;
-    if (type != SAMPLES)
+    if (type != SAMPLES && type != READBACK)
         line[n_line++] = 0;
     code_at = n_line++;
     was_cut = false;
     crc = VL_CRC_START;
-    uint8_t header[HEADER] = {VL_VERSION, type, (uint8_t)number, (uint8_t)(number >> 8)};
+    uint8_t header[HEADER] = {(uint8_t)vl_settings.version, type, (uint8_t)number, (uint8_t)(number >> 8)};
     put(header, sizeof header);
 }
 
@@ -92,21 +94,50 @@ static void send_heartbeat(const struct vl_heartbeat *beat)
     end_frame();
 }
 
-static void send_samples(const struct vl_samples *samples)
+static uint16_t block_number(const struct vl_samples *samples)
+{
+    return (uint16_t)(samples->first / vl_in_force.block);
+}
+
+static void put_samples(const struct vl_samples *samples)
 {
     uint8_t head[SAMPLES_HEAD - HEADER] = {0};
     vl_put(vl_put(vl_put(head, samples->first, 8), samples->clock_us, 8), samples->dropped, 4);
     head[20] = samples->flags;
-    begin_frame(SAMPLES, (uint16_t)(samples->first / vl_in_force.block));
+    begin_frame(SAMPLES, block_number(samples));
     put(head, sizeof head);
     put(samples->counts, vl_in_force.block * vl_about->n_channels * vl_count_bytes());
     end_frame();
+}
+
+static void put_readback(const struct vl_samples *samples)
+{
+    uint8_t head[READBACK_HEAD - HEADER];
+    vl_put(head, samples->first, 8);
+    begin_frame(READBACK, block_number(samples));
+    put(head, sizeof head);
+    put(samples->put_out, vl_in_force.block * vl_count_bytes());
+    end_frame();
+}
+
+static void send_samples(const struct vl_samples *samples)
+{
+    next = samples->put_out ? samples : NULL;
+    if (next)
+        put_readback(samples);
+    else
+        put_samples(samples);
 }
 
 static bool is_idle(void)
 {
     if (n_sent < n_line)
         n_sent += board_write(line + n_sent, n_line - n_sent);
+    if (n_sent == n_line && next) {
+        put_samples(next);
+        next = NULL;
+        n_sent = board_write(line, n_line);
+    }
     return n_sent == n_line;
 }
 
@@ -161,6 +192,15 @@ static void take_command(void)
     vl_take_request(&request);
 }
 
+static void take_output(uint8_t version)
+{
+    const uint64_t first = vl_u64(payload + 4);
+    if (version == 1)
+        vl_take_output(first, payload + FIRST_OUTPUT_HEAD, 0, 0);
+    else
+        vl_take_output(first, payload + OUTPUT_HEAD, vl_u32(payload + 12), vl_u32(payload + 16));
+}
+
 static void take_message(size_t size)
 {
     uint8_t version = payload[0], type = payload[1];
@@ -168,8 +208,8 @@ static void take_message(size_t size)
         take_command();
     else if (type == EMERGENCY_STOP && size == STOP_SIZE)
         vl_take_emergency_stop();
-    else if (type == OUTPUT && version == VL_VERSION && output_size && size == output_size)
-        vl_take_output(vl_u64(payload + 4), payload + OUTPUT_HEAD);
+    else if (type == OUTPUT && version == vl_settings.version && output_size && size == output_size)
+        take_output(version);
     else
         vl_counters.malformed++;
 }
@@ -211,21 +251,24 @@ static uint32_t largest_block(void)
     return (MOST_SENT - SAMPLES_HEAD) / (vl_about->n_channels * vl_count_bytes());
 }
 
-static uint32_t layout_crc(void)
+static uint32_t layout_crc(uint32_t version)
 {
+    (void)version;
     return 0;
 }
 
 static void begin(void)
 {
     n_line = n_sent = 0;
+    next = NULL;
     output_size = 0;
     forget_frame();
 }
 
 static void configure(void)
 {
-    output_size = OUTPUT_HEAD + vl_in_force.block * vl_count_bytes();
+    next = NULL;
+    output_size = (vl_in_force.version == 1 ? FIRST_OUTPUT_HEAD : OUTPUT_HEAD) + vl_in_force.block * vl_count_bytes();
 }
 
 static bool has_expired(void)

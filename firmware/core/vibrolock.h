@@ -1,4 +1,4 @@
-/* A device of the vibrolock wire protocol, version 1: what a board describes, and what it calls.
+/* A device of the vibrolock wire protocol, versions 1 and 2: what a board describes, and what it calls.
  *
  * The core needs no heap, no operating system and no vendor library; of the C library memcpy, memmove, memset, memcmp and strlen, and
  * of the compiler's own library divisions of 64 bits and, in vl_begin alone, arithmetic in double. There is one device in a program.
@@ -105,6 +105,7 @@ struct vl_counters {
     uint32_t repeated_frames;
     uint32_t incomplete_blocks;
     uint32_t resynchronised;
+    uint32_t continued_blocks;     /* blocks in which the vibration went on without an output */
 };
 
 extern struct vl_counters vl_counters;

@@ -24,6 +24,7 @@ COMPARED_COUNTERS = {
     "repeated_frames": 14,
     "incomplete_blocks": 15,
     "resynchronised": 16,
+    "continued_blocks": 17,
 }
 """Counters that both have, and their place in ``struct vl_counters``."""
 
@@ -62,8 +63,9 @@ def sort_out(choice: Choice, sent: Sequence[Event], block_of: Sequence[int]) -> 
 
 
 def _of_the_line(choice: Choice, sent: Sequence[Event]) -> tuple[list, list, list]:
-    by_type: dict[int, list] = {2: [], 3: [], 5: []}
-    rest = b""
+    by_type: dict[int, list] = {2: [], 5: []}
+    rows: list[Rows] = []
+    rest = readback = b""
     for event in sent:
         if event.kind != Kind.BYTES:
             continue
@@ -72,9 +74,15 @@ def _of_the_line(choice: Choice, sent: Sequence[Event]) -> tuple[list, list, lis
             if one:
                 payload = payload_of(one)
                 assert frame(payload) == one + b"\0", "COBS in another form"
-                by_type[payload[1]].append((event.time_us, payload))
+                assert not readback or payload[1] == 3, "a readback without its samples"
+                if payload[1] == 7:
+                    readback = payload
+                elif payload[1] == 3:
+                    rows.append(rows_of_payload(event.time_us, payload, choice, readback))
+                    readback = b""
+                else:
+                    by_type[payload[1]].append((event.time_us, payload))
     assert not rest, "a frame without its end"
-    rows = [rows_of_payload(time_us, payload, choice) for time_us, payload in by_type[3]]
     return by_type[2], by_type[5], rows
 
 
@@ -89,6 +97,8 @@ def _of_the_bus(choice: Choice, sent: Sequence[Event], block_of: Sequence[int]) 
             answers.append((event.time_us, event.data))
         elif function == 0x010:
             heartbeats.append((event.time_us, event.data))
+        elif function == 0x060:
+            samples.take_readback(event)
         else:
             samples.take(event)
     return answers, heartbeats, samples.rows
@@ -132,15 +142,21 @@ def _differences_of_rows(python: PythonDevice, ours: list[Rows], theirs: list[Ro
     ramp_from = 0.0
     for number, (one, other) in enumerate(zip(ours, theirs, strict=False)):
         put_out, first, flags = plant.blocks[number], plant.firsts[number], link.flags[number]
-        head, their_head = one._replace(counts=None), other._replace(counts=None)
-        if not head.is_like(their_head):
-            out.append(Difference("block", number, head, their_head))
+        if not one.is_like(other):
+            out.append(Difference("block", number, one, other))
         if other.counts.shape != one.counts.shape:
             out.append(Difference("block's shape", number, one.counts.shape, other.counts.shape))
             continue
         count = other.counts[:, 0].astype(np.int64)
         if not np.array_equal(readings(count, first, choice.n_channels, choice.bits), other.counts):
             out.append(Difference("structure", number, one.counts.tolist(), other.counts.tolist()))
+        if (one.readback is None) != (other.readback is None):
+            out.append(Difference("whether it reads back block", number, one.readback, other.readback))
+        out += [
+            Difference(f"readback of the {name}", number, rows.readback.tolist(), rows.counts[:, 0].tolist())
+            for name, rows in (("emulator", one), ("firmware", other))
+            if rows.readback is not None and not np.array_equal(rows.readback, rows.counts[:, 0])
+        ]
         allowed = _allowed(put_out, flags, ramp_from, link.ramps_us[number])
         ramp_from = max(float(np.abs(put_out).max()), ramp_from * bool(flags & DeviceFlag.WATCHDOG))
         wrong = np.abs(count - put_out) > allowed

@@ -103,9 +103,10 @@ def random_script(seed: int, n_actions: int) -> Host:
     return host
 
 
-def far_script(choice: Choice, blocks: int, block: int = 1) -> Host:
+def far_script(choice: Choice, blocks: int, block: int = 1, version: int = 1) -> Host:
     """A host that drives blocks of ``block`` samples beyond ``blocks``: at the beginning, then nothing, then again."""
     host = Host(choice, Random(blocks))
+    host.request(Command.SET, Parameter.VERSION, 0, version)
     for parameter, value in ((Parameter.BLOCK, block), (Parameter.QUEUE, 3), (Parameter.WATCHDOG_US, 4_000_000_000)):
         host.request(Command.SET, parameter, 0, value)
     host.request(Command.START)

@@ -12,7 +12,7 @@ from rig.wire.messages import ARM_KEY, Command, DeviceState, Parameter
 from rig.wire.serial.frames import frame
 from tests.firmware.events import BEGIN_US, SERIAL, Choice, Event, Kind, of_frame, protocol_of
 from tests.firmware.nonsense import nonsense_on_the_bus, nonsense_on_the_line
-from tests.firmware.python_device import PythonDevice
+from tests.firmware.python_device import LONGEST_PERIOD, PythonDevice
 
 SETTABLE = (48, 49, 50, 51, 52)
 BLOCKS = (1, 1, 2, 3, 5, 7, 8, 10, 16, 31, 32, 33, 62, 63, 64, 100, 125, 256, 500, 1000)
@@ -33,6 +33,8 @@ class Host:
         self._number = 0
         self._last: bytes | None = None
         self._pressed = False
+        self.period = self.ramp = 0
+        """Of the outputs from the next on: 1/65536 sample, and samples from the end of a block to 0 V."""
         self._dtype = np.dtype(f"<i{choice.bits // 8}")
         if choice.wire != SERIAL:
             self._protocol = protocol_of(choice.n_channels, choice.fd, choice.node)
@@ -49,6 +51,11 @@ class Host:
     @property
     def block(self) -> int:
         return self._setting(Parameter.BLOCK)
+
+    @property
+    def version(self) -> int:
+        """Version of the protocol in use."""
+        return self.python.link.version
 
     @property
     def _is_sampling(self) -> bool:
@@ -114,7 +121,7 @@ class Host:
         self.requests += 1
         self._last = body
         if self.choice.wire == SERIAL:
-            version = 1 if self.random.random() < 0.95 else self.random.randrange(256)
+            version = self.version if self.random.random() < 0.95 else self.random.randrange(256)
             self._payload(bytes((version, 1, 0, 0)) + body)
         else:
             self.send_frame(Frame(0x020 + self.choice.node, body))
@@ -136,7 +143,7 @@ class Host:
         self.requests += 1
         data = bytes((self.random.randrange(256),))
         if self.choice.wire == SERIAL:
-            self._payload(bytes((self.random.choice((1, 1, 9)), 6, 0, 0)) + data)
+            self._payload(bytes((self.random.choice((1, 2, 9)), 6, 0, 0)) + data)
         else:
             self.send_frame(Frame(0, self.random.choice((b"", data, bytes(8)))))
 
@@ -182,6 +189,7 @@ class Host:
         watchdog_us = random.choice((1, 2, 3, 7, 30)) * max(1, round(self._block_us / 1000)) * 1000
         self.request(Command.SET, Parameter.WATCHDOG_US, 0, watchdog_us)
         self.request(Command.SET, Parameter.RAMP_US, 0, random.choice((0, 1000, 20_000, 33_300, 50_000)))
+        self.request(Command.SET, Parameter.VERSION, 0, random.choice((1, 2, 2)))
         self.request(Command.START)
         if random.random() < 0.9:
             self.wait(random.choice((50, 1500, self._block_us)))
@@ -212,10 +220,16 @@ class Host:
             counts = self.counts(max(0, self.block + longer))
         if self.choice.wire == SERIAL:
             first = (number * self.block + amiss) % 2**64
-            self._payload(struct.pack("<BBHQ", 1, 4, number & 0xFFFF, first) + counts.tobytes())
+            self._payload(self.output_head(number, first) + counts.tobytes())
         elif number >= 0:
             for one in self.output_frames(number, counts):
                 self.send_frame(one)
+
+    def output_head(self, number: int, first: int) -> bytes:
+        """What stands before the counts of an output on a serial line; now and then that of the other version."""
+        version = self.version if self.random.random() < 0.98 else 3 - self.version
+        head = struct.pack("<BBHQ", version, 4, number & 0xFFFF, first)
+        return head if version == 1 else head + struct.pack("<II", self.period, self.ramp)
 
     def output_frames(self, number: int, counts: np.ndarray) -> list[Frame]:
         stream = StreamFrames(self._protocol, FrameKind.OUTPUT, self.block)
@@ -253,6 +267,75 @@ class Host:
     def drive_a_while(self) -> None:
         self.drive(self.random.choice((3, 10, 20, 60)), self.random.choice((1.0, 1.0, 0.9, 0.5)))
 
+    def tell_period(self) -> None:
+        """Begin to send outputs with another period, or none; or a ramp."""
+        random, longest = self.random, LONGEST_PERIOD << 16
+        largest = min(longest, max(5 << 16, random.choice((5, 40, 4 * self.block, 20 * self.block)) << 16))
+        bounds = (0, 1, (4 << 16) - 1, longest, longest + 1, 2**32 - 1)
+        self.period = random.choice(bounds) if random.random() < 0.1 else random.randrange(4 << 16, largest + 1)
+        self.ramp = random.choice((0, 0, 0, 1, 3 * self.block, 500, 10**5, 2**32 - 1))
+        if self.choice.wire != SERIAL and (self.version > 1 or random.random() < 0.1):
+            self.send_frame(Frame(0x050 + self.choice.node, struct.pack("<II", self.period, self.ramp)))
+
+    def drive_over_gaps(self) -> None:
+        """Outputs of a vibration, of which some stretches come late, out of order, or never; disarmed or ramped in between."""
+        random, queue = self.random, self.queue
+        waiting: list[int] = []
+        self.tell_period()
+        for _ in range(random.choice((20, 60))):
+            if not self._is_sampling or self._block_us > 2e5:
+                return
+            waiting.append(self.next_block + queue)
+            if random.random() < (0.7 if len(waiting) == 1 else 0.3):
+                self._send_waiting(waiting)
+                waiting = []
+            if self.ramp:
+                self.ramp = max(0, self.ramp - self.block)
+            if random.random() < 0.03:
+                random.choice((self.tell_period, self._arm_again))()
+            self.wait(self._block_us * random.choice((1.0, 1.0, 0.9, 1.1)))
+
+    def vibrate(self) -> None:
+        """A stream of version 2 whose watchdog bears the gaps; then perhaps the other version, and an output of no stream."""
+        random = self.random
+        self.request(Command.STOP)
+        if not self._pressed:
+            self.request(Command.CLEAR)
+        block = random.choice([n for n in BLOCKS if n <= min(64, self._setting(Parameter.LARGEST_BLOCK))])
+        settings = {Parameter.BLOCK: block, Parameter.QUEUE: random.choice((1, 2, 5, 64)), Parameter.VERSION: 2}
+        settings[Parameter.RATE_MHZ] = self.choice.highest_rate_mhz
+        settings[Parameter.WATCHDOG_US] = random.choice((7, 50)) * max(
+            1000, round(1e9 * block / self.choice.highest_rate_mhz)
+        )
+        for parameter, value in settings.items():
+            self.request(Command.SET, parameter, 0, value)
+        self.request(Command.START)
+        self.request(Command.ARM, value=ARM_KEY)
+        for _ in range(random.choice((1, 3))):
+            self.drive_over_gaps()
+        if random.random() < 0.2:
+            self.request(Command.STOP)
+            self.request(Command.SET, Parameter.VERSION, 0, random.choice((1, 2)))
+            self.output(self.queue)
+
+    def _send_waiting(self, numbers: list[int]) -> None:
+        """The outputs of blocks that were held up; a part of them, or in another order."""
+        kind = self.random.random()
+        if kind < 0.2:
+            numbers = numbers[1:]
+        elif kind < 0.3:
+            numbers = numbers[-1:]
+        elif kind < 0.4:
+            self.random.shuffle(numbers)
+        for number in numbers[-8:]:
+            self.output(number)
+
+    def _arm_again(self) -> None:
+        self.request(Command.DISARM)
+        if self.random.random() < 0.5:
+            self.wait(self.random.choice((30, 0.4 * self._block_us, 3 * self._block_us)))
+        self.request(Command.ARM, value=ARM_KEY)
+
     def nonsense(self) -> None:
         """Something that no host sends."""
         self.requests += 1
@@ -272,7 +355,10 @@ class Host:
             self.command: 8,
             self.repeat: 5,
             self.some_output: 12 if self._is_sampling else 1,
-            self.drive_a_while: 12 if self._is_sampling else 0,
+            self.drive_a_while: 6 if self._is_sampling else 0,
+            self.drive_over_gaps: 8 if self._is_sampling else 0,
+            self.tell_period: 1,
+            self.vibrate: 4,
             self.nonsense: 16,
             self.stop_message: 1,
             self.switch: 30 if self._pressed else 0.5,

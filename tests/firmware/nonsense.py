@@ -15,8 +15,8 @@ def nonsense_on_the_line(host: "Host") -> None:
     random = host.random
     request = struct.pack("<BBHBBBBI", 1, 1, 0, random.randrange(256), 4, 0, 0, 0)
     counts = host.counts(host.block).tobytes()
-    output = struct.pack("<BBHQ", 1, 4, 0, random.choice((0, 1, 2**32, 2**63, 2**64 - host.block))) + counts
-    heartbeat = struct.pack("<BBHBBHII", 1, 5, 0, 0, 0, 0, 0, 0)
+    output = host.output_head(0, random.choice((0, 1, 2**32, 2**63, 2**64 - host.block))) + counts
+    heartbeat = struct.pack("<BBHBBHII", host.version, 5, 0, 0, 0, 0, 0, 0)
     payload = random.choice((request, output, output, heartbeat, random.randbytes(random.randrange(40))))
     kind = random.randrange(7)
     if kind == 0:
@@ -41,7 +41,7 @@ def nonsense_on_the_line(host: "Host") -> None:
 
 def nonsense_on_the_bus(host: "Host") -> None:
     random, node = host.random, host.choice.node
-    kind = random.randrange(7)
+    kind = random.randrange(8)
     if kind == 0:
         identifier = random.choice((random.randrange(1, 0x800), 0x010 + node, 0x030 + node, 0x300 + node))
         host.send_frame(_any_frame(host, identifier))
@@ -54,6 +54,8 @@ def nonsense_on_the_bus(host: "Host") -> None:
         host.send_frame(Frame(0x020 + node, random.randbytes(random.choice((0, 7, 6)))))
     elif kind == 4:
         _send_torn_outputs(host)
+    elif kind == 5:
+        host.send_frame(Frame(0x050 + node, random.randbytes(random.choice((0, 4, 7, 8)))))
     else:
         _send_mangled_output(host)
 

@@ -13,6 +13,9 @@ from rig.wire.serial.frames import FrameReader, frame
 from tests.firmware.events import BEGIN_US, BOOT, SERIAL, Choice, Event, Kind, frame_of, of_frame, protocol_of
 from tests.firmware.structure import FULL_RANGE_V, RANGE_V, Formula
 
+LONGEST_PERIOD = 2048
+"""Samples: that of firmware/core/limits.h."""
+
 MODEL = "a formula behind a simulated clock"
 """Longer than what a parameter holds."""
 
@@ -118,8 +121,7 @@ class PythonDevice:
             layout_crc=self.link.layout_crc,
             boot=BOOT,
         )
-        words[Parameter.HIGHEST_VERSION, 0] = 1  # what the firmware speaks
-        del words[Parameter.LONGEST_PERIOD, 0]
+        words[Parameter.LONGEST_PERIOD, 0] = LONGEST_PERIOD
         words[Parameter.LOWEST_RATE_MHZ, 0] = choice.lowest_rate_mhz
         words[Parameter.SHORTEST_WATCHDOG_US, 0] = choice.shortest_watchdog_us
         words[Parameter.LONGEST_WATCHDOG_US, 0] = choice.longest_watchdog_us

@@ -1,4 +1,4 @@
-"""Blocks of samples as a device has sent them, over a line or a bus."""
+"""Blocks of samples as a device has sent them, over a line or a bus, with what they say was put out."""
 
 import struct
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ from rig.wire.can.protocol import FrameKind
 from tests.firmware.events import Choice, Event, frame_of, protocol_of
 
 HEAD = struct.Struct("<BBHQQIHH")
+READBACK_HEAD = struct.Struct("<BBHQ")
 
 
 class Rows(NamedTuple):
@@ -25,17 +26,25 @@ class Rows(NamedTuple):
     reserved: int
     counts: Any
     """[n, n_channels]"""
+    readback: Any = None
+    """[n]: what was put out, where an output was missing (version 2)."""
 
     def is_like(self, other: "Rows") -> bool:
         """Whether all but the counts is the same; times are rounded."""
         times = abs(self.time_us - other.time_us) <= 1 and abs(self.clock_us - other.clock_us) <= 1
-        return times and self._replace(time_us=0, clock_us=0) == other._replace(time_us=0, clock_us=0)
+        plain = {"time_us": 0, "clock_us": 0, "counts": None, "readback": None}
+        return times and self._replace(**plain) == other._replace(**plain)
 
 
-def rows_of_payload(time_us: int, payload: bytes, choice: Choice) -> Rows:
+def rows_of_payload(time_us: int, payload: bytes, choice: Choice, before: bytes = b"") -> Rows:
+    """The block of a payload on a serial line; ``before``: that of its readback, which came immediately before it."""
     _, _, sequence, first, clock_us, dropped, flags, reserved = HEAD.unpack_from(payload)
     counts = np.frombuffer(payload, f"<i{choice.bits // 8}", offset=HEAD.size).reshape(-1, choice.n_channels)
-    return Rows(time_us, first, sequence, clock_us, dropped, flags, reserved, counts)
+    readback = None
+    if before:
+        assert READBACK_HEAD.unpack_from(before)[2:] == (sequence, first)
+        readback = np.frombuffer(before, f"<i{choice.bits // 8}", offset=READBACK_HEAD.size)
+    return Rows(time_us, first, sequence, clock_us, dropped, flags, reserved, counts, readback)
 
 
 class SamplesOnBus:
@@ -47,6 +56,7 @@ class SamplesOnBus:
         self._protocol = protocol_of(choice.n_channels, choice.fd, choice.node)
         self._streams: dict[int, StreamFrames] = {}
         self._frames: list[Event] = []
+        self._readback: list[Event] = []
 
     def take(self, event: Event) -> None:
         if len(self.rows) == len(self._block_of):
@@ -57,8 +67,28 @@ class SamplesOnBus:
         stream = self._streams[block]
         self._frames.append(event)
         if len(self._frames) == stream.groups * stream.parts:
-            self.rows.append(self._joined(stream))
-            self._frames = []
+            self.rows.append(self._joined(stream)._replace(readback=self._read_back(block)))
+            self._frames, self._readback = [], []
+
+    def take_readback(self, event: Event) -> None:
+        """Take a frame of what was put out; they go before the samples of their block."""
+        assert not self._frames, "a readback within its block"
+        self._readback.append(event)
+
+    def _read_back(self, block: int) -> np.ndarray | None:
+        if not self._readback:
+            return None
+        rows, counts, indices = 31 if self._choice.fd else 3, [], []
+        for at, event in enumerate(self._readback):
+            frame = frame_of(event.data)
+            n = min(rows, block - rows * at)
+            indices.append(int.from_bytes(frame.data[:2], "little"))
+            counts += list(struct.unpack_from(f"<{n}h", frame.data, 2))
+            assert frame.identifier == 0x060 + self._choice.node
+            assert (frame.fd, frame.data[2 + 2 * n :]) == (self._choice.fd, bytes(len(frame.data) - 2 - 2 * n))
+            assert self._choice.fd or len(frame.data) == 8
+        assert indices == [(indices[0] + rows * at) & 0xFFFF for at in range(len(indices))]
+        return np.array(counts)
 
     def _joined(self, stream: StreamFrames) -> Rows:
         frames = [frame_of(event.data) for event in self._frames]

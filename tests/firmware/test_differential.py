@@ -59,7 +59,7 @@ def test_the_scripts_come_to_all_that_can_happen(hosts: list[Host]) -> None:
         counted += host.python.device.counts + Counter(host.python.link.counters)
         for block in host.python.link.flags:
             flags.update(flag for flag in DeviceFlag if block & flag)
-    assert set(flags) == set(DeviceFlag) - {DeviceFlag.OUTPUT_CONTINUED}  # the firmware speaks version 1
+    assert set(flags) == set(DeviceFlag)
     for name in (
         *("watchdog_trips", "emergency_stops", "held_blocks", "bad_outputs", "repeated_requests", "outputs_while_idle"),
         *("crc_errors", "oversize_frames", "malformed", "foreign_versions", "damaged_frames", "repeated_frames"),

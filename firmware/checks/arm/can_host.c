@@ -8,7 +8,7 @@
 #ifndef FD
 #define FD 0
 #endif
-enum { NODE = 1, REQUEST = 0x020, OUTPUT_INDEX = 0x040, OUTPUT = 0x100, SAMPLES = 0x300, INBOX = 16 };
+enum { NODE = 1, REQUEST = 0x020, OUTPUT_INDEX = 0x040, OUTPUT_PERIOD = 0x050, OUTPUT = 0x100, SAMPLES = 0x300, INBOX = 16 };
 enum { COUNTS = FD ? 31 : 4, SEQUENCES = FD ? 256 : 32, ROWS = FD ? 7 : 1 };
 
 static struct vl_frame inbox[INBOX];
@@ -66,6 +66,12 @@ void host_sends_outputs(uint32_t first, uint32_t n)
     block = n;
     for (uint32_t g = 0; g < groups; g++)
         send_group((group + g) % numbers, first + g * COUNTS, n - g * COUNTS < COUNTS ? n - g * COUNTS : COUNTS);
+}
+
+void host_tells_period(uint32_t period, uint32_t ramp)
+{
+    const uint32_t told[] = {period, ramp};
+    memcpy(next_frame(OUTPUT_PERIOD, 8), told, 8);
 }
 
 uint32_t host_received_blocks(void)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tools import QEMU, SEMIHOSTING, output_of
 
-CALLERS = ("steady", "ramp", "ramp_by_main_loop")
+CALLERS = ("steady", "continued_short", "continued_longest", "ramp", "ramp_by_main_loop")
 CALLED = ("vl_output", "vl_input", "vl_serve")
 TRACE = re.compile(rb"^Trace 0: \S+ \[\w+/(\w+)/")
 
@@ -72,7 +72,7 @@ class Reader:
             self._in_steady, self._caller = name == "steady", name
         elif self._call is None and begins and name in CALLED and self._caller:
             self._call = self._caller, name
-        elif name == "main":
+        elif name in ("main", "drive"):
             self._in_steady, self._caller = False, ""
         self.counts.steady += self._in_steady
         if name.startswith(("vl_", "board_", "host_")) or not name.startswith(("mem", "__")):

@@ -10,6 +10,9 @@
 void host_asks(uint8_t command, uint8_t parameter, uint32_t value);
 void host_sends_outputs(uint32_t first, uint32_t n);
 
+/* The period (1/65536 sample) and the ramp to 0 V (samples from the end of a block) of all outputs from the next on; 0: none. */
+void host_tells_period(uint32_t period, uint32_t ramp);
+
 /* Blocks of samples that have come. */
 uint32_t host_received_blocks(void);
 

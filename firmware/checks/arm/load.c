@@ -13,6 +13,7 @@
 #define BLOCK 10
 #endif
 enum { PERIOD_US = 200, SAMPLES = 600, PING_EVERY = 250, QUEUE = 2, WATCHDOG_US = 20000, RAMP_US = 10000 };
+enum { SHORT = 100, LONGEST = VL_LONGEST_PERIOD, STEPS = 65536, MISSING = 50 }; /* samples of a period; outputs that do not come */
 
 static const struct vl_channel CHANNELS[] = {
     {.name = "force", .range_v = 5.0f, .v_per_count = 1.5e-4f},
@@ -86,9 +87,10 @@ void board_feed_watchdog(void)
 {
 }
 
-/* -- what is measured: calls from `steady`, and from `ramp` -------------------------------------------------------- */
+/* -- what is measured: calls from `steady`, `continued_...` and `ramp...` ------------------------------------------- */
 
 static const char *stack_in_main_loop;
+static uint32_t samples; /* since START */
 
 static void sample_instant(int32_t *counts)
 {
@@ -108,10 +110,11 @@ __attribute__((noinline)) uint32_t steady(void)
     int32_t counts[N_CHANNELS] = {1, 2, 3, 4};
     __asm__ volatile("mov %0, sp" : "=r"(stack_in_main_loop));
     uint32_t from = TIMER0_VALUE;
-    for (uint32_t sample = 0; sample < SAMPLES; sample++) {
-        if (sample % BLOCK == 0)
-            host_sends_outputs(sample + QUEUE * BLOCK, BLOCK);
-        if (sample % PING_EVERY == 7)
+    host_tells_period(SHORT * STEPS + 1, 0);
+    for (; samples < SAMPLES; samples++) {
+        if (samples % BLOCK == 0)
+            host_sends_outputs(samples + QUEUE * BLOCK, BLOCK);
+        if (samples % PING_EVERY == 7)
             host_asks(1 /* GET */, 65 /* PING */, 0);
         sample_instant(counts);
         vl_output();
@@ -121,12 +124,51 @@ __attribute__((noinline)) uint32_t steady(void)
     return from - TIMER0_VALUE;
 }
 
+/* A period of outputs in time, and then as many as are on their way. */
+static void drive(uint32_t period, uint32_t ramp)
+{
+    int32_t counts[N_CHANNELS] = {1, 2, 3, 4};
+    const uint32_t until = samples + period + 4 + BLOCK, end = until - until % BLOCK + QUEUE * BLOCK;
+    host_tells_period(period * STEPS, ramp);
+    for (; samples < end; samples++) {
+        if (samples % BLOCK == 0 && samples + QUEUE * BLOCK < end)
+            host_sends_outputs(samples + QUEUE * BLOCK, BLOCK);
+        sample_instant(counts);
+        vl_output();
+        vl_input(counts, false);
+        vl_serve();
+    }
+}
+
+static inline __attribute__((always_inline)) void miss_outputs(void)
+{
+    int32_t counts[N_CHANNELS] = {1, 2, 3, 4};
+    for (uint32_t until = samples - samples % BLOCK + MISSING; samples < until; samples++) {
+        sample_instant(counts);
+        vl_output();
+        vl_input(counts, false);
+        vl_serve();
+    }
+}
+
+/* The vibration goes on without outputs. */
+__attribute__((noipa)) void continued_short(void)
+{
+    miss_outputs();
+}
+
+/* The same with the longest period, while the host was on its way to 0 V. */
+__attribute__((noipa)) void continued_longest(void)
+{
+    miss_outputs();
+}
+
 static bool is_until_after_the_ramp(uint32_t sample)
 {
     return sample < (WATCHDOG_US + RAMP_US) / PERIOD_US + 100;
 }
 
-/* The host is silent: outputs are held, then the watchdog brings the output to 0 V. */
+/* The host is silent: the vibration goes on, then the watchdog brings the output to 0 V. */
 __attribute__((noinline)) void ramp(void)
 {
     int32_t counts[N_CHANNELS] = {1, 2, 3, 4};
@@ -160,6 +202,8 @@ static void ask_and_serve(uint8_t command, uint8_t parameter, uint32_t value)
 
 static void set_up(void)
 {
+    samples = 0;
+    ask_and_serve(2, 3, 2); /* the version */
     ask_and_serve(2, 48, 5000000);
     ask_and_serve(2, 49, BLOCK);
     ask_and_serve(2, 50, QUEUE);
@@ -178,10 +222,15 @@ int main(void)
     set_up();
     uint32_t ticks = steady();
     const struct vl_counters *c = &vl_counters;
-    bool all_well = host_received_blocks() == SAMPLES / BLOCK && c->held_blocks == 0 && c->dropped_blocks == 0 && c->bad_outputs == 0
+    bool all_well = host_received_blocks() == SAMPLES / BLOCK && c->held_blocks == 0 && c->continued_blocks == 0 && c->dropped_blocks == 0 && c->bad_outputs == 0
                     && c->late_outputs == 0 && c->damaged_frames == 0 && c->malformed == 0 && c->watchdog_trips == 0;
+    drive(SHORT, 0);
+    continued_short();
+    drive(LONGEST, 20000);
+    continued_longest();
+    all_well = all_well && c->continued_blocks == 2 * MISSING / BLOCK + QUEUE && c->held_blocks == 0;
     ramp();
-    all_well = all_well && c->watchdog_trips == 1 && c->held_blocks > 0;
+    all_well = all_well && c->watchdog_trips == 1;
     ask_and_serve(4, 0, 0); /* STOP */
     ask_and_serve(7, 0, 0); /* CLEAR */
     set_up();

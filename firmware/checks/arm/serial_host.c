@@ -8,7 +8,8 @@
 static uint8_t inbox[512];
 static size_t arrived, taken;
 static uint32_t blocks, place; /* samples that have come, and bytes of the frame that is coming */
-enum { REQUEST = 1, SAMPLES = 3, OUTPUT = 4 };
+static uint32_t told_period, told_ramp;
+enum { VERSION = 2, REQUEST = 1, SAMPLES = 3, OUTPUT = 4 };
 
 static uint32_t crc_of(const uint8_t *bytes, size_t n)
 {
@@ -54,19 +55,27 @@ static size_t put(uint8_t *bytes, uint32_t value, size_t n)
 void host_asks(uint8_t command, uint8_t parameter, uint32_t value)
 {
     static uint8_t number;
-    uint8_t payload[16] = {1, REQUEST, 0, 0, ++number, command, parameter, 0};
+    uint8_t payload[16] = {VERSION, REQUEST, 0, 0, ++number, command, parameter, 0};
     put(payload + 8, value, 4);
     send(payload, 12);
 }
 
 void host_sends_outputs(uint32_t first, uint32_t n)
 {
-    uint8_t payload[64] = {1, OUTPUT};
+    uint8_t payload[64] = {VERSION, OUTPUT};
     size_t size = 4 + put(payload + 4, first, 4) + 4;
+    size += put(payload + size, told_period, 4);
+    size += put(payload + size, told_ramp, 4);
     put(payload + 2, first / n, 2);
     for (uint32_t i = 0; i < n; i++)
         size += put(payload + size, (first + i) * 37u, 2);
     send(payload, size);
+}
+
+void host_tells_period(uint32_t period, uint32_t ramp)
+{
+    told_period = period;
+    told_ramp = ramp;
 }
 
 uint32_t host_received_blocks(void)
