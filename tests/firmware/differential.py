@@ -4,6 +4,7 @@ Run as a program it plays many random scripts: ``python -m tests.firmware.differ
 """
 
 import argparse
+import struct
 import subprocess
 import sys
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
+from rig.wire.can.frames import Frame
 from rig.wire.messages import ARM_KEY, Command, Parameter
 from tests.firmware.comparing import Difference, differences, sort_out
 from tests.firmware.events import CAN, CAN_FD, SERIAL, Choice, Event, events_in
@@ -104,13 +106,19 @@ def random_script(seed: int, n_actions: int) -> Host:
 
 
 def far_script(choice: Choice, blocks: int, block: int = 1, version: int = 1) -> Host:
-    """A host that drives blocks of ``block`` samples beyond ``blocks``: at the beginning, then nothing, then again."""
+    """A host that drives blocks of ``block`` samples beyond ``blocks``: at the beginning, then nothing, then again.
+
+    In version 2 the vibration goes on in between.
+    """
     host = Host(choice, Random(blocks))
     host.request(Command.SET, Parameter.VERSION, 0, version)
     for parameter, value in ((Parameter.BLOCK, block), (Parameter.QUEUE, 3), (Parameter.WATCHDOG_US, 4_000_000_000)):
         host.request(Command.SET, parameter, 0, value)
     host.request(Command.START)
     host.request(Command.ARM, value=ARM_KEY)
+    host.period = 0 if version == 1 else 1_000_000
+    if version > 1 and choice.wire != SERIAL:
+        host.send_frame(Frame(0x050 + choice.node, struct.pack("<II", host.period, 0)))
     for part in range(3):
         host.drive(100)
         if part == 0:

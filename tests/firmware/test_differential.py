@@ -72,12 +72,14 @@ def test_the_scripts_come_to_all_that_can_happen(hosts: list[Host]) -> None:
     assert ramped
 
 
-@pytest.mark.parametrize("what", ["answer", "heartbeat", "output", "flags", "lost"])
+@pytest.mark.parametrize("what", ["answer", "heartbeat", "readback", "output", "flags", "lost"])
 def test_a_device_that_differs_is_found(program: Path, what: str) -> None:
     """What the firmware has said, with one bit of one message changed, or one message less."""
-    host = far_script(Choice(CAN_FD, 4), blocks=300)
+    host = far_script(Choice(CAN_FD, 4), blocks=300, version=2)
     sent = run_firmware(program, host.python.script(host.events))
-    function = {"answer": 0x030, "heartbeat": 0x010, "output": 0x300, "flags": 0x300, "lost": 0x030}[what]
+    function = {"answer": 0x030, "heartbeat": 0x010, "readback": 0x060, "output": 0x300, "flags": 0x300, "lost": 0x030}[
+        what
+    ]
     places = [at for at, one in enumerate(sent) if one.kind == Kind.FRAME and _function(one) == function]
     at = places[len(places) // 2]
     data = bytearray(sent[at].data)
@@ -91,9 +93,12 @@ def _function(event: Event) -> int:
     return int.from_bytes(event.data[:2], "little") & ~0xF
 
 
+@pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("wire", WIRES)
-def test_nothing_differs_from_one_clock_to_the_other_where_sequence_numbers_wrap(wire: int, program: Path) -> None:
-    host = far_script(Choice(wire, 2), blocks=600)
+def test_nothing_differs_from_one_clock_to_the_other_where_sequence_numbers_wrap(
+    wire: int, version: int, program: Path
+) -> None:
+    host = far_script(Choice(wire, 2), blocks=600, version=version)
     assert host.python.device.measured > 600
     assert compare(program, host.choice, host.events) == []
 
@@ -162,6 +167,9 @@ def test_both_tell_the_same_of_every_parameter_and_item(choice: Choice, program:
     for parameter in (*range(68), 255):
         for item in sorted(items | {8 * choice.n_channels, choice.n_channels, 255}):
             host.request(Command.GET, parameter, item)
+    for version in (2, 1, 3, 0):
+        host.request(Command.SET, Parameter.VERSION, 0, version)
+        host.request(Command.GET, Parameter.LAYOUT_CRC)
     assert compare(program, choice, host.events) == []
 
 
