@@ -114,9 +114,10 @@ def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str
     """The device, the part of the recording, what was raised, and whether the recording has an end."""
     options = RunOptions(seed=SEED, check=checked(LEVELS[levels]["bench"]))
     with tempfile.TemporaryDirectory() as folder, driver(DEVICES[device], *given) as made:
-        output, raised = Path(folder) / "run.h5", ""
+        output, raised, kept = Path(folder) / "run.h5", "", None
         try:
-            carry_out(plan_for(levels), bench_for(levels), output, options).close()
+            with carry_out(plan_for(levels), bench_for(levels), output, options) as recording:
+                kept = Kept(recording.parts[-1])
         except (Exception, HostKilledError) as error:
             raised = f"{type(error).__name__}: {error}"
         if device == "emulated":
@@ -124,8 +125,9 @@ def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str
         closed = output.exists()
         if not closed:
             finalise(journal_path(output), output)
-        with Recording(output) as recording:
-            kept = Kept(recording.parts[-1])
+        if kept is None:
+            with Recording(output) as recording:
+                kept = Kept(recording.parts[-1])
         return made[0], kept, raised, closed and kept.end is not None
 
 

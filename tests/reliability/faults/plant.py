@@ -85,28 +85,27 @@ class BrokenRig:
             self._truth = aligned((n, self._observe.shape[1]))
         return self._truth
 
-    def _acts(self, part: str, n: int) -> bool:
-        """Whether a fault of this part acts within the next n samples."""
-        return self._fault is not None and self._fault.part == part and self.first + n > self._onset
+    def _acts_from(self, part: str, n: int) -> int:
+        """The first of the next n samples at which a fault of this part acts; n if it does at none of them."""
+        here = self._fault is not None and self._fault.part == part
+        return min(max(self._onset - self.first, 0), n) if here else n
 
-    def _since(self, n: int) -> np.ndarray:
-        return np.arange(self.first, self.first + n) - self._onset
+    def _since(self, k: int, n: int) -> np.ndarray:
+        """Samples since the fault began, of the next n from the k-th on."""
+        return np.arange(self.first + k, self.first + n) - self._onset
 
     def _amplified(self, voltages: np.ndarray) -> np.ndarray:
-        out = voltages.copy()
-        if self._fault is not None and self._acts("amplifier", voltages.size):
-            at = self._since(voltages.size)
-            broken = at >= 0
-            before = voltages[~broken]
-            self._last_out_v = float(before[-1]) if before.size else self._last_out_v
-            if self._fault.kind == "clipped":
-                limit = CLIPPED * self._needed_v
-                out[broken] = np.clip(voltages[broken], -limit, limit)
-            else:
-                spoil = AMPLIFIER[self._fault.kind]
-                out[broken] = spoil(voltages[broken], at[broken], self._last_out_v, self._bench.sample_rate_hz)
+        n, out = voltages.size, voltages.copy()
+        k = self._acts_from("amplifier", n)
+        self._last_out_v = float(voltages[k - 1]) if k else self._last_out_v
+        if k == n or self._fault is None:
+            return out
+        if self._fault.kind == "clipped":
+            limit = CLIPPED * self._needed_v
+            out[k:] = np.clip(voltages[k:], -limit, limit)
         else:
-            self._last_out_v = float(voltages[-1])
+            spoil = AMPLIFIER[self._fault.kind]
+            out[k:] = spoil(voltages[k:], self._since(k, n), self._last_out_v, self._bench.sample_rate_hz)
         return out
 
     def _spoil(self, readings: np.ndarray) -> None:
@@ -115,26 +114,20 @@ class BrokenRig:
         n, volts = readings.shape[0], readings[:, self._index]
         if self._fault.kind in LATE_S:
             self._past = np.concatenate([self._past, volts])
-        if not self._acts(self._fault.part, n):
-            self._last_v = float(volts[-1])
+        k = self._acts_from(self._fault.part, n)
+        self._last_v = float(volts[k - 1]) if k else self._last_v
+        if k == n:
             return
-        at = self._since(n)
-        broken = at >= 0
-        before = volts[~broken]
-        self._last_v = float(before[-1]) if before.size else self._last_v
         if self._fault.kind in LATE_S:
-            late = np.arange(n) + self._past.size - n - round(LATE_S[self._fault.kind] * self._bench.sample_rate_hz)
-            delayed = np.where(late >= 0, self._past[np.maximum(late, 0)], 0.0)
-            readings[broken, self._index] = delayed[broken]
-            return
-        if self._fault.kind == "swapped":
+            late = np.arange(k, n) + self._past.size - n - round(LATE_S[self._fault.kind] * self._bench.sample_rate_hz)
+            readings[k:, self._index] = np.where(late >= 0, self._past[np.maximum(late, 0)], 0.0)
+        elif self._fault.kind == "swapped":
             pair = [self._index, self.swapped_with]
-            readings[np.ix_(broken, pair)] = readings[np.ix_(broken, pair[::-1])]
-            return
-        if broken.any():
+            readings[k:, pair] = readings[k:, pair[::-1]]
+        else:
             spoil = SENSOR[self._fault.kind]
-            readings[broken, self._index] = spoil(
-                volts[broken].copy(), at[broken], self._last_v, self._bench.sample_rate_hz
+            readings[k:, self._index] = spoil(
+                volts[k:].copy(), self._since(k, n), self._last_v, self._bench.sample_rate_hz
             )
 
     def _weaken(self) -> None:
