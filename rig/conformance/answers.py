@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
-from rig.daq import DAQ, HELD, LOST, Channel, flag_names
+from rig.daq import CONTINUED, DAQ, HELD, LOST, Channel, flag_names
 
 __all__ = ["FILTER_SAMPLES", "Answer", "Heard", "HearingTheOutput", "with_loopback"]
 
@@ -19,6 +19,7 @@ LONGEST_RUN_S = 30.0
 SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks
 TOO_LATE = (
     HELD,
+    CONTINUED,
     "watchdog",
 )  # flags of samples at which the converter had another output, for the next one came too late
 NO_LOOPBACK = (
@@ -47,8 +48,14 @@ class Heard(NamedTuple):
     lost: np.ndarray
     """bool[n]: flagged as lost."""
     held: np.ndarray
-    """bool[n]: flagged as held: another output than this one was on the converter."""
+    """bool[n]: flagged as held, or continued: another output than this one was on the converter."""
+    continued: np.ndarray
+    """bool[n]: flagged as continued."""
+    put_out: np.ndarray
+    """float64[n]: what the driver says was put out in place of what was handed over, V; else NaN."""
     block: int
+    queue_samples: int
+    """Samples between the handing over of an output and its instant."""
     latency_samples: float
     """As the driver says it."""
     channels: tuple[Channel, ...]
@@ -59,6 +66,16 @@ class Heard(NamedTuple):
         """bool[n]: samples that were neither lost nor can have been changed by an output that was held."""
         near = np.convolve(self.held, np.ones(2 * FILTER_SAMPLES + 1))[FILTER_SAMPLES:-FILTER_SAMPLES] > 0.5
         return ~self.lost & ~near
+
+    def handed_over(self, instants: np.ndarray) -> np.ndarray:
+        """Where the outputs of instants [n] were handed over, [n]; the last ones of the queue have no instant yet."""
+        return np.append(instants[self.queue_samples :], np.zeros(self.queue_samples, instants.dtype))[: instants.size]
+
+    @property
+    def as_put_out(self) -> np.ndarray:
+        """float64[n]: the outputs, and in place of those that came too late what was put out, V."""
+        instead = self.handed_over(np.nan_to_num(self.put_out, nan=0.0))
+        return np.where(self.handed_over(np.isfinite(self.put_out)), instead, self.outputs)
 
 
 class Answer(NamedTuple):
@@ -131,30 +148,51 @@ class HearingTheOutput(DriverUnderTest):
             daq.start(min(block or max(self.blocks), daq.capabilities.largest_block))
             yield daq
 
-    def hear(self, daq: DAQ, outputs: np.ndarray, pauses: dict[int, float] | None = None) -> Heard:
+    def hear(
+        self,
+        daq: DAQ,
+        outputs: np.ndarray,
+        pauses: dict[int, float] | None = None,
+        periods: np.ndarray | None = None,
+    ) -> Heard:
         """Hand over outputs, whole blocks, in one array; ``pauses``: seconds that are waited before a block.
 
-        A run that takes longer than half a minute ends there.
+        ``periods``: of the outputs of each block, samples; 0 for none. A run that takes longer than half a minute ends there.
         """
         block, columns = daq.block, [index for index, channel in enumerate(daq.channels) if channel.loopback]
         names = flag_names(daq.counters)
-        late_bits = sum(1 << names.index(name) for name in TOO_LATE if name in names)
+        bits = {name: 1 << names.index(name) for name in TOO_LATE if name in names}
         voltages, read, flags = (
             np.zeros(block),
             np.full((outputs.size, len(columns)), np.nan),
             np.zeros(outputs.size, int),
         )
+        put_out = np.full(outputs.size, np.nan)
         began, end = time.monotonic(), outputs.size
         for first in range(0, outputs.size, block):
             if pauses and first // block in pauses:
                 self.pause(daq, pauses[first // block])
             voltages[:] = outputs[first : first + block]
+            daq.continuation["period_samples"] = 0.0 if periods is None else periods[first // block]
             read[first : first + block] = daq.exchange(voltages)[:, columns]
             flags[first : first + block] = daq.flags
+            put_out[first : first + block] = daq.put_out
             if time.monotonic() - began > LONGEST_RUN_S:
                 end = first + block
                 break
         channels = tuple(daq.channels[column] for column in columns)
         read /= [channel.sensitivity_v_per_unit for channel in channels]
-        lost, held = (flags & LOST) != 0, (flags & late_bits) != 0
-        return Heard(outputs[:end], read[:end], lost[:end], held[:end], block, daq.latency_samples, channels)
+        flagged = (LOST, sum(bits.values()), bits.get(CONTINUED, 0))
+        lost, held, continued = (flags[:end] & mask != 0 for mask in flagged)
+        return Heard(
+            outputs[:end],
+            read[:end],
+            lost,
+            held,
+            continued,
+            put_out[:end],
+            block,
+            daq.queue_blocks * block,
+            daq.latency_samples,
+            channels,
+        )

@@ -11,6 +11,7 @@ cannot be judged, because nothing sees the output or because this machine was bu
 Where something physical moves, outputs stay within ``amplitude_v``.
 """
 
+from rig.conformance.continuing import ContinuingTests
 from rig.conformance.gone import GoneTests
 from rig.conformance.life_cycle import LifeCycleTests
 from rig.conformance.loopback import LoopbackTests
@@ -21,5 +22,7 @@ from rig.conformance.without_host import WithoutHostTests
 __all__ = ["DriverContract"]
 
 
-class DriverContract(LifeCycleTests, SamplesTests, LoopbackTests, WaysOutTests, WithoutHostTests, GoneTests):
+class DriverContract(
+    LifeCycleTests, SamplesTests, LoopbackTests, ContinuingTests, WaysOutTests, WithoutHostTests, GoneTests
+):
     """Tests of one driver. Override `make`; and ``amplitude_v``, ``tolerance_v`` for a physical bench."""

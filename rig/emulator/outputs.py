@@ -129,5 +129,9 @@ class OutputQueue:
         self._there[slot] = False
         continued = ~has_come if self._source["period"] else np.zeros(has_come.size, bool)
         for index in np.flatnonzero(continued):
-            counts[index] = count_at(self._source, self._sent, first + int(index))
+            counts[index] = self.count_at(first + int(index))
         return Due(counts, has_come, continued)
+
+    def count_at(self, instant: int) -> int:
+        """The count with which to go on at an instant, where there is a source."""
+        return count_at(self._source, self._sent, instant)

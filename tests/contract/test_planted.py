@@ -6,6 +6,7 @@ import pytest
 from rig.conformance import DriverContract, NotApplicable, Unproven, with_loopback
 from rig.drivers.virtual import VirtualDAQ
 from tests.contract.planted import PLANTED
+from tests.contract.planted.continuing import ContinuingDAQ
 from tests.contract.planted.drivers import GOOD, CloseUnseen, LateHost, PacedDAQ, StopUnseen
 from tests.contract.planted.hosts import Late, Punctual
 from tests.contract.planted.table import BEGIN, written
@@ -84,7 +85,7 @@ def test_the_kit_fails_a_planted_fault_in_the_test_that_names_it(fault):
     assert said.partition(": ")[2], "passed, or failed without a word"
 
 
-@pytest.mark.parametrize("driver", GOOD, ids=lambda driver: driver.__name__)
+@pytest.mark.parametrize("driver", [*GOOD, ContinuingDAQ], ids=lambda driver: driver.__name__)
 def test_a_good_driver_is_failed_by_no_test(driver):
     said = {test: objection_or_doubt(OverADriver(driver), test) for test in TESTS}
     assert {test: text for test, text in said.items() if text not in ("", "unproven")} == {}
@@ -130,3 +131,19 @@ def test_the_page_has_the_table():
     page = (ROOT / "docs" / "reference" / "daq-contract.md").read_text(encoding="utf-8")
     assert BEGIN in page
     assert written(page) == page, "python -m tests.contract.planted docs/reference/daq-contract.md"
+
+
+CONTINUING = sorted({fault.test for fault in PLANTED if issubclass(fault.driver, ContinuingDAQ)})
+
+
+@pytest.mark.parametrize("test", CONTINUING)
+def test_a_device_that_goes_on_as_it_says_is_proven_to(test):
+    assert len(CONTINUING) == 4
+    assert objection(OverADriver(ContinuingDAQ), test) == ""
+
+
+@pytest.mark.parametrize("test", CONTINUING)
+def test_a_device_that_does_not_say_that_it_goes_on_is_not_judged_by_it(test):
+    for driver in (PacedDAQ, VirtualDAQ):
+        with pytest.raises(NotApplicable, match=r"does not say|waits for the host"):
+            getattr(OverADriver(driver), f"test_{test}")()
