@@ -13,7 +13,7 @@ from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
 from rig.text.console import number, print_table
-from rig.text.disorder import LATE_BLOCKS, OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, disorder_text
+from rig.text.disorder import LATE_BLOCKS, LATE_FRAMES, OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, disorder_text
 from rig.text.message_pages import where_explained
 from rig.text.printable import printable, printable_strings
 
@@ -50,7 +50,7 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 def _counted(counters: Mapping[str, int]) -> list[str]:
     """Return what a driver has counted, one line for each counter; frames out of order are one line."""
-    order = (OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, LATE_BLOCKS)
+    order = (OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, LATE_FRAMES, LATE_BLOCKS)
     out = []
     for name, count in counters.items():
         if count and name == CONTINUED:

@@ -6,7 +6,7 @@ import numpy as np
 
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_LOST
 
-__all__ = ["DISTURBED", "DeviceFaults", "pages_on", "why_disturbed"]
+__all__ = ["DISTURBED", "LOST", "DeviceFaults", "pages_on", "why_disturbed"]
 
 DISTURBED = "the settle rule was broken while recording"
 TOO_LATE, LOST = "outputs came too late", "samples were lost on their way"

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from rig.campaigns.evaluation.device_faults import DeviceFaults
+from rig.campaigns.evaluation.device_faults import LOST, DeviceFaults
 from rig.campaigns.evaluation.lost_samples import lost_rows, lost_warnings
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows, stretches
 from rig.daq import CONTINUED, HELD, flag_names
-from rig.text.disorder import LATE_BLOCKS, disorder_text
+from rig.text.disorder import disorder_text, is_late
 from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD
 
@@ -46,11 +46,11 @@ def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) 
 
 
 def with_disorder(point: Point[Any], counters: Mapping[str, int]) -> Point[Any]:
-    """Name the order of frames where a point lacks samples and blocks came too late to be put in their place.
+    """Name the order of frames where a point lacks samples and some came too late to be put in their place.
 
     ``counters`` are those of the driver, so far.
     """
-    if not point.lost_samples or not counters.get(LATE_BLOCKS, 0):
+    if not is_late(counters) or not (point.lost_samples or LOST in point.reason):
         return point
     text = disorder_text(counters)
     return point.warned(text) if point.accepted else replace(point, reason=f"{point.reason}; {text}")

@@ -289,7 +289,6 @@ class Execution:
         points = [
             with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
         ]
-        points = [with_disorder(point, self.loop.counters) for point in points]
         if not self.in_one_go:
             left_alone = int(told[0]["left_alone"])
             points = [with_force_harmonics(self.bench, self.plan, target, point, left_alone) for point in points]
@@ -361,7 +360,7 @@ class Execution:
 
     def _report(self, point: Point[Any]) -> None:
         """Write and show a point under its number in the recording, which a change of plan does not alter."""
-        point = with_plausibility(self.bench, self.plan, point, self.known)
+        point = with_plausibility(self.bench, self.plan, with_disorder(point, self.loop.counters), self.known)
         point, refusal = self.scale.applied(point)
         if refusal:
             self.loop.request_stop(refusal)

@@ -169,28 +169,33 @@ class Blocks:
             self._drop(group // self._per_block)
         self._mark = None
         block, place = divmod(group, self._per_block)
-        self._note_order(block, group * self._parts + part)
+        is_out_of_order = self._note_order(block, group * self._parts + part)
         if group >= self._next:
             self._next = group + 1
             self._drop(block - OPEN_BLOCKS + 1)
         if block < self._oldest or block == self._early:
             self._count("repeated_frames")
+            if is_out_of_order:
+                self._count("late_frames")
             return None
         if self._per_block * self._parts == 1:
             self._finish(block)
             return block, counts, flags
         return self._add(block, place * self._parts + part, piece, counts, flags)
 
-    def _note_order(self, block: int, frame: int) -> None:
-        """Count a frame that has not come before if it comes after a later one, and that is of one of the newest blocks."""
+    def _note_order(self, block: int, frame: int) -> bool:
+        """Whether a frame has not come before but comes after a later one, and is of one of the newest blocks; counted."""
         slot = frame % len(self._came)
         if self._came[slot] >= frame:
-            return
-        newest_block = self._newest // (self._per_block * self._parts)
-        if frame < self._newest and block > newest_block - OPEN_BLOCKS:
-            self._count("out_of_order_frames")
+            return False
         self._came[slot] = frame
-        self._newest = max(self._newest, frame)
+        if frame > self._newest:
+            self._newest = frame
+            return False
+        if block <= self._newest // (self._per_block * self._parts) - OPEN_BLOCKS:
+            return False
+        self._count("out_of_order_frames")
+        return True
 
     def _add(
         self, block: int, frame: int, piece: Piece, counts: np.ndarray, flags: int

@@ -27,11 +27,11 @@ from rig.wire.messages import (
 __all__ = ["COUNTERS", "CanCodec"]
 
 COUNTERS = (
-    *("foreign_frames", "own_frames", "damaged_frames", "repeated_frames", "out_of_order_frames"),
-    *("incomplete_blocks", "resynchronised"),
+    *("foreign_frames", "own_frames", "damaged_frames", "repeated_frames"),
+    *("out_of_order_frames", "late_frames", "incomplete_blocks", "resynchronised"),
 )
 """Counters of a codec: foreign frames, own frames returned, wrong lengths, frames that come twice or after their block was
-given up, frames that come after a later one, torn blocks, corrected indices."""
+given up, frames that come after a later one and those of them whose block was given up, torn blocks, corrected indices."""
 
 _LARGEST_DROPPED = 255
 _NEVER = -(1 << 30)

@@ -16,6 +16,10 @@ WHO = " (adapter, its firmware or its driver)"
         ({"reordered_blocks": 2}, "2 blocks put in their place"),
         ({"late_blocks": 1}, "1 blocks too late for their place, and lost"),
         (
+            {"out_of_order_frames": 2, "late_frames": 1},
+            "2 frames after a later one, 1 frames too late for their block, which is lost",
+        ),
+        (
             {"out_of_order_frames": 9, "reordered_blocks": 2, "late_blocks": 1},
             "9 frames after a later one, 2 blocks put in their place, 1 blocks too late for their place, and lost",
         ),

@@ -73,5 +73,8 @@ def test_where_blocks_came_too_late_for_their_place_the_order_is_named() -> None
     refused = with_disorder(point.refused("7 of 1000 samples were lost on their way"), LATE)
     assert refused.reason.startswith(f"7 of 1000 samples were lost on their way; {said}")
     assert with_disorder(point, LATE | {"late_blocks": 0}) == point
+    assert "1 frames too late" in with_disorder(point, LATE | {"late_blocks": 0, "late_frames": 1}).warnings[-1]
+    failed = made_point(quality=Quality.REJECTED, reason="7 of 9 samples were lost on their way")
+    assert with_disorder(failed, LATE).reason.startswith(f"{failed.reason}; {said}")
     whole = with_device_remarks(made_point(), rows_with(0, 0), COUNTERS)
     assert with_disorder(whole, LATE) == whole

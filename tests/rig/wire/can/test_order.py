@@ -161,24 +161,49 @@ def test_neighbours_in_each_others_place_cost_nothing(bus, samples, data) -> Non
     pairs = zip(sent[::2], sent[1::2], strict=False)
     assert counters["out_of_order_frames"] == sum(a[:2] > b[:2] for a, b in pairs if a.block >= 0 <= b.block)
     assert counters["repeated_frames"] == counters["incomplete_blocks"] == counters["resynchronised"] == 0
+    assert counters["late_frames"] == 0
+
+
+def after_a_loss(one: Way, start: int, most_blocks: int, data: st.DataObject) -> list[Sent]:
+    """Frames of which a stretch of up to so many blocks is missing, the others swapped and doubled."""
+    wrap = one.wrap_blocks
+    sent = one.sent(range(start, start + 2 * wrap + min(wrap, 40)))
+    first = data.draw(st.integers(0, min(len(sent) // 4, 60)), label="loss from")
+    lost = data.draw(st.integers(0, most_blocks), label="blocks lost")
+    behind = sent[first].block if sent[first].block >= 0 else sent[first + 1].block
+    goes_on = next(at for at, each in enumerate(sent) if each.block == behind + lost)
+    return disturbed(sent[:first] + sent[goes_on - (sent[goes_on - 1].block < 0) :], data, losses=0)
 
 
 @settings(deadline=None, max_examples=50)
 @given(st.sampled_from(BUSES), st.booleans(), st.data())
-def test_a_long_loss_misplaces_nothing_within_its_bound_whatever_changes_places(bus, samples, data) -> None:
-    """The bound of the page: a loss of less than W groups at a stretch, less four blocks."""
+def test_a_loss_of_less_than_half_the_sequence_numbers_misplaces_nothing_whatever_changes_places(
+    bus, samples, data
+) -> None:
     one, start = starting(bus, samples, "a wrap")
-    wrap = one.wrap_blocks
-    sent = one.sent(range(start, start + wrap + min(wrap, 40)))
-    first = data.draw(st.integers(0, min(len(sent) // 2, 60)), label="loss from")
-    lost = data.draw(st.integers(0, wrap - 5), label="blocks lost")
-    behind = sent[first].block if sent[first].block >= 0 else sent[first + 1].block
-    goes_on = next(at for at, each in enumerate(sent) if each.block == behind + lost)
-    left = sent[:first] + sent[goes_on - (sent[goes_on - 1].block < 0) :]
-    left = disturbed(left, data, losses=0)
-    got = one.received(left)  # which asserts that every block is what it says
+    left = after_a_loss(one, start, one.wrap_blocks // 2 - 2, data)
+    wanted = expected(one, left)
+    assert one.received(left) == wanted  # which asserts that every block is what it says
+    assert one.receiver._counters["resynchronised"] == 0
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.sampled_from(BUSES), st.booleans(), st.data())
+def test_after_a_longer_loss_no_more_are_misplaced_than_the_page_says_and_indices_put_it_right(
+    bus, samples, data
+) -> None:
+    one, start = starting(bus, samples, "a wrap")
+    left = after_a_loss(one, start, one.wrap_blocks, data)
+    wrong, got = 0, []
+    for each in left:
+        message = one.receiver.decode(each.frame)
+        if isinstance(message, Samples | Output):
+            got.append(message.first // one.n)
+            wrong += each.block != got[-1]
     assert len(set(got)) == len(got)
     assert all(later >= earlier - 1 for earlier, later in pairwise(got))
+    assert wrong <= one.wrap_blocks  # half of it, where no index has changed places with a frame
+    assert left[-1].block - got[-1] <= one.wrap_blocks + 2
 
 
 @pytest.mark.parametrize("bus", BUSES)
@@ -197,4 +222,4 @@ def test_a_block_that_comes_two_too_late_is_given_up_and_counted() -> None:
     frames[3:6] = frames[4], frames[5], frames[3]
     assert one.received(frames) == [0, 1, 2, 4, 5, 6, 7, 8, 9]
     counters = one.receiver._counters
-    assert (counters["out_of_order_frames"], counters["repeated_frames"]) == (1, 1)
+    assert (counters["out_of_order_frames"], counters["late_frames"], counters["repeated_frames"]) == (1, 1, 1)
