@@ -16,6 +16,7 @@ PERIOD = 12.4
 """Samples: no whole number, and few, so that a copy of a copy shows after a while."""
 OFF_SHARE = 0.1  # of the amplitude: the cut of a peak between two samples takes 3 %, the cubic 0.2 %
 FIT_SAMPLES = 2000
+FIRST_BLOCKS = 20
 SINE_BLOCKS = 60
 PAUSE_SHARE = 0.5  # of the watchdog
 FARTHEST = 6.0  # times its RMS: beyond it there is no noise
@@ -33,6 +34,7 @@ class ContinuingTests(HearingTheOutput, LookingAtTheOutput):
             blocks += math.ceil(pause_s * daq.sample_rate_hz / daq.block)
             outputs = self.amplitude_v * np.sin(2.0 * np.pi / PERIOD * np.arange(blocks * daq.block))
             outputs[: fit * daq.block] = self.signs(fit * daq.block)
+            outputs[: FIRST_BLOCKS * daq.block] = 0.0  # those that are late after the start are flagged by nobody
             periods = np.where(np.arange(blocks) >= fit, PERIOD, 0.0)
             heard = self.hear(daq, outputs, {fit + SINE_BLOCKS // 2: pause_s}, periods)
         if not heard.held.any():
