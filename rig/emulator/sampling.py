@@ -167,7 +167,12 @@ class Sampling:
         self.output_v = volts
         self.measured = first + block
         self.blocks += 1
-        return Measured(first, readings, seen | missing, self._counts_of(volts))
+        return Measured(first, readings, seen | missing, self._counts_of(self._put_out_in_place_of(volts)))
+
+    def _put_out_in_place_of(self, volts: np.ndarray) -> np.ndarray:
+        """The voltages of a block, or what the plant's own faults have put out instead."""
+        instead = getattr(self.plant, "put_out", None)
+        return volts if instead is None else np.where(np.isfinite(instead), instead, volts)
 
     def _counts_of(self, volts: np.ndarray) -> np.ndarray:
         """What the converter makes of voltages: the nearest counts within its range."""

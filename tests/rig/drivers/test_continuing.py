@@ -162,3 +162,35 @@ def test_the_latest_version_that_both_speak_is_used(lowest: int, highest: int, u
         assert daq.identity["protocol"] == used
         assert daq.device.words[Parameter.VERSION, 0] == int(used)
         assert daq.identity["longest_period"] == ("16384" if used == "2" else "0")
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_what_the_rig_behind_the_device_has_held_by_its_own_faults_is_read_back_too(lockstep: bool) -> None:
+    faults = {"held_per_s": 40.0, "held_s": 0.002}
+    bench = bench_with()
+    driver = bench.driver.model_copy(update={"options": {**bench.driver.options, "faults": faults}})
+    bench = bench.model_copy(update={"driver": driver, "block": BLOCK})
+    daq = MemoryDAQ(bench, 3, WireOptions(queue_blocks=QUEUE), lockstep=lockstep)
+    plant, held = daq.device.plant, []
+    step = plant.step
+
+    def watched(volts: np.ndarray) -> tuple[np.ndarray, int]:
+        out = step(volts)
+        held.append(plant.put_out.copy())
+        return out
+
+    plant.step = watched
+    put_out = []
+    with daq:
+        daq.start(BLOCK)
+        for j in range(200):
+            daq.exchange(sine(j + QUEUE))
+            put_out.append(daq.put_out.copy())
+    got, wanted = np.concatenate(put_out), np.concatenate(held)[: 200 * BLOCK]
+    assert np.isfinite(wanted).any()
+    handed = np.concatenate([np.zeros(QUEUE * BLOCK), *(sine(j) for j in range(QUEUE, 200))])
+    step_v = plant.output_v_per_count
+    replaced = np.isfinite(wanted) & (np.abs(wanted - handed) > step_v)
+    assert replaced.any()
+    np.testing.assert_allclose(got[replaced], wanted[replaced], atol=0.51 * step_v)
+    assert np.isnan(got[~np.isfinite(wanted)]).all()
