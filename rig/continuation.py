@@ -38,7 +38,6 @@ SOURCE = np.dtype(
     [
         ("longest", "i8"),
         ("armed", "i8"),
-        ("newest", "i8"),
         ("run_begin", "i8"),
         ("run_end", "i8"),
         ("end", "i8"),
@@ -49,10 +48,9 @@ SOURCE = np.dtype(
         ("highest", "i8"),
     ]
 )
-"""What a device goes on with (one record). ``longest``: longest period, samples; ``armed``: instant of ARM; ``newest``: index
-behind the last output kept; ``run_begin``, ``run_end``: consecutive outputs with a period. The source is the period before
-``end``: ``period`` (steps; 0: there is no source, outputs are held), ``ramp`` (samples from ``end`` to 0 V; 0: none), and its
-extremes, valid where ``is_bounded``."""
+"""What a device goes on with (one record). ``longest``: longest period, samples; ``armed``: instant of ARM; ``run_begin``,
+``run_end``: consecutive outputs with a period. The source is the period before ``end``: ``period`` (steps; 0: there is no
+source, outputs are held), ``ramp`` (samples from ``end`` to 0 V; 0: none), and its extremes, valid where ``is_bounded``."""
 
 
 def ring_for(longest_period: int) -> np.ndarray:
@@ -77,7 +75,6 @@ def ramp_length(ramp_samples: float) -> int:
 def begin(source: Record, longest_period: int) -> None:
     """Begin with nothing kept, as at the start of sampling; periods up to ``longest_period`` samples can be continued."""
     source.longest = longest_period
-    source.newest = 0
     forget(source, 0)
 
 
@@ -97,16 +94,15 @@ def keep(source: Record, ring: np.ndarray, first: int, counts: np.ndarray, perio
     `ring_for`.
     """
     end = first + counts.size
-    source.newest = max(source.newest, end)
-    for index in range(max(first, source.newest - ring.size), end):
-        ring[index % ring.size] = counts[index - first]
-    source.is_bounded = 0
     if end > source.end + source.longest:
         source.period = 0
     if period < SHORTEST_PERIOD * STEPS or period > source.longest * STEPS:
         source.run_end = _NO_RUN
         source.period = 0
         return
+    for index in range(max(first, max(source.run_end, end) - ring.size), end):
+        ring[index % ring.size] = counts[index - first]
+    source.is_bounded = 0
     if first < source.run_end:
         return
     if first > source.run_end:

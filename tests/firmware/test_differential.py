@@ -10,7 +10,7 @@ import pytest
 from rig.wire.can.codec import CanCodec
 from rig.wire.messages import ARM_KEY, Command, DeviceFlag, Message, Parameter, Samples, Stream
 from rig.wire.serial.codec import Codec
-from rig.wire.serial.frames import FrameReader
+from rig.wire.serial.frames import FrameReader, frame
 from tests.firmware.building import built
 from tests.firmware.comparing import differences, sort_out
 from tests.firmware.differential import (
@@ -204,6 +204,25 @@ def test_of_an_instant_that_was_missed_the_block_is_dropped_and_indices_go_on(bl
         np.testing.assert_array_equal(one.counts, other.counts)
     assert theirs.counters[4] == 1
     assert ours.answers == theirs.answers
+
+
+@pytest.mark.parametrize("versions", [(1, 2), (2, 1)])
+@pytest.mark.parametrize("wire", WIRES)
+def test_outputs_after_another_version_was_set_belong_to_no_stream(
+    wire: int, versions: tuple[int, int], program: Path
+) -> None:
+    host = Host(Choice(wire, 2), Random(1))
+    host.request(Command.SET, Parameter.VERSION, 0, versions[0])
+    host.request(Command.START)
+    host.output(1)
+    host.request(Command.STOP)
+    host.request(Command.SET, Parameter.VERSION, 0, versions[1])
+    host.tell_period()
+    host.output(2)
+    if wire == SERIAL:  # as long as those of the stream that was
+        host.happens(Kind.BYTES, frame(bytes((versions[1], 4)) + bytes(12 if versions[0] == 1 else 20)))
+    assert compare(program, host.choice, host.events) == []
+    assert host.python.device.counts["outputs_while_idle"] >= 1
 
 
 @pytest.mark.parametrize("choice", choices_that_are_refused(), ids=str)

@@ -101,6 +101,17 @@ periods = st.one_of(
 ramps = st.one_of(st.just(0), st.integers(1, 80), st.just(2**32 - 1))
 
 
+def test_outputs_far_ahead_from_before_arm_take_no_room_from_those_after_it() -> None:
+    device, page = Device(), Page()
+    for one in (device, page):
+        one.keep(1000 * LONGEST, list(range(10)), 7 << 16)
+        one.arm(0)
+        for first in range(0, 60, 10):
+            one.keep(first, [37 * index % 101 for index in range(first, first + 10)], 7 << 16)
+    assert [device.at(instant) for instant in range(60, 70)] == [page.at(instant) for instant in range(60, 70)]
+    assert device.at(60)
+
+
 @settings(max_examples=300, deadline=None)
 @given(data=st.data(), n=st.sampled_from([1, 3, 5, 16, 50]))
 def test_blocks_in_any_order_are_continued_as_the_page_says(data: st.DataObject, n: int) -> None:

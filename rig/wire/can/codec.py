@@ -56,6 +56,7 @@ class CanCodec:
         self._index = protocol.packing(FrameKind.OUTPUT_INDEX)
         self._period = struct.Struct("<II")
         self._stream: Stream | None = None
+        self._continues = False  # whether the stream is one of version 2
         self._last_beat: Heartbeat | None = None
         self._flags_told = 0
 
@@ -63,7 +64,6 @@ class CanCodec:
         """Use a version of the protocol from now on, before `configure`."""
         self.protocol = self._latest.speaking(version)
         self._kinds, self._identifiers = self.protocol.kinds, self.protocol.identifiers
-        self._continues = version > LOWEST_VERSION
 
     def configure(self, stream: Stream) -> None:
         """Set the shape of samples and outputs; both start at index 0. Errors: those of `check_stream`."""
@@ -78,6 +78,7 @@ class CanCodec:
         self._incoming = Blocks(self._counters, self._received)
         if self._device:
             self._incoming.begin(stream.queue)
+        self._continues = self.protocol.version > LOWEST_VERSION
         if self._continues:
             self._told, self._heard = PeriodsTold(stream.rate_hz), PeriodsHeard()
             identifier = self._identifiers[FrameKind.READBACK, 0]
@@ -133,7 +134,7 @@ class CanCodec:
 
     def forget_told(self) -> None:
         """Note that frames of an output were not sent: what they told may not have arrived."""
-        if self._continues and self._stream is not None:
+        if self._continues:
             self._told.forget()
 
     def _must_tell(self, first: int) -> bool:
@@ -167,7 +168,7 @@ class CanCodec:
             if kind is FrameKind.OUTPUT_INDEX and self._stream is not None:
                 self._incoming.mark(self._index.unpack(data)[0])
                 return None
-            if kind is FrameKind.OUTPUT_PERIOD and self._stream is not None:
+            if kind is FrameKind.OUTPUT_PERIOD and self._continues:
                 self._heard.hear(*self._period.unpack(data))
                 return None
         elif kind is FrameKind.ANSWER:
@@ -182,7 +183,7 @@ class CanCodec:
         return None
 
     def _decode_readback(self, frame: Frame) -> Readback | None:
-        if self._stream is None:
+        if not self._continues:
             self._counters["foreign_frames"] += 1
             return None
         whole = self._readbacks.put(frame, self._here)

@@ -176,7 +176,9 @@ class Codec:
         raise Malformed(f"type {kind} with {size} bytes")
 
     def _output(self, payload: bytes) -> Output:
-        head = OUTPUT_HEAD if self.version == LOWEST_VERSION else PERIODIC_HEAD
+        head = (
+            PERIODIC_HEAD if self._readback_size else OUTPUT_HEAD
+        )  # of the version that the stream was agreed on with
         _, _, sequence, first, *goes_on = head.unpack_from(payload)
         return Output(first, np.ndarray(self._output_shape, self._counts, payload, head.size), sequence, *goes_on)
 
