@@ -11,7 +11,7 @@ from rig.drivers.wire.dialogue import ANSWER_S, STOPPED, Dialogue, latched_text,
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
-from rig.wire.messages import Command, DeviceFlag, DeviceState, Parameter, Status, Stream
+from rig.wire.messages import LOWEST_VERSION, VERSION, Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
 __all__ = ["Connection", "RoundTrips"]
 
@@ -69,6 +69,8 @@ class Connection:
         """Bits per second of that stream; also known for a wire without a limit."""
         self.sustainable_hz = math.inf
         """Highest sample rate that wire and device carry with blocks of this size, Hz."""
+        self.lacks_room = False
+        """Whether version 1 is spoken because the wire has no room for version 2."""
         self.found_running = False
         """Whether the device was still sampling when it was found."""
         self.latched = self.cleared = NOTHING
@@ -77,16 +79,32 @@ class Connection:
     def meet(self, bench: Bench, queue: int) -> None:
         """Find the device. Refuse it if it is not the one the bench describes, or if the wire cannot carry its stream."""
         self._find()
-        negotiate(self.dialogue)
-        facts = read_facts(self.dialogue)
-        compare(facts, bench, self.link.name, self.link.layout_crc)
-        self.facts = facts
-        self.check_capacity(Stream(len(bench.channels), bench.block, bench.sample_rate_hz, facts.bits, queue))
+        bits = self._agree(bench, VERSION).bits
+        stream = Stream(len(bench.channels), bench.block, bench.sample_rate_hz, bits, queue)
+        try:
+            self.check_capacity(stream)
+        except DaqRefused as refused:
+            self._do_without_readbacks(bench, stream, refused)
         for number in range(OPENING_PINGS):
             began = self.clock()
             self.dialogue.ask(Command.GET, Parameter.PING, number)
             self.round_trips.add(self.clock() - began)
         self.latched = self._what_has_latched()
+
+    def _agree(self, bench: Bench, latest: int) -> DeviceFacts:
+        """Agree on a version, and see whether this is the device that the bench describes."""
+        negotiate(self.dialogue, latest)
+        self.facts = facts = read_facts(self.dialogue)
+        compare(facts, bench, self.link.name, self.link.layout_crc)
+        return facts
+
+    def _do_without_readbacks(self, bench: Bench, stream: Stream, refused: DaqRefused) -> None:
+        """Speak version 1 if the wire has room for that alone; raise what was refused if the device does not speak it."""
+        if self.link.version == LOWEST_VERSION or self.dialogue.get(Parameter.LOWEST_VERSION) > LOWEST_VERSION:
+            raise refused
+        self._agree(bench, LOWEST_VERSION)
+        self.check_capacity(stream)
+        self.lacks_room = True
 
     def _find(self) -> None:
         """Ask until a device answers, and stop it in case an earlier host has left it running."""

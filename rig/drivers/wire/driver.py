@@ -105,6 +105,11 @@ class WireDAQ(DAQ):
         out = remarks_on(connection.facts, self._bench)
         raised = raised_remark(self._options, connection.facts, self._bench.block / self._bench.sample_rate_hz)
         out += [raised] if raised else []
+        if connection.lacks_room:
+            out.append(
+                "the wire has no room for version 2 of the protocol: outputs that come too late are held, not continued; "
+                "ask for larger blocks"
+            )
         if connection.found_running:
             out.append("the device was still running from an earlier run and was stopped first")
         if connection.cleared:

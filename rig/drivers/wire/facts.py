@@ -7,7 +7,7 @@ import numpy as np
 from rig.bench import Bench
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqMismatch, DaqProtocol
-from rig.wire.messages import LOWEST_VERSION, Command, Parameter
+from rig.wire.messages import LOWEST_VERSION, VERSION, Command, Parameter
 from rig.wire.parameter_words import as_double
 
 __all__ = ["DeviceFacts", "compare", "negotiate", "read_facts", "remarks_on"]
@@ -54,10 +54,10 @@ class DeviceFacts:
     """Longest period of outputs that the device can go on with, samples; 0 for none."""
 
 
-def negotiate(dialogue: Dialogue) -> None:
-    """Agree on the latest version of the protocol that both speak; raise `DaqProtocol` if there is none."""
+def negotiate(dialogue: Dialogue, latest: int = VERSION) -> None:
+    """Agree on the latest version of the protocol that both speak, up to ``latest``; raise `DaqProtocol` if there is none."""
     lowest, highest = dialogue.get(Parameter.LOWEST_VERSION), dialogue.get(Parameter.HIGHEST_VERSION)
-    ours = dialogue.link.highest_version
+    ours = min(dialogue.link.highest_version, latest)
     version = min(highest, ours)
     if version < max(lowest, LOWEST_VERSION):
         raise DaqProtocol(

@@ -14,6 +14,7 @@ from rig.wire.can.bus import PythonCanBus
 from rig.wire.can.frames import BusTiming
 from rig.wire.can.protocol import definition
 from rig.wire.can.slcan import SlcanBus
+from rig.wire.messages import Parameter
 from rig.wire.serial.port import open_pseudo_terminal
 from tests.rig.wire.can.devices import bench_on, device_on
 
@@ -69,9 +70,28 @@ def test_a_rate_that_the_bus_cannot_carry_is_refused_with_the_sum() -> None:
     channel = uuid4().hex
     with (
         device_on(virtual_bus(channel, False), False),
-        pytest.raises(DaqRefused, match=r"samples 5000/s x 135 us.*: 115%"),
+        pytest.raises(DaqRefused, match=r"samples 5000/s x 135 us.*: 110%"),
     ):
         CanDAQ(bench_on("virtual", channel, 1, fd=False)).open()
+
+
+@pytest.mark.parametrize(("block", "version"), [(10, "1"), (8, "2")])
+def test_version_1_is_spoken_where_the_bus_has_no_room_for_version_2(block: int, version: str) -> None:
+    channel = uuid4().hex
+    with device_on(virtual_bus(channel, False), False):
+        daq = CanDAQ(bench_on("virtual", channel, block, fd=False))
+        np.testing.assert_array_equal(readings(daq, block), expected(block, 1))
+        assert daq.identity["protocol"] == version
+        assert ["no room for version 2" in remark for remark in daq.remarks].count(True) == (version == "1")
+        assert daq.statistics["wire_load_share"] < 0.9
+
+
+def test_a_device_that_speaks_version_2_alone_is_refused_where_the_bus_has_no_room_for_it() -> None:
+    channel = uuid4().hex
+    with device_on(virtual_bus(channel, False), False) as device:
+        device.words[Parameter.LOWEST_VERSION, 0] = 2
+        with pytest.raises(DaqRefused, match=r"periods 100/s x 135 us .*: 92%"):
+            CanDAQ(bench_on("virtual", channel, 10, fd=False)).open()
 
 
 def test_a_block_beyond_the_sequence_numbers_is_refused_when_opening() -> None:
