@@ -8,7 +8,7 @@ sample-synchronous hardware.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import Enum
 from types import TracebackType
 from typing import ClassVar, NamedTuple, Self
@@ -166,6 +166,8 @@ class DAQ(ABC):
         self.flags = np.zeros(0, np.uint16)
         self.put_out = np.zeros(0)
         self.continuation = np.zeros(1, CONTINUATION)
+        self.meanwhile: Callable[[], None] | None = None
+        """Work of the caller for the next `exchange`, see `do_meanwhile`."""
         self.state = State.CLOSED
         self._driven = False
         self._blocks_of_zero = 0
@@ -310,10 +312,22 @@ class DAQ(ABC):
             raise
         except Exception as error:
             raise as_daq_error(error) from error
+        finally:
+            if self.meanwhile is not None:
+                self.do_meanwhile()
         if self.flags is not self._flags or self.put_out is not self._put_out:  # the loop's machine code takes them so
             raise DaqError("the driver has replaced `flags` or `put_out`; allowed is to fill what `start` has made")
         self._blocks_of_zero += int(largest == 0.0)
         return inputs
+
+    def do_meanwhile(self) -> None:
+        """Do the caller's work once. A driver may call this where outputs are sent and the block is awaited: no time is lost.
+
+        Otherwise it is done at the end of `exchange`.
+        """
+        work, self.meanwhile = self.meanwhile, None
+        if work is not None:
+            work()
 
     def exchange_zeros(self) -> None:
         """Exchange blocks of 0 V until the last nonzero output has left the converter; called before `stop` ends a run.

@@ -207,7 +207,7 @@ class WireDAQ(DAQ):
 
     def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
         assert self._streaming is not None
-        self._streaming.exchange(voltages, self.continuation, inputs, self.flags, self.put_out)
+        self._streaming.exchange(voltages, self.continuation, inputs, self.flags, self.put_out, self.do_meanwhile)
 
     def emergency_stop(self, reason: int = 0) -> None:
         """Make the device drop its output to 0 V and latch. Sent three times, because it is not acknowledged."""

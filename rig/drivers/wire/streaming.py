@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -113,8 +114,9 @@ class Streaming:
         inputs: np.ndarray,
         flags: np.ndarray,
         put_out: np.ndarray,
+        meanwhile: Callable[[], None],
     ) -> None:
-        """Send a block of outputs [n], and how they go on (`rig.daq.CONTINUATION`).
+        """Send a block of outputs [n], and how they go on (`rig.daq.CONTINUATION`); do other work ``meanwhile``.
 
         Fills ``inputs`` [n, n_channels], ``flags`` [n] and ``put_out`` [n] with the block received.
         """
@@ -136,6 +138,7 @@ class Streaming:
         if self._has_put_out:
             put_out.fill(np.nan)
             self._has_put_out = False
+        meanwhile()
         samples = self.incoming.take()
         if samples is None:
             inputs.fill(np.nan)

@@ -64,9 +64,12 @@ class WallClockLoop(DrivenLoop):
         self.times = BlockTimes(self._pace, memory, self._deadline_ns)
         self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
         self._unsaid = False
-        # Spread over the blocks of a chunk, as each chore costs as much time as a block; a one-block chunk does both at once.
-        chores = [self._look_round, self._announce] if memory.layout.chunk > daq.block else [self._both]
-        self._chores = {number * daq.block: chore for number, chore in enumerate(chores)}
+        self._began_ns = 0
+        self._filled: tuple[Slot, int] | None = None
+        # Spread over the blocks of a chunk, as each chore costs as much time as a block.
+        chores = [self._hand_over, self._look_round, self._announce]
+        spread = memory.layout.chunk >= len(chores) * daq.block
+        self._chores = dict(enumerate(chores)) if spread else {0: self._all_chores}
         slot, block = memory.to_fill(), daq.block
         inputs = np.empty((block, len(daq.channels)))
         self._tick_block = bound(
@@ -91,54 +94,71 @@ class WallClockLoop(DrivenLoop):
     def run(self) -> None:
         """Run until the output is off."""
         before = disturbances()
-        began = _now()
+        self._began_ns = _now()
         self._pace.begin()
         over = False
         while not over:
             self._wait_for_judgement()
-            slot = self._memory.to_fill()
-            rows = self._fill(slot)
+            self._fill()
             over = self.failure is not None or self.tick.over
             if over:
                 self.stop()  # the next outputs first, the rows after them
-            self._hand_over(slot, rows, _now() - began)
+            self._hand_over()
         self._announce()
         self.disturbances = since(before)
 
-    def _fill(self, slot: Slot) -> int:
-        """Fill a slot block by block; return the number of rows in it."""
-        tick, words, pace, voltages = self.tick, self._memory.words, self._pace, self._voltages
-        told = self.daq.put_out, self.daq.continuation
-        arrays, block = tick.arrays, self.daq.block
-        chores, tick_block = self._chores, self._tick_block
+    def _fill(self) -> None:
+        """Fill slots block by block, in lockstep one, else until the loop ends; the last one is still to be handed over.
+
+        The chores of a chunk, one a block, are done where no time is lost: where the device paces, once outputs are sent and
+        the block is awaited (`DAQ.do_meanwhile`), else before the next block is due. The first is to hand over the slot before.
+        """
+        tick, daq, words, pace, voltages = self.tick, self.daq, self._memory.words, self._pace, self._voltages
+        told = daq.put_out, daq.continuation
+        arrays, block, blocks = tick.arrays, daq.block, self._memory.layout.chunk // daq.block
+        chores, tick_block, begun_at = self._chores, self._tick_block, self.times.begun
         guard = arrays.guard.view(np.int64).data
-        for first in range(0, self._memory.layout.chunk, block):
+        number, slot = 0, None
+        while True:
             if words[STOP]:
                 tick.request_stop()
             if words[RELEASE_START]:
                 tick.release_start()
-            if first > 0 and self._judgement_is_due():
-                return first
-            if first in chores:
-                chores[first]()
-                if self.failure is not None:  # the ring may be full
-                    return first
-            end = first + block
-            readings, rows = slot.readings[first:end], slot.rows[first:end]
+            if number > 0 and self._judgement_is_due():
+                break
             self._account()
+            if number in chores:
+                daq.meanwhile = chores[number]
+                if not pace.by_device:
+                    daq.do_meanwhile()
+                    if self.failure is not None:  # the ring may be full
+                        break
             begun = pace.wait()
             swapped = self._swap()
-            if swapped is None:
-                return first
+            if daq.meanwhile is not None:  # the driver was refused before it had begun
+                daq.do_meanwhile()
+            if swapped is None or self.failure is not None:
+                break
             begun = begun or _now()
+            if slot is None:
+                slot = self._memory.to_fill()
+            first = number * block
+            readings, rows = slot.readings[first : first + block], slot.rows[first : first + block]
             inputs, flags = swapped
             tick_block(arrays, inputs, flags, readings, rows, voltages, *told)
-            self.times.begun(begun)
+            begun_at(begun)
             self._samples += block
+            number += 1
             if guard[0] == OFF and tick.over:
                 self._account()
-                return end
-        return self._memory.layout.chunk
+                break
+            if number == blocks:
+                if not pace.has_clock:
+                    break
+                self._filled = slot, number * block
+                number, slot = 0, None
+        if slot is not None or self._filled is None:
+            self._filled = self._memory.to_fill() if slot is None else slot, number * block
 
     def _judgement_is_due(self) -> bool:
         """Whether, in lockstep, a judgement of the start is due and has still to come."""
@@ -167,15 +187,18 @@ class WallClockLoop(DrivenLoop):
         if response > self._stall_ns and not self._pace.by_device:
             self._end(f"the loop stood still for {1e-9 * response:.1f} s")
 
-    def _hand_over(self, slot: Slot, rows: int, wall_ns: int) -> None:
-        """Complete a chunk and announce it.
+    def _hand_over(self) -> None:
+        """Complete the chunk that was filled last, if there is one; it is still to be announced.
 
         If the campaign is gone, the same slot is filled again. If the ring is full, the campaign may still read that slot.
         """
+        if self._filled is None:
+            return
+        (slot, rows), self._filled = self._filled, None
         self._announce()  # the previous chunk, if this one ended before it was announced
         if self._alone or self._memory.free < 1:
             return
-        slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, wall_ns
+        slot.head[:] = rows, self._samples, self.times.overruns, self.times.busy_ns, _now() - self._began_ns
         counts = list(self.counters.values())[: slot.counters.size]
         slot.counters[: len(counts)] = counts
         slot.state[:] = self._state
@@ -192,7 +215,8 @@ class WallClockLoop(DrivenLoop):
         except OSError:
             self._alone = True
 
-    def _both(self) -> None:
+    def _all_chores(self) -> None:
+        self._hand_over()
         self._look_round()
         self._announce()
 

@@ -57,7 +57,7 @@ class BlockTimes:
         self._pace, self._deadline_ns = pace, deadline_ns
         histograms = memory.histograms
         self._counts = histograms["wake_up"].add, histograms["execution"].add, histograms["response"].add
-        self._begun_ns = self._release_ns = 0
+        self._begun_ns = 0
         self._computed_ns = _computed()
         self.late = self.stalls = self.own_stalls = self.busy_ns = 0
 
@@ -72,14 +72,15 @@ class BlockTimes:
 
     def begun(self, begun_ns: int) -> None:
         """Record that work on a block began at this time (monotonic clock, ns)."""
-        self._begun_ns, self._release_ns = begun_ns, self._pace.release(begun_ns)
+        self._begun_ns = begun_ns
 
     def done(self) -> int:
         """Record that the outputs of the block are sent now; return the time since the block's release, ns."""
-        begun, release = self._begun_ns, self._release_ns
+        done = _now()
+        begun = self._begun_ns
         if not begun:
             return 0
-        done = _now()
+        release = self._pace.release(begun)
         self._begun_ns = 0
         self.busy_ns += done - begun
         count_wake_up, count_execution, count_response = self._counts
