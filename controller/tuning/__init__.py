@@ -22,6 +22,7 @@ from controller.tuning.plant import PlantModel
 from controller.tuning.stability import (
     LARGEST_AT_HALF,
     Margins,
+    changes_of_hardening,
     closed_loop_poles,
     gains_at_half,
     hardening_margins,
@@ -47,6 +48,7 @@ __all__ = [
     "Settling",
     "Steps",
     "assess",
+    "changes_of_hardening",
     "closed_loop_poles",
     "complex_response_law",
     "control_loop",

@@ -17,6 +17,7 @@ around the transfer function from delta w_0 to ln|A| (`ControlLoop.response_afte
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,7 +33,7 @@ from controller.tuning.laws import (
 )
 from controller.tuning.plant import PlantModel
 
-__all__ = ["ControlLoop", "control_loop", "lag_per_frequency"]
+__all__ = ["ControlLoop", "SlowChanges", "control_loop", "lag_per_frequency", "slow_changes"]
 
 Complex = NDArray[np.complex128]
 
@@ -55,6 +56,48 @@ def lag_per_frequency(plant: PlantModel, s: ArrayLike, lag_deg: float = -90.0) -
     return np.asarray(difference / s, np.complex128)
 
 
+class SlowChanges(NamedTuple):
+    """What a plant makes of slow changes at complex frequencies s, before low-pass and delay: the same whatever the law."""
+
+    s: Complex
+    """complex[n], rad/s."""
+    deviations: Complex
+    """complex[n, 4, 3]: from (ln|U|, arg U, Omega) to (ln|F|, arg F, ln|A|, arg A)."""
+    after_shift: Complex
+    """complex[n, 4]: from a shift of the mode (rad/s) to the same."""
+
+
+def slow_changes(plant: PlantModel, s: Complex, omega: float) -> SlowChanges:
+    """Return what a plant that is locked at the frequency omega (rad/s) makes of slow changes at s [n]."""
+    return SlowChanges(s, _deviations(plant, s, omega), _after_shift(plant, s, omega))
+
+
+def _deviations(plant: PlantModel, s: Complex, omega: float) -> Complex:
+    rows = []
+    for response in (plant.force_per_v, plant.acceleration_per_v):
+        p, r = envelope(response, s, omega)
+        rows += [np.stack([p, -r, -r / s], axis=-1), np.stack([r, p, (p - 1.0) / s], axis=-1)]
+    return np.stack(rows, axis=1)
+
+
+def _after_shift(plant: PlantModel, s: Complex, omega: float) -> Complex:
+    """Return what a shift of the mode leads to.
+
+    It acts like the force ``G = 2 w_0 shift A/(phi_d^2 W^2)`` on the mode alone: ``F <- -H_F beta Y_m G`` and ``A <- H_F alpha
+    Y_m G``, with the mode's part Y_m of the accelerance.
+    """
+    out = np.zeros((s.size, 4), np.complex128)
+    for sign in (1.0, -1.0):
+        carrier = 1j * sign * omega
+        alpha, beta = plant.exciter(s + carrier)
+        driven = plant.force_per_v(s + carrier) * plant.mode_accelerance(s + carrier)
+        driven *= 2.0 * plant.frequency_rad_s / (plant.drive_shape * omega) ** 2
+        for row, relative in ((0, -beta * driven * plant.accelerance(carrier)), (2, alpha * driven)):
+            out[:, row] += 0.5 * relative
+            out[:, row + 1] += -0.5j * sign * relative
+    return out
+
+
 @dataclass(frozen=True)
 class ControlLoop:
     """Plant, demodulator and laws at one lag; all methods refer to the linearised loop."""
@@ -74,28 +117,7 @@ class ControlLoop:
 
     def measured(self, s: Complex) -> Complex:
         """Return M(s) [n, 4, 3]: from (ln|U|, arg U, Omega) to the demodulated (ln|F|, arg F, ln|A|, arg A)."""
-        rows = []
-        for response in (self.plant.force_per_v, self.plant.acceleration_per_v):
-            p, r = envelope(response, s, self.omega_rad_s)
-            rows += [np.stack([p, -r, -r / s], axis=-1), np.stack([r, p, (p - 1.0) / s], axis=-1)]
-        return np.stack(rows, axis=1) * self._smoothing(s)[:, None, None]
-
-    def _after_shift(self, s: Complex) -> Complex:
-        """Return W(s) [n, 4]: from a shift of the mode (rad/s) to (ln|F|, arg F, ln|A|, arg A), before the low-pass.
-
-        The shift acts like the force ``G = 2 w_0 shift A/(phi_d^2 W^2)`` on the mode alone: ``F <- -H_F beta Y_m G`` and ``A <-
-        H_F alpha Y_m G``, with the mode's part Y_m of the accelerance.
-        """
-        out = np.zeros((s.size, 4), np.complex128)
-        for sign in (1.0, -1.0):
-            carrier = 1j * sign * self.omega_rad_s
-            alpha, beta = self.plant.exciter(s + carrier)
-            driven = self.plant.force_per_v(s + carrier) * self.plant.mode_accelerance(s + carrier)
-            driven *= 2.0 * self.plant.frequency_rad_s / (self.plant.drive_shape * self.omega_rad_s) ** 2
-            for row, relative in ((0, -beta * driven * self.plant.accelerance(carrier)), (2, alpha * driven)):
-                out[:, row] += 0.5 * relative
-                out[:, row + 1] += -0.5j * sign * relative
-        return out
+        return _deviations(self.plant, s, self.omega_rad_s) * self._smoothing(s)[:, None, None]
 
     def _smoothing(self, s: Complex) -> Complex:
         return np.asarray(self.low_pass_rad_s / (s + self.low_pass_rad_s) * np.exp(-s * self.plant.delay_s))
@@ -162,16 +184,18 @@ class ControlLoop:
         outputs = self._closed(s, inputs)
         return outputs[:, 2], self._lag(outputs)
 
-    def response_after_shift(self, s: Complex) -> Complex:
+    def response_after_shift(self, s: Complex, known: "SlowChanges | None" = None) -> Complex:
         """Return the transfer function from a shift of the mode's frequency (rad/s) to ln|A| of the vibration itself.
 
-        The mode alone is shifted; the exciter stays as it is, unlike in `lag_after_frequency`.
+        The mode alone is shifted; the exciter stays as it is, unlike in `lag_after_frequency`. ``known`` are the slow changes
+        of this plant at these ``s`` and this lag, where several laws are tried on it.
         """
-        shifted, smoothing = self._after_shift(s), self._smoothing(s)
-        demanded = self.feedback(s) @ (shifted * smoothing[:, None])[:, :, None]
-        actuators = -np.linalg.solve(self.return_difference(s), demanded)[:, :, 0]
-        moved = self.measured(s)[:, 2] / smoothing[:, None]
-        return np.asarray(shifted[:, 2] + np.sum(moved * actuators, axis=1))
+        known = known or slow_changes(self.plant, s, self.omega_rad_s)
+        smoothing, feedback = self._smoothing(s), self.feedback(s)
+        demanded = feedback @ (known.after_shift * smoothing[:, None])[:, :, None]
+        closed = np.eye(3) + feedback @ (known.deviations * smoothing[:, None, None])
+        actuators = -np.linalg.solve(closed, demanded)[:, :, 0]
+        return np.asarray(known.after_shift[:, 2] + np.sum(known.deviations[:, 2] * actuators, axis=1))
 
     def _outputs(self, s: Complex, actuator: int, drive: Complex) -> Complex:
         inputs = np.zeros((s.size, 3), np.complex128)

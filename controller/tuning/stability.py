@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.tuning.laws import ComplexResponseLaw
-from controller.tuning.loop import ControlLoop
+from controller.tuning.loop import ControlLoop, SlowChanges, slow_changes
+from controller.tuning.plant import PlantModel
 
 __all__ = [
     "LARGEST_AT_HALF",
     "Margins",
+    "changes_of_hardening",
     "closed_loop_poles",
     "gains_at_half",
     "hardening_margins",
@@ -60,15 +62,22 @@ def unstable_poles(loop: ControlLoop) -> int:
     return _windings(loop.determinant, INSET * omega, radius) + known
 
 
-def hardening_margins(loop: ControlLoop) -> tuple[float, float]:
+def changes_of_hardening(plant: PlantModel, lag_deg: float = -90.0) -> SlowChanges:
+    """Return what a plant makes of slow changes, for `hardening_margins` of several laws on it."""
+    omega = plant.lock_frequency_rad_s(lag_deg)
+    return slow_changes(plant, np.asarray(1j * np.geomspace(1e-4, REACH, 600) * omega, np.complex128), omega)
+
+
+def hardening_margins(loop: ControlLoop, known: SlowChanges | None = None) -> tuple[float, float]:
     """Return the softening and the hardening (both from 0) up to which a loop that is stable on the linear plant stays stable.
 
     Both are changes of the mode's frequency for a relative change of its amplitude, ``d ln w_0 / d ln a``: a hardening kappa
     closes the loop ``1 - kappa t(s)`` around t, the transfer function from a shift of the mode to its amplitude. It becomes
-    unstable at the first kappa for which ``kappa t(i w)`` is 1. Infinite if there is none.
+    unstable at the first kappa for which ``kappa t(i w)`` is 1. Infinite if there is none. ``known``: `changes_of_hardening` of
+    the loop's plant and lag.
     """
-    omega = np.geomspace(1e-4, REACH, 600) * loop.omega_rad_s
-    transfer = loop.response_after_shift(np.asarray(1j * omega, np.complex128)) * loop.plant.frequency_rad_s
+    known = known or changes_of_hardening(loop.plant, loop.lag_deg)
+    transfer = loop.response_after_shift(known.s, known) * loop.plant.frequency_rad_s
     across = np.flatnonzero(np.diff(np.sign(transfer.imag)) != 0)
     share = transfer.imag[across] / (transfer.imag[across] - transfer.imag[across + 1])
     real = transfer.real[across] + share * (transfer.real[across + 1] - transfer.real[across])

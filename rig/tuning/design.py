@@ -18,6 +18,7 @@ from controller.tuning import (
     PhaseLaw,
     PlantModel,
     assess,
+    changes_of_hardening,
     complex_response_law,
     design_phase_law,
     gains_at_half,
@@ -160,18 +161,18 @@ def _candidates(plant: PlantModel, low_passes_rad_s: list[float]) -> list[_Candi
     out = []
     gains = product(low_passes_rad_s, SHARES, PROPORTIONALS, RESPONSE_SHARES, CANCELS)
     pole = plant.pole_offset_rad_s()
+    shifted = [plant.at(frequency_rad_s=(1.0 + part) * plant.frequency_rad_s) for part in (0.0, SOFTENED, HARDENED)]
+    plants = [(at, changes_of_hardening(at)) for at in shifted]
     for w, share, proportional, response, cancels in gains:
         if (pole / cancels).real >= 0.0:
             continue  # a plan allows stable poles alone
         law = complex_response_law(plant, w, share=response, smoothing_rad_s=w)
         law = replace(law, proportional=cancels * law.proportional)
         loop = ControlLoop(plant, w, FrequencyErrorLaw(share * w, proportional), law)
-        softer, harder = (
-            replace(loop, plant=plant.at(frequency_rad_s=(1.0 + shift) * plant.frequency_rad_s))
-            for shift in (SOFTENED, HARDENED)
+        (softening, hardening), (softer, _), (_, harder) = (
+            hardening_margins(replace(loop, plant=at), changes) for at, changes in plants
         )
-        softening, hardening = hardening_margins(loop)
-        slopes = min(softening, hardening_margins(softer)[0]), min(hardening, hardening_margins(harder)[1])
+        slopes = min(softening, softer), min(hardening, harder)
         out.append(_Candidate(loop, share, proportional, response, cancels, slopes))
     return out
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from controller.tuning import ControlLoop, FrequencyErrorLaw, PlantModel, hardening_margins
+from controller.tuning import ControlLoop, FrequencyErrorLaw, PlantModel, changes_of_hardening, hardening_margins
 from tests.controller.tuning.rigs import plant_of
 
 OMEGA = 2.0 * math.pi * 50.0
@@ -54,3 +54,15 @@ def test_a_shift_moves_the_response_of_the_mode_as_another_plant_does():
     ]
     found = complex(loop.response_after_shift(np.array([1e-6j * loop.omega_rad_s]))[0])
     assert found.real == pytest.approx((moved[0] - moved[1]) / (2.0 * step), rel=0.02)
+
+
+@pytest.mark.parametrize("lag_deg", [-90.0, -60.0])
+def test_what_the_plant_makes_of_slow_changes_serves_every_law_on_it(lag_deg):
+    plant = plant_of("magnet-beam")
+    known = changes_of_hardening(plant, lag_deg)
+    for low_pass_rad_s in (20.0, 40.0):
+        loop = ControlLoop(plant, low_pass_rad_s, FrequencyErrorLaw(1.0), None, lag_deg)
+        np.testing.assert_allclose(loop.measured(known.s), known.deviations * loop._smoothing(known.s)[:, None, None])
+        assert hardening_margins(loop, known) == hardening_margins(loop)
+    other = changes_of_hardening(plant.at(frequency_rad_s=1.1 * plant.frequency_rad_s), lag_deg)
+    assert hardening_margins(loop, other) != hardening_margins(loop)
