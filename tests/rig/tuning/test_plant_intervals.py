@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -47,13 +48,20 @@ def responses(bench, noise, rng):
     )
 
 
+@cache
+def fitted(neighbour, seed, noise):
+    """The responses of a rig with this noise, and the plant as it is found in them."""
+    bench = bench_of(neighbour)
+    matrix = responses(bench, noise, np.random.default_rng(seed))
+    return matrix, plant_of(bench, matrix, 0.0)
+
+
 def errors(neighbour, seeds, noise=1e-3):
     """Relative errors of frequency, damping, shape and ratio, and the stated ones, [seed, 2, 4]."""
-    bench, out = bench_of(neighbour), []
+    out = []
     true = np.array([2.0 * math.pi * HERTZ, DAMPING, SHAPE, 1.6])
     for seed in seeds:
-        matrix = responses(bench, noise, np.random.default_rng(seed))
-        plant = plant_of(bench, matrix, 0.0)
+        matrix, plant = fitted(neighbour, seed, noise)
         ratios, stds = measured_ratios(matrix, plant), measured_ratio_stds(matrix, plant)
         found = [plant.frequency_rad_s, plant.damping_ratio, plant.drive_shape, ratios["acc_magnet"]]
         std = [plant.frequency_std_rad_s, plant.damping_ratio_std, plant.drive_shape_std, stds["acc_magnet"]]
@@ -76,8 +84,7 @@ def test_a_mode_that_the_model_lacks_is_seen_by_the_narrower_fits():
 
 @pytest.mark.parametrize(("turn_deg", "told"), [(0.0, None), (7.0, 7.0), (-12.0, -12.0), (187.0, 7.0), (0.4, None)])
 def test_a_response_that_stands_off_a_real_mode_shape_is_measured(turn_deg, told):
-    bench = bench_of(6.0)
-    matrix = responses(bench, 1e-4, np.random.default_rng(1))
+    matrix, plant = fitted(6.0, 0, 1e-4)
     turned = matrix.value * np.exp(1j * np.radians([0.0, 0.0, turn_deg]))[None, :, None]
-    found = measured_turns_deg(replace(matrix, value=turned), plant_of(bench, matrix, 0.0))
+    found = measured_turns_deg(replace(matrix, value=turned), plant)
     assert found == ({} if told is None else {"acc_magnet": pytest.approx(told, abs=0.1)})
