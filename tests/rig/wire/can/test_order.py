@@ -223,3 +223,12 @@ def test_a_block_that_comes_two_too_late_is_given_up_and_counted() -> None:
     assert one.received(frames) == [0, 1, 2, 4, 5, 6, 7, 8, 9]
     counters = one.receiver._counters
     assert (counters["out_of_order_frames"], counters["late_frames"], counters["repeated_frames"]) == (1, 1, 1)
+
+
+@pytest.mark.parametrize(("begun", "returned"), [(3, [0]), (4, [])])
+def test_frames_belong_to_the_newest_block_and_the_three_before_it(begun: int, returned: list[int]) -> None:
+    one = way((4, True, 10), True, 0)
+    frames = [each for each in one.sent(range(6)) if each.block >= 0]
+    firsts = [each for each in frames if each.place == 0 and each.block <= begun]
+    assert one.received([*firsts, frames[1]]) == returned
+    assert one.receiver._counters["incomplete_blocks"] == (not returned)
