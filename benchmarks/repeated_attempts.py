@@ -61,7 +61,10 @@ def run_once(wire: str, plan_name: str, seed: int, options: dict[str, Any]) -> d
     plan = load_plan(plan_name)
     began = time.monotonic()
     bench = bench_of(plan, plan_name).model_copy(update={"block": BLOCK})
-    with emulated(bench, wire, lockstep=False, options=options) as reached, rig.run(plan, bench=reached, seed=seed) as done:
+    with (
+        emulated(bench, wire, lockstep=False, options=options) as reached,
+        rig.run(plan, bench=reached, seed=seed) as done,
+    ):
         recording = done.recording
         points = list(recording.latest.values())
         refused = [attempt for point in points for attempt in point.get("refused_before", ())]

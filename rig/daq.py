@@ -89,6 +89,8 @@ class Adjustable(NamedTuple):
     """Part of the wire's capacity that a stream may take."""
     automatic: bool = False
     """Whether the bench leaves the queue to what is measured before a run (`rig.loop.worker.queue_choice`)."""
+    longest_period: int = 0
+    """Longest period of outputs, samples, with which the device goes on where the next come too late; 0: it holds them."""
 
 
 class State(Enum):

@@ -54,6 +54,8 @@ class Timing(NamedTuple):
     """Median round trip of a short message; 0 if the driver does not tell."""
     busy_s: float
     """Computing time of the driver, a block."""
+    late_99_s: float = math.inf
+    """Lateness within which 99 % of the blocks came."""
 
 
 class Settings(NamedTuple):
@@ -111,14 +113,17 @@ def recommend(
     return Recommendation(Settings(block, queue, watchdog), rate, holds, reasons)
 
 
-def queue_reason(timing: Timing, queue: int, block: int, rate_hz: float, allowed: Adjustable | None) -> str:
-    """Return in one line how long a queue lasts, and how long it must by the rule."""
+def queue_reason(
+    timing: Timing, queue: int, block: int, rate_hz: float, allowed: Adjustable | None, late: str = ""
+) -> str:
+    """Return in one line how long a queue lasts, and how long it must by the rule; ``late`` says how late blocks came."""
     block_s = block / rate_hz
     answered = answer_s(timing, _wire_s(block, rate_hz, allowed))
+    late = late or f"blocks came up to {milliseconds(timing.late_s)} late (counted {RESERVE:g} times)"
     return (
         f"lasts {milliseconds(max(1, queue) * block_s)}; {milliseconds(answered + (1.0 - BUSY) * block_s)} are needed: "
-        f"blocks came up to {milliseconds(timing.late_s)} late (counted {RESERVE:g} times), a round trip takes "
-        f"{milliseconds(timing.round_trip_s)}, the controller has {milliseconds((1.0 - BUSY) * block_s)}"
+        f"{late}, a round trip takes {milliseconds(timing.round_trip_s)}, the controller has "
+        f"{milliseconds((1.0 - BUSY) * block_s)}"
     )
 
 

@@ -148,6 +148,7 @@ class WireDAQ(DAQ):
             wire_share=shares,
             largest_wire_share=MOST_LOAD,
             automatic=self._given.queue_blocks == "auto",
+            longest_period=facts.longest_period,
         )
 
     def adjust(self, queue_blocks: int, watchdog_s: float | None = None) -> None:

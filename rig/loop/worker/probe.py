@@ -72,6 +72,7 @@ def timing_of(facts: dict[str, Any]) -> Timing:
         gap_s=1e-6 * facts["block_us"]["largest"],
         round_trip_s=1e-6 * facts["statistics"].get("round_trip_p50_us", 0.0),
         busy_s=1e-6 * facts["driver_us"],
+        late_99_s=1e-6 * facts["late_us"]["p99"],
     )
 
 

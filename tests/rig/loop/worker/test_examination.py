@@ -95,16 +95,17 @@ def test_held_outputs_and_a_queue_that_is_too_short_are_remarked(examined):
 
 
 def test_a_bench_that_leaves_its_queue_to_the_run_needs_no_lines_and_is_tried_with_what_it_would_take(examined):
-    late(examined, 0.020)
+    late(examined, 0.008)
+    examined.words[Parameter.LONGEST_PERIOD, 0] = 0
     facts = examine_device(AUTO, 0)
     advice = facts["recommendation"]
-    assert advice["settings"]["queue_blocks"] == 16  # 30 ms and half of 2 ms, and the round trip
+    assert advice["settings"]["queue_blocks"] == 7  # 12 ms and half of 2 ms, and the round trip
     assert advice["differs"] == {}
     assert advice["bench_lines"] == []
-    assert advice["reasons"]["queue_blocks"].startswith('as "auto" takes it before a run: lasts 32 ms; ')
+    assert advice["reasons"]["queue_blocks"].startswith('as "auto" takes it before a run: lasts 14 ms; ')
     assert facts["remarks"] == []
     assert facts["held_blocks"] == 0
-    assert facts["queue_blocks"] == 16
+    assert facts["queue_blocks"] == 7
 
 
 def test_where_what_auto_would_take_does_not_hold_a_number_is_recommended(examined):
