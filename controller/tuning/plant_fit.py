@@ -20,6 +20,8 @@ NO_MODE = 0.15
 
 If the residuals of other modes explain the accelerance to within this fraction, there is no mode inside the band: the
 equations for the pole then contain only noise or rounding. With a mode inside the band the misfit is 0.8 or more."""
+MOST_STEPS = 300
+"""Of a fit that creeps along what the lines hardly determine; others take some ten."""
 UNDETERMINED = 1e3  # standard error over alpha, where the lines say nothing of it
 
 
@@ -69,22 +71,33 @@ def fitted(
         error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
         return np.concatenate([error.real, error.imag, prior(x)])
 
+    least_mass = 1e-3 * float(np.max(np.abs(start[9:])))
+
     def prior(x: Real) -> Real:
         if exciter_prior is None:
             return np.zeros(0)
-        spring, mass, jerk = x[9], x[11], x[12]
-        return np.asarray(
-            np.array([spring, jerk]) / (exciter_prior * max(abs(mass), 1e-3 * float(np.max(np.abs(start[9:])))))
-        )
+        return np.asarray(x[[9, 12]] / (exciter_prior * max(abs(x[11]), least_mass)))
+
+    def jacobian_of(x: Real) -> Real:
+        of_f, of_a = _derivatives(x, s, centre)
+        error = np.concatenate([of_f * weight_f, of_a * weight_a], axis=1)
+        of_prior = np.zeros((x.size, 0))
+        if exciter_prior is not None:
+            of_prior = np.zeros((x.size, 2))
+            of_prior[[9, 12], [0, 1]] = 1.0 / (exciter_prior * max(abs(x[11]), least_mass))
+            if abs(x[11]) > least_mass:
+                of_prior[11] = -prior(x) / x[11]
+        return np.concatenate([error.real, error.imag, of_prior], axis=1).T
 
     starts = [start] if exciter_prior is None else [start, _light(start)]
     fits = [
         least_squares(
             residuals,
             begin,
+            jac=jacobian_of,
             method="lm",
             x_scale=np.maximum(np.abs(start), 1e-3 * np.max(np.abs(start[5:]))),
-            max_nfev=4000,
+            max_nfev=MOST_STEPS,
         )
         for begin in starts
     ]
@@ -171,6 +184,31 @@ def _model(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
     beta = (x[9] + z * (x[10] + z * (x[11] + z * x[12]))) / z**2
     force = 1.0 / (alpha + beta * accelerance)
     return force, accelerance * force
+
+
+def _derivatives(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
+    """Return the derivatives of `_model` by each parameter, complex[13, n] each."""
+    z = s / centre
+    w, damped = math.exp(x[0]), 2.0 * math.exp(x[1] + x[0]) * z
+    pole = z**2 + damped + w**2
+    mode = math.exp(x[2]) * z**2 / pole
+    force, acceleration = _model(x, s, centre)
+    accelerance = acceleration / force
+    beta = (x[9] + z * (x[10] + z * (x[11] + z * x[12]))) / z**2
+    powers = z ** np.arange(-2, 4)[:, None]
+    of_accelerance = np.zeros((x.size, z.size), np.complex128)
+    of_accelerance[:5] = (
+        -mode / pole * (damped + 2.0 * w**2),
+        -mode / pole * damped,
+        mode,
+        np.ones_like(z),
+        z**2,
+    )
+    of_exciter = beta * of_accelerance
+    of_exciter[5:9] += powers[2:]
+    of_exciter[9:] += powers[:4] * accelerance
+    of_force = -(force**2) * of_exciter
+    return of_force, of_accelerance * force + accelerance * of_force
 
 
 def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from controller.tuning import PlantModel
+from controller.tuning import PlantModel, plant_fit
 from tests.controller.tuning.rigs import LINEAR_HZ, plant_of, responses, shipped
 
 NAMES = ["magnet-beam", "friction-beam"]
@@ -134,3 +134,15 @@ def test_a_mode_wider_than_the_lines_needs_a_damping_above_zero(damping_ratio):
     assert found.damping_ratio == pytest.approx(damping_ratio, rel=0.02)
     with pytest.raises(ValueError, match="no damped resonance"):
         PlantModel.from_frequency_responses(*one_mode(-damping_ratio, 1e-4), **RATE)
+
+
+def test_a_fit_goes_by_the_derivatives_of_its_model():
+    s, centre, step = 2j * math.pi * np.linspace(15.0, 40.0, 60), 2.0 * math.pi * 24.0, 1e-6
+    x = np.array([0.01, -5.0, -0.2, 0.3, 0.1, 0.4, 0.1, -0.3, 0.02, 0.2, 0.06, 0.5, -0.04])
+    for name, exact in zip(("force", "acceleration"), plant_fit._derivatives(x, s, centre), strict=True):
+        for index, along in enumerate(step * np.eye(x.size)):
+            ends = [plant_fit._model(x + sign * along, s, centre)[name == "acceleration"] for sign in (1.0, -1.0)]
+            numeric = (ends[0] - ends[1]) / (2.0 * step)
+            np.testing.assert_allclose(
+                exact[index], numeric, atol=1e-6 * np.abs(numeric).max(), err_msg=f"{name} {index}"
+            )
