@@ -14,8 +14,9 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -123,9 +124,11 @@ def main() -> None:
     runs = []
     if not wanted.json:
         print(HEAD, flush=True)
-    with busy(wanted.beside), ThreadPoolExecutor(len(wires) if wanted.together else 1) as threads:
+    workers = ProcessPoolExecutor(len(wires) if wanted.together else 1, get_context("spawn"))
+    with busy(wanted.beside), workers:
         for number in range(wanted.runs):
-            for run in threads.map(lambda wire: run_once(wire, wanted.plan, number, options), wires):  # noqa: B023
+            asked = [workers.submit(run_once, wire, wanted.plan, number, options) for wire in wires]
+            for run in (one.result() for one in asked):
                 runs.append(run)
                 if wanted.json:
                     continue
