@@ -72,7 +72,7 @@ class Incoming:
         newer = self._newer
         if not newer:
             newer.append(self._wait())
-        if len(newer) == 1 and newer[0].first == self.expected + self._block:
+        if newer[0].first == self.expected + self._block:
             self._look_for_the_one_before(newer[0].first)
         samples = None
         if newer[0].first == self.expected:
@@ -84,7 +84,6 @@ class Incoming:
             self.lost_samples += self._block
             self.missing_readbacks += self.expected in self._untold
             self._given_up.append(self.expected)
-        self._readbacks.pop(self.expected, None)
         self._untold.pop(self.expected, None)
         self.expected += self._block
         return samples

@@ -108,6 +108,17 @@ def test_heartbeats_during_the_wait_are_heard() -> None:
         found.take()
 
 
+def test_other_messages_do_not_make_the_wait_longer() -> None:
+    beat = Heartbeat(DeviceState.ARMED, 0, 7, 0)
+    found, link = incoming(
+        [(1.0, block(1)), (1.3, beat), (1.4, beat), (1.6, block(0)), (1.7, block(0)), (2.0, block(2))]
+    )
+    assert taken(found, 2) == [None, 1]
+    assert link.now_s == pytest.approx(1.5)
+    assert taken(found, 1) == [2]
+    assert (found.late_blocks, found.repeated_blocks) == (1, 1)
+
+
 def test_a_stream_of_other_messages_does_not_hold_the_loop_up() -> None:
     beats = [(1.0, Heartbeat(DeviceState.ARMED, 0, 7, 0))] * 1000
     found, link = incoming([(1.0, block(1)), *beats, (1.0, block(0))], 0.0)
