@@ -7,6 +7,7 @@ from rig.daq import LOST, Channel
 from rig.drivers import make_daq
 from rig.drivers.virtual.faults import OUTPUT_CONTINUED, OUTPUT_HELD
 from rig.emulator.emulated import emulated
+from rig.emulator.plant import VirtualPlant
 from rig.errors import ConfigurationError
 from rig.loop.loop import Loop
 from rig.tick.layout import DEVICE_SHIFT
@@ -172,6 +173,12 @@ def test_an_emulated_device_holds_the_same_outputs_with_the_flag_of_the_wire():
     _, flags, _ = exchanged({"held_per_s": 20.0, "held_s": 0.0056}, 14, n=300 * 14)
     np.testing.assert_array_equal(np.concatenate(raised) == 4, flags == OUTPUT_HELD)
     assert flags.any()
+
+
+def test_an_emulated_device_refuses_late_outputs_that_are_drawn():
+    bench = bench_with({"block": 14}, faults={"late_per_s": 1.0})
+    with pytest.raises(ConfigurationError, match=r"faults\.late_per_s = 1: allowed is 0 for an emulated device"):
+        VirtualPlant(bench)
 
 
 @pytest.mark.parametrize(
