@@ -104,8 +104,8 @@ class VirtualDAQ(DAQ):
         late_per_s = self._queue_options.faults.late_per_s
         if late_per_s > 0.0:
             raise ConfigurationError(
-                f"driver.options.faults.late_per_s = {late_per_s:g}: allowed is 0 for an emulated device, whose outputs come as "
-                "late as its host sends them"
+                f"driver.options.faults.late_per_s = {late_per_s:g}: allowed is 0 for an emulated device, whose outputs "
+                "come as late as its host sends them"
             )
         faults = held_outputs(self._seed, self.sample_rate_hz, self._bench_block, self._queue_options.faults)
         return Converters(np.zeros(0), counts, loopback, faults, self._how != "attached", self._released)
