@@ -88,6 +88,8 @@ def test_the_row_holds_what_was_put_out_where_that_was_not_what_was_handed_over(
     rows = np.where(np.isfinite(put_out), put_out, handed)
     began = QUEUE * BLOCK
     assert np.abs(rows[began:] - output_v[began:]).max() <= 0.5 * step_v + 1e-9
+    counts = [np.rint(volts[began:] / step_v) for volts in (handed, output_v)]
+    np.testing.assert_array_equal(np.isnan(put_out[began:]), counts[0] == counts[1])
     assert np.isnan(put_out[~late]).all()
     np.testing.assert_allclose(put_out[np.isfinite(put_out)], output_v[np.isfinite(put_out)], atol=1e-9)
     assert np.abs(output_v[began:] - handed[began:]).max() <= 1.3 * 0.005  # the vibration goes on

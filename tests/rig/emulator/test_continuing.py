@@ -236,6 +236,8 @@ def test_every_way_out_of_armed_is_at_0_v_while_it_goes_on(how: str) -> None:
         np.testing.assert_array_equal(bench.device.output_v, 0.0)
     else:
         np.testing.assert_array_equal(bench.counts[326:], 0)
+        assert not any(flags & (HELD | CONTINUED) for flags in bench.flags[33:])  # nothing is missing any more
+        assert max(one.first for one in bench.link.of(Readback)) == 320
 
 
 def test_a_late_ramp_ends_when_it_would_have_ended() -> None:

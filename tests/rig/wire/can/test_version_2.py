@@ -84,6 +84,15 @@ def test_a_ramp_is_told_once_and_counts_down_by_itself(fd: bool, n: int) -> None
         assert heard(device, frames) == [((j + 1) * n, period, ramp)]
 
 
+@pytest.mark.parametrize("fd", [True, False])
+def test_a_ramp_that_begins_ends_or_is_another_is_told_at_once(fd: bool) -> None:
+    device, host = ends(fd, 1)
+    ramps = [0, 0, 100, 99, 50, 49, 0, 0]
+    sent = [host.encode(output(j, 1, 20 << 16, ramp)) for j, ramp in enumerate(ramps)]
+    assert [bool(told(frames)) for frames in sent] == [True, False, True, False, True, False, True, False]
+    assert [heard(device, frames)[0][2] for frames in sent] == ramps
+
+
 def test_a_ramp_that_is_over_leaves_nothing_to_go_on_with_even_if_its_end_is_not_told() -> None:
     device, host = ends(True, 10)
     assert heard(device, host.encode(output(0, 10, 20 << 16, 25))) == [(10, 20 << 16, 25)]
@@ -138,6 +147,21 @@ def test_readbacks_arrive_as_they_were_sent_before_their_samples_and_beyond_the_
         assert got.first == j * n
         np.testing.assert_array_equal(got.counts, counts_of(j, n))
     assert not any(host._counters.values())
+
+
+def test_a_readback_is_taken_for_one_near_the_samples_that_have_come() -> None:
+    device, host = ends(True, 40)
+    for j in range(70000 // 40):
+        for frame in device.encode(Samples(j * 40, np.zeros((40, 4), np.int16))):
+            host.decode(frame)
+    (got,) = blocks(host, device.encode(Readback(70000, counts_of(1, 40))))
+    assert got.first == 70000
+
+
+def test_readbacks_of_two_blocks_in_the_other_order_both_arrive() -> None:
+    device, host = ends(False, 10)
+    later, earlier = (device.encode(Readback(first, counts_of(first, 10))) for first in (10, 0))
+    assert [one.first for one in blocks(host, [*later, *earlier])] == [10, 0]
 
 
 def test_the_frames_of_a_readback_are_those_of_the_page() -> None:
