@@ -9,9 +9,12 @@ import pytest
 from rig.bench import load_bench
 from rig.drivers.can import CanDAQ
 from rig.drivers.virtual import VirtualDAQ
+from rig.emulator import Device, VirtualPlant
+from rig.emulator.parameters import described
 from rig.errors import ConfigurationError, DaqDisconnected, DaqMismatch, DaqProtocol, DaqRefused
 from rig.wire.can.bus import PythonCanBus
 from rig.wire.can.frames import BusTiming
+from rig.wire.can.link import CanLink
 from rig.wire.can.protocol import definition
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.messages import Parameter
@@ -125,7 +128,7 @@ def test_two_devices_under_different_nodes_do_not_hear_each_other() -> None:
 
 def test_a_device_with_another_definition_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "moved.dbc"
-    path.write_text(definition(4, True).replace("BO_ 64 OutputIndex", "BO_ 80 OutputIndex"))
+    path.write_text(definition(4, True).replace("BO_ 64 OutputIndex", "BO_ 112 OutputIndex"))
     channel = uuid4().hex
     with device_on(virtual_bus(channel, True), True), pytest.raises(DaqMismatch, match="definition"):
         CanDAQ(bench_on("virtual", channel, dbc=str(path))).open()
@@ -152,3 +155,17 @@ def test_multicast_is_refused_where_there_is_a_network(monkeypatch: pytest.Monke
     monkeypatch.setattr("rig.wire.can.bus.socket.if_nameindex", lambda: [(1, "lo"), (2, "eth0")])
     with pytest.raises(DaqRefused, match="network namespace"):
         CanDAQ(bench_on("udp_multicast", "239.74.163.2")).open()
+
+
+def test_with_a_definition_of_version_1_version_1_is_spoken_at_either_end(tmp_path: Path) -> None:
+    path = tmp_path / "version-1.dbc"
+    path.write_text(definition(4, True, 1))
+    channel = uuid4().hex
+    with device_on(virtual_bus(channel, True), True):
+        daq = CanDAQ(bench_on("virtual", channel, 10, dbc=str(path), data_bitrate=8_000_000))
+        with daq:
+            assert daq.identity["protocol"] == "1"
+    plant = VirtualPlant(load_bench("magnet-beam"))
+    link = CanLink(virtual_bus(channel, True), 4, BusTiming(True), dbc=path, device=True)
+    device = Device(plant, described(plant, layout_crc=link.layout_crc), link)
+    assert device.words[Parameter.HIGHEST_VERSION, 0] == 1
