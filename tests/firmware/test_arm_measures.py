@@ -95,3 +95,12 @@ def test_trace_and_timer_count_the_same_and_a_sample_takes_a_part_of_its_time(
     assert whole / samples < 0.25 * instructions.CLOCK_HZ / instructions.RATE_HZ
     assert 0 < counts.locked < 500
     assert max(counts.calls["ramp", "vl_output"]) > max(counts.calls["steady", "vl_output"])
+
+
+def test_an_output_that_is_continued_takes_a_part_of_a_sample_s_time(measures: SimpleNamespace, tmp_path: Path) -> None:
+    """The first of a source looks for its extremes, by pieces; those behind it do not."""
+    instructions = measures.instructions
+    counts = measures.execution.traced(measures.tools.load(tmp_path, "serial", "-O2", 10))
+    _, short, of_short, longest, of_longest = instructions.where_outputs_are_missing("serial", "-O2", counts)
+    assert of_short < of_longest < short < longest < 0.2 * instructions.CLOCK_HZ / instructions.RATE_HZ
+    assert of_longest < 5 * max(counts.calls["steady", "vl_output"])

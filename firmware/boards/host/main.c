@@ -113,6 +113,7 @@ static void print_counters(void)
     PRINT(watchdog_trips);
     PRINT(emergency_stops);
     PRINT(held_blocks);
+    PRINT(continued_blocks);
     PRINT(dropped_blocks);
     PRINT(bad_outputs);
     PRINT(late_outputs);

@@ -35,9 +35,18 @@ def row(wire: str, optimisation: str, block: int, counts: Counts) -> list[object
     return [f"{wire}, {optimisation}", block, *numbers, max(serve), f"{share:.1f}", f"{2 * share:.1f}"]
 
 
+def where_outputs_are_missing(wire: str, optimisation: str, counts: Counts) -> list[object]:
+    """A row of the table of ``vl_output`` where an output is missing: the first one of a source, and those behind it."""
+    out: list[object] = [f"{wire}, {optimisation}"]
+    for period in ("short", "longest"):
+        first, *others = counts.calls[f"continued_{period}", "vl_output"]
+        out += [first, max(others)]
+    return out
+
+
 def at_worst(wire: str, optimisation: str, counts: Counts) -> list[object]:
     """A row of the table of what an interrupt and a lock need at most."""
-    output = max(max(calls) for (_, name), calls in counts.calls.items() if name == "vl_output")
+    output = max(max(counts.calls[caller, "vl_output"]) for caller in ("steady", "ramp", "ramp_by_main_loop"))
     input_ = max(max(calls) for (_, name), calls in counts.calls.items() if name == "vl_input")
     return [f"{wire}, {optimisation}", output, input_, counts.locked]
 
@@ -60,12 +69,19 @@ HEAD = [
     "at 2 cycles, %",
 ]
 HEAD_AT_WORST = ["wire", "`vl_output`", "`vl_input`", "locked"]
+HEAD_OF_MISSING = [
+    "wire",
+    "period of 100: first",
+    "each further",
+    "the longest period, in a ramp: first",
+    "each further",
+]
 HEAD_OF_FUNCTIONS = ["wire", "functions, instructions a sample", "by trace", "by timer"]
 
 
 def report(build: Path) -> str:
     """Tables of instructions: by block; at worst; by function, with how well trace and timer agree."""
-    by_block_, worst, functions = list[list[object]](), list[list[object]](), list[list[object]]()
+    by_block_, worst, missing, functions = (list[list[object]]() for _ in range(4))
     for optimisation in OPTIMISATIONS:
         for wire in WIRES:
             for block in BLOCKS:
@@ -73,6 +89,7 @@ def report(build: Path) -> str:
                 counts = traced(elf)
                 by_block_.append(row(wire, optimisation, block, counts))
             worst.append(at_worst(wire, optimisation, counts))
+            missing.append(where_outputs_are_missing(wire, optimisation, counts))
             timed = TIMER_TICK * said(elf)[0]
             functions.append([f"{wire}, {optimisation}", hot(counts), counts.steady, timed])
     return "\n\n".join(
@@ -81,6 +98,8 @@ def report(build: Path) -> str:
             table(HEAD, by_block_),
             "At most, with the watchdog's trip and ramp; locked: between `board_lock` and `board_unlock`.",
             table(HEAD_AT_WORST, worst),
+            f"`vl_output` where an output is missing, in blocks of {BLOCKS[-1]}. The first looks for the period's extremes.",
+            table(HEAD_OF_MISSING, missing),
             f"Where they go, at blocks of {BLOCKS[-1]}; and all instructions of the steady part, by two ways of counting.",
             table(HEAD_OF_FUNCTIONS, functions),
         ]
