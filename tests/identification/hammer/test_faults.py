@@ -30,3 +30,43 @@ def test_a_second_top_within_the_pulse_is_told_with_its_height_and_its_distance(
 @pytest.mark.parametrize(("valley_n", "hit"), [(25.0, True), (30.0, True), (35.0, False), (55.0, False)])
 def test_a_second_top_is_a_hit_from_a_valley_of_half_its_height_on(valley_n, hit):
     assert bool(told([(20, 100.0), (44, 60.0)], valley_n)) is hit
+
+
+WIDE = Pulse(100, 120, 142, 100.0)
+"""A pulse of 42 samples: what follows it is averaged over 21, from 21 samples after its end on."""
+
+
+def followed_by(further):
+    """What is said of a pulse without noise, and of what follows it."""
+    force = np.interp(np.arange(4000.0), [99, 120, 142], [0.0, 100.0, 0.0])
+    return double_hit(force + further, WIDE, (), 0.0, 1e5)
+
+
+def flat(height_n, first, samples=31):
+    return np.where((np.arange(4000) >= first) & (np.arange(4000) < first + samples), height_n, 0.0)
+
+
+@pytest.mark.parametrize(("height_n", "hit"), [(2.9, False), (3.1, True)])
+def test_a_later_pulse_is_a_hit_from_three_percent_of_the_first_on(height_n, hit):
+    assert bool(followed_by(flat(height_n, 600))) is hit
+
+
+def test_a_later_pulse_is_told_with_its_height_and_its_distance():
+    top = lambda at, height_n: height_n * np.maximum(1.0 - np.abs(np.arange(4000) - at) / 25.0, 0.0)  # noqa: E731
+    assert followed_by(top(1320, 8.0)) == "double hit: another one of 8 N (8 %) 12 ms later"
+    assert (
+        followed_by(top(188, 8.0)) == "double hit: another one of 8 N (8 %) 0.68 ms later"
+    )  # as early as it is sought
+
+
+def test_ringing_that_changes_sign_within_half_the_pulse_is_no_hit():
+    at = np.arange(4000.0)
+    rings = lambda samples: 10.0 * np.exp(-(((at - 700.0) / 150.0) ** 2)) * np.sin(2.0 * np.pi * at / samples)  # noqa: E731
+    assert followed_by(rings(21.0)) == ""
+    assert followed_by(rings(60.0)).startswith("double hit")
+
+
+def test_a_later_pulse_is_sought_where_two_means_have_room():
+    force = np.interp(np.arange(4000.0), [99, 120, 142], [0.0, 100.0, 0.0]) + flat(50.0, 200, 5)
+    assert double_hit(force[:204], WIDE, (), 0.0, 1e5) == ""  # 41 samples after those that are left out
+    assert double_hit(force[:205], WIDE, (), 0.0, 1e5).startswith("double hit: another one of 50 N")

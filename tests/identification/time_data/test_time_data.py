@@ -16,6 +16,7 @@ from identification import (
     time_responses,
 )
 from identification.time_data.periodicity import period_remark
+from identification.time_data.responses import time_spectra
 
 FORCE, DRIVE, VOLT = Channel("force", "force", "V"), Channel("out", "drive", "V"), Channel("gen", "monitor", "V")
 RATE_HZ, SIZE, F0, ZETA = 512.0, 512, 40.0, 0.02
@@ -151,3 +152,47 @@ def test_decimated_records_lose_their_spoilt_ends():
     assert one.inputs.shape[1] == 3000 - 2 * 32
     rest = time_experiments(random_records(at_rest=True), rate_hz=50.0)[0]
     assert rest.inputs.shape[1] == 3000 - 32
+
+
+def tones(lines, size, excited_hz=None, periods=2):
+    """Records whose force has these spectral lines alone, (number, amplitude), at one line a hertz."""
+    at = np.arange(size * periods) / size
+    force = np.sum([size_of * np.cos(2.0 * np.pi * number * at) for number, size_of in lines], axis=0)
+    return TimeRecords(
+        channels=(FORCE, DRIVE),
+        sample_rate_hz=float(size),
+        records=(TimeRecord(samples=np.array([force, 0.5 * force]), name="tones"),),
+        period_samples=size,
+        excited_hz=excited_hz,
+    )
+
+
+@pytest.mark.parametrize(
+    ("size", "excited_hz", "wanted"),
+    [
+        (64, None, [3, 7, 12, 30, 31]),
+        (64, (7.0, 30.0), [7, 12, 30]),  # lines at the ends belong to the band
+        (64, (7.1, 29.9), [12]),
+        (64, (6.0, 20.0), [7, 12]),
+        (63, None, [3, 7, 12, 30, 31]),  # an odd period has its highest line below half the rate
+    ],
+)
+def test_spectra_are_those_from_the_first_excited_line_of_the_band_to_the_last(size, excited_hz, wanted):
+    given = [(3, 1.0), (7, 0.2), (12, 1.0), (30, 0.5), (31, 0.7)]
+    found = time_spectra(tones(given, size, excited_hz))
+    np.testing.assert_allclose(found.frequency_hz, np.arange(wanted[0], wanted[-1] + 1))
+    np.testing.assert_array_equal(found.frequency_hz[found.excited], wanted)
+    assert found.spectra.shape == (1, 2, 2, wanted[-1] - wanted[0] + 1)
+    amplitudes = [dict(given)[number] for number in wanted]
+    np.testing.assert_allclose(found.spectra[0, :, 0, found.excited].T, [amplitudes, amplitudes], rtol=1e-9)
+    np.testing.assert_allclose(found.spectra[0, :, 1], 0.5 * found.spectra[0, :, 0], atol=1e-12)
+
+
+def test_a_line_at_half_the_rate_has_no_phase_and_is_left_out():
+    found = time_spectra(tones([(3, 1.0), (31, 1.0), (32, 1.0)], 64))
+    np.testing.assert_array_equal(found.frequency_hz[found.excited], [3.0, 31.0])
+
+
+def test_a_band_without_power_is_refused_with_its_ends():
+    with pytest.raises(IdentificationError, match=r"channel 'force': has no power at any line in 13 to 20 Hz"):
+        time_spectra(tones([(3, 0.0)], 64, (13.0, 20.0)))
