@@ -144,3 +144,17 @@ def test_a_channel_of_which_nothing_was_seen_gives_no_higher_level(monkeypatch):
     assert higher == pytest.approx(0.04)  # four times, the most
     inputs[:, -1] = np.nan
     assert SEARCH.next_level(0.01, seen_in(bench, recorded_with(bench, inputs))) is None
+
+
+@pytest.mark.parametrize(("lowest_hz", "deciding_hz"), [(5.0, 0.4 * 24.37), (20.0, 20.0)])
+def test_a_displacement_is_taken_to_be_at_the_lowest_frequency_that_was_played(monkeypatch, lowest_hz, deciding_hz):
+    """All of an acceleration a at the frequency f would be a displacement of ``a / (2 pi f)^2``."""
+    bench = bench_with({"limits": {"frequency_hz": (lowest_hz, 200.0), "displacement_m": 1e-4}})
+    assert bench.specimen.linear_frequency_hz == 24.37
+    clear = SimpleNamespace(coherence=np.full(len(bench.channels), 1.0))
+    monkeypatch.setattr("rig.check.run.responses_in", lambda recorded: clear)
+    inputs = np.zeros((100, len(bench.channels)))
+    inputs[::2, 1], inputs[1::2, 1] = 0.5, -0.5  # m/s2
+    seen = seen_in(bench, recorded_with(bench, inputs))
+    assert seen.enough
+    assert seen.share_of_limits == pytest.approx(0.5 / (2.0 * np.pi * deciding_hz) ** 2 / 1e-4, rel=1e-6)

@@ -545,6 +545,35 @@ def test_a_setting_that_is_refused_is_told_with_the_devices_reason_and_a_nearest
     assert ("nearest" in said) == (status == Status.NOT_ALLOWED)
 
 
+@pytest.mark.parametrize(
+    ("parameter", "told", "set_instead"),
+    [
+        (Parameter.RATE_MHZ, "sample_rate_hz = 5000 Hz", "2500 Hz"),
+        (Parameter.BLOCK, "block = 10 samples", "5 samples"),
+        (Parameter.QUEUE, "driver.options.queue_blocks = 4 blocks", "2 blocks"),
+        (Parameter.WATCHDOG_US, "driver.options.watchdog_s = 0.3 s", "0.15 s"),
+        (Parameter.RAMP_US, "driver.options.ramp_s = 0.08 s", "0.04 s"),
+    ],
+)
+def test_a_setting_that_a_device_halves_is_told_by_its_key_in_the_benchs_units(
+    parameter: Parameter, told: str, set_instead: str
+) -> None:
+    daq = MemoryDAQ(bench_with(), 3, WireOptions(queue_blocks=4, watchdog_s=0.3, ramp_s=0.08))
+    heard = daq.device.handle
+
+    def halving(message: Message, now_s: float) -> None:
+        if isinstance(message, Request) and message[1:3] == (Command.SET, parameter):
+            half = message.value // 2
+            daq.wire.to_host.append(Answer(message.number, Status.DONE, message.parameter, message.item, half))
+        else:
+            heard(message, now_s)
+
+    daq.device.handle = halving  # type: ignore[method-assign]
+    with daq, pytest.raises(DaqMismatch) as caught:
+        daq.start(10)
+    assert str(caught.value) == f"memory: {told}: the device has set {set_instead} instead"
+
+
 def test_a_watchdog_shorter_than_two_blocks_is_refused() -> None:
     with MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=0.01)) as daq, pytest.raises(DaqRefused, match=r"0\.02 s"):
         daq.start(50)

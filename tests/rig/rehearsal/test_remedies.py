@@ -1,11 +1,15 @@
 """A plan that is bad in one way gets the remedy for that, and not another one."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from rig.campaigns.plans import load_plan, plan_from
+from rig.rehearsal import remedies
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
-from rig.rehearsal.remedies import improve, remedies_for
+from rig.rehearsal.remedies import Remedy, _spread, improve, remedies_for
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
 from tests.rig.rehearsal.plans import SHORT, magnet_beam
 
@@ -81,3 +85,54 @@ def test_every_kind_of_plan_has_remedies_that_are_plans(name):
         for key in remedy.changes:
             assert key in type(plan).model_fields, remedy.name
             assert remedy.changes[key] != table.get(key), remedy.name
+
+
+def draw(number, *, completed, tripped=False, accepted=0, computed=True):
+    points = tuple(SimpleNamespace(accepted=k < accepted) for k in range(10))
+    trial = SimpleNamespace(
+        computed=computed, completed=completed, tripped=tripped, points=points, duration_s=1.0, level=np.nan
+    )
+    return SimpleNamespace(number=number, trial=trial)
+
+
+@pytest.mark.parametrize("number", [25, 60, 100, 241])
+def test_a_sample_of_draws_reaches_from_the_first_to_the_last_in_even_steps(number):
+    sample = _spread(range(number))
+    assert (len(sample), sample[0], sample[-1]) == (24, 0, number - 1)
+    steps = np.diff(sample)
+    assert steps.min() >= 1
+    assert steps.max() - steps.min() <= 1
+
+
+@pytest.mark.parametrize("number", [0, 1, 24])
+def test_few_draws_are_all_in_the_sample(number):
+    assert _spread(range(number)) == list(range(number))
+
+
+@pytest.mark.parametrize(("failed", "well"), [(30, 90), (90, 30), (10, 100), (30, 0)])
+def test_probabilities_of_a_sample_are_those_of_all_draws_that_it_stands_for(monkeypatch, failed, well):
+    """Failed draws trip after 4 of 10 points; the remedy lets all complete, so that both ends are known exactly."""
+    plan = SimpleNamespace(targets=lambda: range(10))
+    other = SimpleNamespace(targets=lambda: range(8))  # fewer points are no gain by themselves
+    draws = [draw(k, completed=False, tripped=True, accepted=4) for k in range(failed)]
+    draws += [draw(failed + k, completed=True, accepted=10) for k in range(well)]
+    draws += [draw(failed + well, completed=False, computed=False)]  # of this one nothing is known
+    monkeypatch.setattr(remedies, "remedies_for", lambda *_: [Remedy("help", {"retries": 3})])
+    monkeypatch.setattr(remedies, "_changed", lambda *_: other)
+    monkeypatch.setattr(remedies, "replace", lambda one, **changes: SimpleNamespace(**(vars(one) | changes)))
+    asked = []
+
+    def again(request, sample, jobs):
+        asked.append([one.number for one in sample])
+        return [draw(one.number, completed=True, accepted=8) for one in sample]
+
+    monkeypatch.setattr(remedies, "_again", again)
+    told = []
+    found = improve(SimpleNamespace(plan=plan, bench=None), SimpleNamespace(draws=draws), progress=told.append)
+    share = failed / (failed + well)
+    (effect,) = told
+    assert effect.ends_well == (pytest.approx(1.0 - share), 1.0)
+    assert effect.trips == (pytest.approx(share), 0.0)
+    assert effect.points == (pytest.approx(1.0 - 0.6 * share), pytest.approx(0.8))
+    assert effect.draws == len(asked[0]) == min(failed, 24) + min(well, 24)
+    assert found.plan is other

@@ -1,0 +1,57 @@
+"""What stands for a sample that is lost, against the vibration that went on meanwhile."""
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+
+from controller import AmplitudeLaw, preset
+from rig.tick.measure import pass_over
+from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.segments import Segment, SettleRule
+from rig.tick.tick import Tick
+from tests.rig.rigs import bench_with
+
+FORCE, DRIVE = cmath.rect(3.0, 0.7), cmath.rect(20.0, -1.1)
+
+
+@pytest.fixture
+def tick():
+    bench = bench_with()
+    segments = [Segment(SegmentKind.RAMP, -1, 0.5, 2.0), Segment(SegmentKind.HOLD, -1, 0.5, 1000.0)]
+    made = Tick(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), segments, 1.5)
+    vibration = made.arrays.control["vibration"]
+    vibration["force"], vibration["drive"] = FORCE, DRIVE
+    return made
+
+
+def lose(tick, theta):
+    """Lose a sample at this angle of the output; the readings that it leaves."""
+    readings = np.zeros(len(tick.arrays.inputs))
+    pass_over(tick.arrays, readings, math.cos(theta), math.sin(theta))
+    return readings
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.4, 2.0, -1.3])
+def test_force_and_motion_are_those_of_their_fundamentals_at_the_angle_of_the_output(tick, theta):
+    readings = lose(tick, theta)
+    loop = tick.arrays.loop
+    assert loop["force"][0] == pytest.approx(3.0 * math.cos(theta + 0.7), rel=1e-12)
+    assert loop["drive_motion"][0] == pytest.approx(20.0 * math.cos(theta - 1.1), rel=1e-12)
+    assert loop["lost"][0] == 1
+    assert np.isnan(readings).all()
+
+
+def test_the_mean_of_the_force_goes_on_as_if_its_samples_had_come(tick):
+    """To the first order of the low-pass's gain g: a sample away from the mean by F moves it by ``g F``."""
+    arrays = tick.arrays
+    means, gain = arrays.watches["mean"], arrays.law["detector"]["mean_gain"][0]
+    channel = arrays.loop["force_channel"][0]
+    means[channel] = seen = 0.5
+    forces = 3.0 * np.cos(0.01 * np.arange(60))
+    for k, force in enumerate(forces):
+        lose(tick, 0.01 * k - 0.7)
+        seen += gain * (0.5 + force - seen)
+    assert means[channel] == pytest.approx(0.5 + gain * forces.sum(), rel=1e-12)
+    assert means[channel] - 0.5 == pytest.approx(seen - 0.5, rel=60 * gain)
