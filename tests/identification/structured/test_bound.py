@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification import IdentificationError
-from identification.structured.bound import bound_of
-from identification.structured.elements import NonlinearElement
+from identification.structured.bound import _with, bound_of
+from identification.structured.elements import NonlinearElement, Tables
 from identification.structured.laws import Iwan, Jenkins, PolynomialDamper, PolynomialSpring
+from identification.structured.steps import System
 from tests.identification.structured.models import RATE_HZ, beam, multisine
 
 
@@ -75,3 +76,43 @@ def test_far_beyond_the_data_the_largest_response_is_within_ten_of_the_bound():
 def test_a_force_that_is_not_above_zero_is_refused():
     with pytest.raises(IdentificationError, match=r"force_rms_n: is 0, must be finite and above zero"):
         bound_of(beam(), 0.0)
+
+
+def one_mode(stiffness, damper, step_s=0.01, omega=100.0, zeta=0.2):
+    """A mode, and one element whose spring is cubic up to 1 and straight with this slope beyond, with a constant damper."""
+    x = np.linspace(-1.0, 1.0, 201)
+    spring = [stiffness * x**3 / 3.0, stiffness * x**2, stiffness * x**4 / 12.0]
+    tables = Tables(
+        springs=np.array([spring]),
+        dampers=np.full((1, 201), damper),
+        limits=np.array([[1.0, stiffness, stiffness]]),
+        sliders=np.zeros((0, 2)),
+        first=np.zeros(2, int),
+    )
+    one = np.ones((1, 1))
+    return System(step_s, 1, omega * one[0], zeta * one[0], one, 1, one, tables, np.zeros(3))
+
+
+@pytest.mark.parametrize("damper", [0.0, 60.0])
+@pytest.mark.parametrize("stiffness", [3e3, 1e4, 3e4])
+@pytest.mark.parametrize("eps_share", [0.1, 0.5])
+def test_the_energy_after_a_step_is_within_what_the_step_takes(stiffness, damper, eps_share):
+    """``W <= mu S`` without a force, S and W as in the module's text, W with the spring's own force and potential."""
+    omega, c, theta = 100.0, 40.0, 0.5
+    found = _with(one_mode(stiffness, damper), 1.0, eps_share, theta, 0.0)
+    assert found is not None
+    mu, eps, h = (1.0 - theta) / found[1], eps_share * c, 0.01
+    angle, far = np.meshgrid(np.linspace(0.0, np.pi, 721), np.geomspace(0.1, 1e3, 41))
+    mean_v, mean_q = far * omega * np.cos(angle), far * np.sin(angle)
+    beyond = np.abs(mean_q) > 1.0
+    force = np.where(
+        beyond, np.sign(mean_q) * stiffness * (1.0 / 3.0 + np.abs(mean_q) - 1.0), stiffness * mean_q**3 / 3.0
+    )
+    v = mean_v - 0.5 * h * ((c + damper) * mean_v + omega**2 * mean_q + force)
+    q = mean_q + 0.5 * h * mean_v
+    over = np.abs(q) - 1.0
+    potential = np.where(over > 0.0, stiffness * (1.0 / 12.0 + over / 3.0 + 0.5 * over**2), stiffness * q**4 / 12.0)
+    energy = 0.5 * v**2 + 0.5 * omega**2 * q**2 + potential + eps * (q * v + 0.5 * c * q**2)
+    taken = (c - eps - eps * stiffness * h**2 / 12.0) * mean_v**2
+    taken += eps * (omega**2 - 0.25 * eps * damper) * mean_q**2
+    assert np.max(energy / taken) < mu < 10.0 * np.max(energy / taken)

@@ -59,11 +59,16 @@ def test_every_test_has_its_mark_in_the_place_of_its_models_and_the_mean_across_
     assert next(lines, None) is None
 
 
-def test_a_single_error_is_written_beside_its_mark_and_unbounded_runs_are_counted_at_the_top():
-    axis, _ = drawn({"one": table()})
-    texts = {text.get_text(): text for text in axis.texts}
-    assert set(texts) == {"40 %", "2/4 unbounded"}
-    assert texts["40 %"].xy == (1.0, pytest.approx(40.0))
-    assert texts["2/4 unbounded"].get_position() == (2.0, 0.98)
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_single_error_is_written_beside_its_mark_and_unbounded_runs_are_counted_at_the_top(number):
+    axis, _ = drawn({f"variant {k}": table(1.0 + k) for k in range(number)})
+    texts = iter(axis.texts)
+    for k in range(number):
+        aside = (k + 0.5) * 0.8 / number - 0.4
+        error, unbounded = next(texts), next(texts)
+        assert (error.get_text(), unbounded.get_text()) == (f"{40 * (k + 1)} %", "2/4 unbounded")
+        assert error.xy == pytest.approx((1.0 + aside, 40.0 * (k + 1)))
+        assert unbounded.get_position() == pytest.approx((2.0 + aside, 0.98))
+    assert next(texts, None) is None
     assert [tick.get_text() for tick in axis.get_xticklabels()] == list(ERRORS)
     assert axis.get_title() == "trained at low"
