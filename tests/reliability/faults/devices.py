@@ -107,7 +107,7 @@ class EmulatedRig(Watched, WireDAQ):
     wall_clock: ClassVar[bool] = False
 
     def __init__(self, bench: Bench, seed: int, fault: Fault | None, onset: int, needed_v: float) -> None:
-        super().__init__(bench, seed, WireOptions())
+        super().__init__(bench, seed, WireOptions(queue_blocks=1))
         self.fault, self.onset, self.handed = fault, onset, []
         self._was_late = False
         self.wire = MemoryWire()
