@@ -317,3 +317,12 @@ def test_a_period_in_steps(samples: float, steps: int) -> None:
 )
 def test_a_ramp_in_samples(samples: float, length: int) -> None:
     assert ramp_length(samples) == length
+
+
+def test_a_block_without_a_period_ends_the_run_also_for_a_block_that_comes_in_its_place() -> None:
+    device, page = Device(), Page()
+    for one in (device, page):
+        one.keep(0, list(range(20)), 8 << 16)
+        one.keep(20, list(range(10)), 0)
+        one.keep(20, list(range(10)), 8 << 16)
+    assert device.at(30) is page.at(30) is None
