@@ -36,10 +36,10 @@ WIDE = Pulse(100, 120, 142, 100.0)
 """A pulse of 42 samples: what follows it is averaged over 21, from 21 samples after its end on."""
 
 
-def followed_by(further):
-    """What is said of a pulse without noise, and of what follows it."""
+def followed_by(further, noise_n=0.0):
+    """What is said of a pulse, and of what follows it, where the force is known to have this noise."""
     force = np.interp(np.arange(4000.0), [99, 120, 142], [0.0, 100.0, 0.0])
-    return double_hit(force + further, WIDE, (), 0.0, 1e5)
+    return double_hit(force + further, WIDE, (), noise_n, 1e5)
 
 
 def flat(height_n, first, samples=31):
@@ -49,6 +49,11 @@ def flat(height_n, first, samples=31):
 @pytest.mark.parametrize(("height_n", "hit"), [(2.9, False), (3.1, True)])
 def test_a_later_pulse_is_a_hit_from_three_percent_of_the_first_on(height_n, hit):
     assert bool(followed_by(flat(height_n, 600))) is hit
+
+
+@pytest.mark.parametrize(("height_n", "hit"), [(5.1, False), (5.4, True)])
+def test_a_later_pulse_stands_out_of_six_times_the_noise_that_is_left_of_21_samples(height_n, hit):
+    assert bool(followed_by(flat(height_n, 600), 4.0)) is hit  # 6 * 4 N / sqrt(21) = 5.24 N
 
 
 def test_a_later_pulse_is_told_with_its_height_and_its_distance():

@@ -9,7 +9,7 @@ from rig.campaigns.plans import load_plan, plan_from
 from rig.rehearsal import remedies
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
-from rig.rehearsal.remedies import Remedy, _spread, improve, remedies_for
+from rig.rehearsal.remedies import Remedy, _rates, _spread, improve, remedies_for
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
 from tests.rig.rehearsal.plans import SHORT, magnet_beam
 
@@ -109,7 +109,7 @@ def test_few_draws_are_all_in_the_sample(number):
     assert _spread(range(number)) == list(range(number))
 
 
-@pytest.mark.parametrize(("failed", "well"), [(30, 90), (90, 30), (10, 100), (30, 0)])
+@pytest.mark.parametrize(("failed", "well"), [(30, 90), (90, 30), (1, 100), (30, 1), (30, 0)])
 def test_probabilities_of_a_sample_are_those_of_all_draws_that_it_stands_for(monkeypatch, failed, well):
     """Failed draws trip after 4 of 10 points; the remedy lets all complete, so that both ends are known exactly."""
     plan = SimpleNamespace(targets=lambda: range(10))
@@ -135,4 +135,10 @@ def test_probabilities_of_a_sample_are_those_of_all_draws_that_it_stands_for(mon
     assert effect.trips == (pytest.approx(share), 0.0)
     assert effect.points == (pytest.approx(1.0 - 0.6 * share), pytest.approx(0.8))
     assert effect.draws == len(asked[0]) == min(failed, 24) + min(well, 24)
-    assert found.plan is other
+    rise = 0.8 - (1.0 - 0.6 * share) + 2.0 * share  # of the points, less twice the trips
+    assert found.plan is (other if rise > 0.02 else plan)
+
+
+def test_points_beyond_those_asked_for_count_no_more():
+    two = [draw(0, completed=True, accepted=10), draw(1, completed=False, accepted=4)]
+    assert _rates(two, {0: 3.0, 1: 1.0}, 8) == (0.75, 0.0, 0.875)  # (3 * 1 + 1 * 0.5) / 4
