@@ -12,6 +12,7 @@ from rig.conformance import with_loopback
 from rig.daq import LOST, State
 from rig.drivers import make_daq
 from rig.drivers.wire import WireOptions
+from rig.drivers.wire.connection import RoundTrips
 from rig.emulator import Device, Faults, VirtualPlant
 from rig.emulator.parameters import described
 from rig.errors import (
@@ -626,6 +627,27 @@ def test_round_trips_are_measured_before_and_during_the_run() -> None:
             daq.exchange(volts)
         assert daq.statistics["round_trips"] == pytest.approx(before["round_trips"] + 20, abs=2)
         assert daq.statistics["sustainable_rate_hz"] == 5000.0
+
+
+def test_round_trips_are_told_in_microseconds_by_their_percentiles_and_only_the_last_are_kept() -> None:
+    trips = RoundTrips()
+    assert trips.report() == {}
+    for number in range(101):
+        trips.add(1e-6 * (100.0 - number))
+    assert trips.report() == {
+        "round_trip_p50_us": 50.0,
+        "round_trip_p99_us": 99.0,
+        "round_trip_largest_us": 100.0,
+        "round_trips": 101.0,
+    }
+    for _ in range(4096):
+        trips.add(7e-6)
+    assert trips.report() == {
+        "round_trip_p50_us": 7.0,
+        "round_trip_p99_us": 7.0,
+        "round_trip_largest_us": 7.0,
+        "round_trips": 4197.0,
+    }
 
 
 def test_it_says_who_the_device_is() -> None:
