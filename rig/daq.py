@@ -281,7 +281,7 @@ class DAQ(ABC):
         self.flags = np.zeros(block, np.uint16)
         self.put_out = np.full(block, math.nan)
         self.continuation[:] = 0.0
-        self._flags, self._put_out = self.flags, self.put_out
+        self._arrays_made = self.flags, self.put_out
         self._shape = block, len(self.channels)
         self._largest_of = bound(largest_of, np.zeros(block))
         self._driven = False
@@ -317,7 +317,9 @@ class DAQ(ABC):
         finally:
             if self.meanwhile is not None:
                 self.do_meanwhile()
-        if self.flags is not self._flags or self.put_out is not self._put_out:  # the loop's machine code takes them so
+        if not (
+            self.flags is self._arrays_made[0] and self.put_out is self._arrays_made[1]
+        ):  # as machine code has them
             raise DaqError("the driver has replaced `flags` or `put_out`; allowed is to fill what `start` has made")
         self._blocks_of_zero += int(largest == 0.0)
         return inputs

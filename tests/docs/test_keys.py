@@ -50,4 +50,5 @@ def test_what_goes_wrong_on_a_bus_names_every_counter_of_it_and_errors_that_ther
     words = set(re.findall(r"`(\w+)`", table_under("What goes wrong on the bus", page)["table"]))
     errors = {word for word in words if word.startswith("Daq")}
     assert errors <= set(rig_errors.__all__)
-    assert words - errors == {*CanLink(SlcanBus("a port"), 4).counters, "lost_samples", "retries"}
+    of_the_driver = "lost_samples", "retries", "late_blocks", "reordered_blocks"
+    assert words - errors == {*CanLink(SlcanBus("a port"), 4).counters, *of_the_driver}
