@@ -90,7 +90,7 @@ class Adjustable(NamedTuple):
     automatic: bool = False
     """Whether the bench leaves the queue to what is measured before a run (`rig.loop.worker.queue_choice`)."""
     longest_period: int = 0
-    """Longest period of outputs, samples, with which the device goes on where the next come too late; 0: it holds them."""
+    """Longest period, samples, with which the device goes on where outputs come too late; 0 if it holds the last one."""
 
 
 class State(Enum):

@@ -1,8 +1,9 @@
 """Options that all wires share, and the watchdog time that follows from them."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field_validator
+from pydantic_core import PydanticCustomError
 
 from rig.bench.configuration import Configured
 from rig.drivers.wire.facts import DeviceFacts
@@ -28,6 +29,15 @@ class WireOptions(Configured):
     """Duration of the ramp to 0 V after the watchdog has tripped, s; 0 drops the output at once."""
     timeout_s: float | None = Field(None, gt=0, le=MOST_S)
     """Longest wait for a block before the device counts as silent, s; by default 0.25 s, or 10 blocks if longer."""
+
+    @field_validator("queue_blocks", mode="wrap")
+    @classmethod
+    def _number_or_auto(cls, value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+        try:
+            return validate(value)
+        except ValidationError:  # one of each kind, which would be two faults of one key
+            allowed = f"1 to {LARGEST_QUEUE} blocks, or 'auto'"
+            raise PydanticCustomError("allowed", "{allowed}", {"allowed": allowed}) from None
 
     @property
     def queue(self) -> int:

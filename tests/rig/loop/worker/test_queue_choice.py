@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rig.bench.configuration import validated
 from rig.drivers.wire import WireOptions
 from rig.emulator import Faults
-from rig.errors import DaqDisconnected, DaqError
+from rig.errors import ConfigurationError, DaqDisconnected, DaqError
 from rig.loop.recommendation import RESERVE, Timing
 from rig.loop.session import LocalSession
 from rig.loop.worker.queue_choice import QueueChoice, covering_queue, settle_queue, usual_delay_s
@@ -58,6 +59,14 @@ def test_auto_is_the_default():
     assert WireOptions().queue_blocks == "auto"
     assert WireOptions().queue == 1
     assert WireOptions(queue_blocks=5).queue == 5
+
+
+@pytest.mark.parametrize("wrong", ["automatic", 0, 65, 2.5, None, True])
+def test_a_queue_that_is_none_is_one_line_that_says_what_is_allowed(wrong):
+    with pytest.raises(ConfigurationError) as refused:
+        validated(WireOptions, {"queue_blocks": wrong}, "driver.options")
+    told = {"automatic": "'automatic'", None: "None"}.get(wrong, str(wrong))
+    assert str(refused.value) == f"driver.options: queue_blocks = {told}: allowed is 1 to 64 blocks, or 'auto'"
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.005, 0.010])
