@@ -317,9 +317,8 @@ class DAQ(ABC):
         finally:
             if self.meanwhile is not None:
                 self.do_meanwhile()
-        if not (
-            self.flags is self._arrays_made[0] and self.put_out is self._arrays_made[1]
-        ):  # as machine code has them
+        flags, put_out = self._arrays_made  # the loop's machine code takes them as they were made
+        if self.flags is not flags or self.put_out is not put_out:
             raise DaqError("the driver has replaced `flags` or `put_out`; allowed is to fill what `start` has made")
         self._blocks_of_zero += int(largest == 0.0)
         return inputs

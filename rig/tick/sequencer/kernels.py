@@ -243,6 +243,23 @@ def samples_of(segment: Record, samples: int, elapsed: float) -> float:
 
 
 @kernel
+def is_refused_for_faults(
+    progress: Record, segments: np.ndarray, outcomes: np.ndarray, settling: Record, planned: float, over: bool
+) -> bool:
+    """Refuse the present record, of ``planned`` samples, for faults of the device; return whether that ended it.
+
+    With too many of them it is measured again, or its point given up. After a held output it is measured again if it may be.
+    """
+    fault = too_many_faults(progress, planned)
+    if fault == DONE:
+        return bool(step_is_over(progress, over) and measure_again(progress, segments, outcomes, settling, OUTPUT_HELD))
+    if not measure_again(progress, segments, outcomes, settling, fault, True):
+        close_segment(progress, outcomes, settling, fault)
+        skip_point(progress, segments, outcomes, False)
+    return True
+
+
+@kernel
 def advance(
     progress: Record,
     segments: np.ndarray,
@@ -334,13 +351,8 @@ def advance(
         return
     over = samples >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
     if segment.kind == RECORD and progress.held + progress.continued + progress.lost > 0:
-        fault = too_many_faults(progress, samples_of(segment, samples, elapsed))
-        if fault != DONE:
-            if not measure_again(progress, segments, outcomes, settling, fault, True):
-                close_segment(progress, outcomes, settling, fault)
-                skip_point(progress, segments, outcomes, False)
-            return
-        if step_is_over(progress, over) and measure_again(progress, segments, outcomes, settling, OUTPUT_HELD):
+        planned = samples_of(segment, samples, elapsed)
+        if is_refused_for_faults(progress, segments, outcomes, settling, planned, over):
             return
     if segment.kind == HOLD and wants_harmonics(segment, settling, elapsed):
         return
