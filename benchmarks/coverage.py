@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 import rig
@@ -52,8 +51,6 @@ PIECE = 20000
 """Samples that a replay takes at once between points."""
 TRUE_CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m"))
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorials" / "a-rig-of-your-own.md"
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,7 @@ import numpy as np
 
 import rig
 from benchmarks.integrator import kernels as integrator_kernels
-from benchmarks.rk4 import arrays as rk4_arrays
-from benchmarks.rk4 import kernels as rk4_kernels
+from benchmarks.rk4 import arrays as rk4_arrays, kernels as rk4_kernels
 from rig.bench import Bench, load_bench
 from rig.campaigns.plans import load_plan
 from rig.drivers import make_daq

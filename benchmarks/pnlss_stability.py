@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from identification import Channel, Features, PnlssModel, SteadyStates, pnlss_response
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 HZ, DAMPING, RATE_HZ = 25.0, 0.01, 3200.0
 EVERY, SHARE, PERIODS, SETTLED = 4, 1e-6, 60, 300

@@ -14,15 +14,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from identification import StructuredModel, bound_of
 from identification.structured.bound import Bound
 from rig.models.files.files import load
 from rig.models.files.structured import IdentifiedStructured
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 HUNDRED, LEVELS, DECAYS = 100.0, 40, 12.0
 """Largest force over the training level, levels of the bound, and length of a run in time constants of the slowest mode."""

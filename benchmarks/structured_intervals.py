@@ -9,14 +9,12 @@ import argparse
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
 from identification import StructuredModel, fit_structured
 from identification.structured.laws import Jenkins, PolynomialSpring
 from identification.structured.uncertainty import std_of
 from tests.identification.structured import test_elements as truth
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 QUANTITIES = (
     "stiffness of the joint",

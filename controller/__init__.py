@@ -23,42 +23,13 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from controller.amplitude import AmplitudeLaw
-    from controller.detector import Detector
-    from controller.force import ForceLoop
-    from controller.frequency import FrequencyLaw
-    from controller.law import Law, OpenLoop, control_state
-    from controller.lock import LockRule, LockState
-    from controller.pll import PhaseLockedLoop
-    from controller.presets import preset
+    from controller.amplitude import AmplitudeLaw as AmplitudeLaw
+    from controller.detector import Detector as Detector
+    from controller.force import ForceLoop as ForceLoop
+    from controller.frequency import FrequencyLaw as FrequencyLaw
+    from controller.law import Law as Law, OpenLoop as OpenLoop, control_state as control_state
+    from controller.lock import LockRule as LockRule, LockState as LockState
+    from controller.pll import PhaseLockedLoop as PhaseLockedLoop
+    from controller.presets import preset as preset
 else:
-    __getattr__, __dir__ = on_use(
-        __name__,
-        {
-            "AmplitudeLaw": "amplitude",
-            "Detector": "detector",
-            "ForceLoop": "force",
-            "FrequencyLaw": "frequency",
-            "Law": "law",
-            "LockRule": "lock",
-            "LockState": "lock",
-            "OpenLoop": "law",
-            "PhaseLockedLoop": "pll",
-            "control_state": "law",
-            "preset": "presets",
-        },
-    )
-
-__all__ = [
-    "AmplitudeLaw",
-    "Detector",
-    "ForceLoop",
-    "FrequencyLaw",
-    "Law",
-    "LockRule",
-    "LockState",
-    "OpenLoop",
-    "PhaseLockedLoop",
-    "control_state",
-    "preset",
-]
+    __getattr__, __dir__, __all__ = on_use(__name__)

@@ -19,8 +19,6 @@ from controller.through_response import (
 )
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-__all__ = ["AMPLITUDE", "AMPLITUDE_STATE", "AmplitudeLaw", "AmplitudeSettings"]
-
 SMALLEST_PART = 1e-5  # of the largest voltage: where a logarithmic law begins from rest
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
 

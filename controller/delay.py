@@ -12,8 +12,6 @@ not all that should be is.
 
 import math
 
-__all__ = ["LARGEST_TURN_DEG", "highest_crossover_rad_s", "longest_delay_s"]
-
 LARGEST_TURN_DEG = 45.0
 """Largest phase that the delay may take at the highest crossover: half of the margin of a loop that integrates."""
 

@@ -12,8 +12,6 @@ from controller.primitives import size, track, wrap
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-__all__ = ["DETECTOR", "DETECTOR_STATE", "VIBRATION", "Detector", "DetectorSettings"]
-
 
 class Detector(IntEnum):
     """Method that estimates the complex amplitudes of force and response, and the phase error."""

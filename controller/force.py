@@ -11,8 +11,6 @@ from controller.primitives import log_proportional_integral, log_ratio, proporti
 from controller.settings import Settings
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["FORCE_LOOP", "FORCE_LOOP_STATE", "ForceLoop", "ForceSettings"]
-
 
 class ForceLoop(IntEnum):
     """How a force is held."""

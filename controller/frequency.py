@@ -11,8 +11,6 @@ from controller.primitives import proportional_integral
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-__all__ = ["FREQUENCY", "FREQUENCY_STATE", "GAINS", "FrequencyLaw", "FrequencySettings"]
-
 LARGEST_FREQUENCY_ERROR = 0.05  # of the frequency
 
 

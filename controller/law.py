@@ -16,8 +16,6 @@ from controller.rest import REST, REST_STATE, see_rest, take_as_measured
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel
 
-__all__ = ["CONTROL", "LAW", "Law", "OpenLoop", "control_state"]
-
 LAW = np.dtype(
     [
         ("detector", DETECTOR),

@@ -10,8 +10,6 @@ from pydantic import Field, model_validator
 from controller.settings import Settings
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["LOCK", "THRESHOLDS", "LockRule", "LockState"]
-
 
 class LockState(IntEnum):
     """State of the phase lock."""

@@ -4,8 +4,6 @@ import numpy as np
 
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-__all__ = ["PERIOD"]
-
 PERIOD = np.dtype(
     [
         ("sum_error", "f8"),

@@ -14,8 +14,6 @@ from controller.law import LAW, HarmonicsTable
 from controller.lock import LockRule
 from controller.rest import RestSettings
 
-__all__ = ["PhaseLockedLoop"]
-
 
 class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorSettings, AmplitudeSettings):
     """Gains and bounds of the loop; `build` turns them into the record that the kernels read."""

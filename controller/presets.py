@@ -16,8 +16,6 @@ from typing import Literal
 
 from controller.pll import PhaseLockedLoop
 
-__all__ = ["preset"]
-
 _PAPER = {
     # specimen: test -> K1, K2, K3, K4, omega_m (rad/s); a is 2 pi rad/s throughout. Table of the paper's appendix.
     ("magnet-beam", "stepped-phase"): (2.0, 2.0 * math.pi, 1.5, 1.0, 48.0 * math.pi),

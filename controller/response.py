@@ -10,8 +10,6 @@ from controller.primitives import log_proportional_integral, log_ratio, size, wr
 from controller.settings import Settings
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["RESPONSE_LOOP", "RESPONSE_LOOP_STATE", "ResponseSettings"]
-
 PLANT_VARIES = 3.0  # factor by which the plant's gain may be off and is still followed
 
 RESPONSE_LOOP = np.dtype(

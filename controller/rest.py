@@ -10,8 +10,6 @@ from controller.primitives import size, wrap
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel
 
-__all__ = ["REST", "REST_STATE", "RestSettings"]
-
 REST = np.dtype([("gain", "f8"), ("share", "f8"), ("mode_shape_squared", "f8"), ("dt_s", "f8")])
 """Parameters of the estimate (one record).
 

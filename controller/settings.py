@@ -4,8 +4,6 @@ from pydantic import ConfigDict
 
 from vibrolock.described import Described
 
-__all__ = ["Settings"]
-
 
 class Settings(Described):
     """Settings in SI units: validated, frozen, without unknown keys."""

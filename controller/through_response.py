@@ -12,8 +12,6 @@ from controller.primitives import log_ratio
 from controller.settings import Settings
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["REFERENCE", "REFERENCE_STATE", "ThroughResponseSettings"]
-
 SLOPE_FORGETS = 0.5  # rate at which the slope estimate forgets, as a fraction of the loop's integral gain
 STEEPEST = 10.0
 UNMOVED = 1e-7  # square of a logarithmic change (0.03 %) below which the slope estimate tends to 1

@@ -4,16 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["Backbone"]
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

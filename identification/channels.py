@@ -6,18 +6,6 @@ from typing import Literal, get_args
 
 from identification.errors import IdentificationError
 
-__all__ = [
-    "MOTION_ORDER",
-    "MOTION_UNIT",
-    "Channel",
-    "Motion",
-    "Role",
-    "chosen_rows",
-    "find_name",
-    "find_role",
-    "in_newtons",
-]
-
 Role = Literal["force", "drive", "response", "monitor"]
 Motion = Literal["displacement", "velocity", "acceleration"]
 

@@ -10,12 +10,9 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
-__all__ = ["Controlled", "FrequencyResponse", "pack_frequency_responses", "unpack_frequency_responses"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 Controlled = Literal["force", "response", "voltage", "none"]
 
 

@@ -8,16 +8,11 @@ resonance.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role, in_newtons
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
-
-__all__ = ["PeriodicVibration", "wrapped_deg"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 def wrapped_deg(angle_deg: float) -> float:

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 
-__all__ = ["pack", "pack_all", "unpack", "unpack_all"]
-
 Arrays = Mapping[str, NDArray[Any]]
 T = TypeVar("T")
 

@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from identification.errors import IdentificationError
 
-__all__ = ["finite", "finite_array", "one_specimen", "positive", "read_only"]
-
 
 def read_only(values: ArrayLike, dtype: DTypeLike) -> NDArray[Any]:
     """Return a copy of ``values`` as a read-only array."""

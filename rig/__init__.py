@@ -25,22 +25,9 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from rig.api import Run, resume, run
-    from rig.bench import Bench, load_bench
-    from rig.campaigns.plans import load_plan
-    from rig.recording.reader import Recording
+    from rig.api import Run as Run, resume as resume, run as run
+    from rig.bench import Bench as Bench, load_bench as load_bench
+    from rig.campaigns.plans import load_plan as load_plan
+    from rig.recording.reader import Recording as Recording
 else:
-    __getattr__, __dir__ = on_use(
-        __name__,
-        {
-            "Bench": "bench",
-            "Recording": "recording.reader",
-            "Run": "api",
-            "load_bench": "bench",
-            "load_plan": "campaigns.plans",
-            "resume": "api",
-            "run": "api",
-        },
-    )
-
-__all__ = ["Bench", "Recording", "Run", "load_bench", "load_plan", "resume", "run"]
+    __getattr__, __dir__, __all__ = on_use(__name__)

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["Run", "resume", "run"]
-
 
 class Run(Result):
     """A new recording and its measurements. If no output file was given, the recording is deleted together with this object."""

@@ -13,19 +13,6 @@ import numpy as np
 
 from vibrolock.compiled import Record, kernel
 
-__all__ = [
-    "SHORTEST_PERIOD",
-    "SOURCE",
-    "STEPS",
-    "begin",
-    "count_at",
-    "forget",
-    "keep",
-    "period_steps",
-    "ramp_length",
-    "ring_for",
-]
-
 STEPS = 1 << 16
 """Steps of a period in one sample."""
 SHORTEST_PERIOD = 4

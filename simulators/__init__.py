@@ -23,17 +23,8 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from simulators.shipped import shipped_specimens
-    from simulators.simulation import Simulation
-    from simulators.virtual_rig import VirtualRig
+    from simulators.shipped import shipped_specimens as shipped_specimens
+    from simulators.simulation import Simulation as Simulation
+    from simulators.virtual_rig import VirtualRig as VirtualRig
 else:
-    __getattr__, __dir__ = on_use(
-        __name__,
-        {
-            "Simulation": "simulation",
-            "VirtualRig": "virtual_rig",
-            "shipped_specimens": "shipped",
-        },
-    )
-
-__all__ = ["Simulation", "VirtualRig", "shipped_specimens"]
+    __getattr__, __dir__, __all__ = on_use(__name__)

@@ -9,8 +9,6 @@ from pydantic import ConfigDict, Field, model_validator
 from simulators.part import Part, Positive
 from simulators.shipped import GEOMETRY, shaker_values
 
-__all__ = ["Exciter", "Stinger"]
-
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 YOUNGS_MODULUS_PA = {"steel": 200e9, "piano-wire": 190e9, "aluminium": 68.9e9, "nylon": 2.76e9}

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CHANNEL", "CONVERTER", "PLANT", "SITE", "Flag", "RigArrays", "RigState", "SiteKind"]
-
 
 class Flag(IntFlag):
     """Faults of a sample; ``sample`` returns these bits, or-ed."""

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from simulators.plant.assembly import LinearPlant
 
-__all__ = ["LinearModes", "coupled_modes", "structure_modes"]
-
 _FREE = 1e-6
 """Fraction of the highest frequency below which a frequency counts as zero, that of a free motion with rounding errors."""
 

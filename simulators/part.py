@@ -6,8 +6,6 @@ from pydantic import ConfigDict, Field
 
 from vibrolock.described import Described
 
-__all__ = ["Part", "Positive", "Several"]
-
 Item = TypeVar("Item")
 
 Positive = Annotated[float, Field(gt=0.0)]

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrolock.compiled import kernel
-from vibrolock.lanes import WIDTH, load, spread, store
+from vibrolock.lanes import load, spread, store
+from vibrolock.width import WIDTH
 
 
 @kernel

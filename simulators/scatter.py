@@ -16,8 +16,6 @@ from pydantic import Field
 from simulators.part import Part, Several
 from simulators.plant.assembly import LinearPlant
 
-__all__ = ["Deviation", "Scatter", "deviated"]
-
 Relative = Annotated[float, Field(ge=0.0, le=0.3)]
 AboveMinusOne = Annotated[float, Field(gt=-1.0)]
 Drawn = TypeVar("Drawn", bound=Part)

@@ -5,8 +5,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["merged", "shaker_descriptions", "shaker_values", "shipped_specimens", "specimen_table", "with_parts_of"]
-
 
 def shipped_specimens() -> tuple[str, ...]:
     """Return the names of the shipped specimens."""

@@ -11,8 +11,6 @@ from simulators.layout import Flag, RigArrays, RigState
 from simulators.plant.compilation import pad
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["Simulation", "TimeSeries"]
-
 
 @dataclass(frozen=True, eq=False)
 class TimeSeries:

@@ -23,8 +23,6 @@ from simulators.sites.friction import FrictionSite
 from simulators.structures.structure import ModalStructure, Structure
 from simulators.wear import Wear
 
-__all__ = ["VirtualRig"]
-
 _OPEN, _LOOSE_N_M = 1e4, 1e-6
 
 

@@ -15,8 +15,6 @@ from pydantic import Field, model_validator
 from simulators.part import Part, Positive, Several
 from simulators.scatter import Deviation
 
-__all__ = ["Wear"]
-
 Rate = Annotated[float, Field(ge=-1.0, le=1.0)]
 
 

@@ -14,8 +14,6 @@ import pytest
 
 from rig.cli import main
 
-__all__ = ["Ended", "command", "run_command", "signals_as_they_were"]
-
 
 class Ended(NamedTuple):
     """What a command came to."""

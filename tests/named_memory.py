@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-__all__ = ["named_memory"]
-
 # Python's own shared memory and semaphores, and ours. Other programs, and joblib in tests beside this one, come and go.
 NAMES = ("psm_", "sem.mp-", "vibrolock")
 

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["first_those_that_wait", "keep_bytecode", "use_memory_for_files", "workers"]
-
 MEMORY = Path("/dev/shm")
 ENOUGH_BYTES = 6 * 2**30
 """What the files of all tests take, three times over."""

@@ -13,8 +13,6 @@ from pathlib import Path
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["copy_of", "made_once", "shared_folder"]
-
 
 @functools.cache
 def shared_folder() -> Path:

@@ -3,8 +3,6 @@
 import time
 from collections.abc import Callable
 
-__all__ = ["LONG_S", "wait_until"]
-
 LONG_S = 900.0
 """After which a test gives up. No test is about it: a machine with ten busy processes a core comes nowhere near."""
 

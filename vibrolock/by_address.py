@@ -6,8 +6,6 @@ import numpy as np
 
 from vibrolock.compiled import kernel
 
-__all__ = ["call_at", "call_each"]
-
 
 def _call_at(typing: Any, address: Any, s: Any) -> Any:
     """Call a function ``double (*)(double)`` at an address, without Python."""

@@ -26,17 +26,6 @@ from typing import Any, ParamSpec, TypeAlias, TypeVar, cast
 
 import numpy as np
 
-__all__ = [
-    "Record",
-    "bound",
-    "content_digest",
-    "inner_kernel",
-    "kernel",
-    "kernel_cache_folder",
-    "note_use",
-    "unlocked_kernel",
-]
-
 P = ParamSpec("P")
 R = TypeVar("R")
 

@@ -2,7 +2,5 @@
 
 from collections.abc import Callable
 
-__all__ = ["on_compiling"]
-
 on_compiling: list[Callable[[str], None]] = []
 """Called with the name of each kernel that is about to be compiled, for it is not in the cache."""

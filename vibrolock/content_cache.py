@@ -23,8 +23,6 @@ from vibrolock.compiling import on_compiling
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["c_function", "dispatcher", "inner_dispatcher"]
-
 PATIENCE_S = 300.0
 """How long a process waits for another that compiles the same kernel, before it does so itself. The largest take 30 s."""
 

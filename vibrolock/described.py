@@ -9,8 +9,6 @@ from typing import Any
 
 from pydantic import BaseModel, GetJsonSchemaHandler
 
-__all__ = ["Described", "attribute_docstrings"]
-
 
 class Described(BaseModel):
     """A model whose docstring under a field is the field's description in the JSON schema.

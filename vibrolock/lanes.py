@@ -18,8 +18,6 @@ from numba.extending import intrinsic, overload, register_model
 
 from vibrolock.width import WIDTH
 
-__all__ = ["WIDTH", "differ", "greatest", "least", "load", "spread", "store"]
-
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 _INDEX = ir.IntType(32)

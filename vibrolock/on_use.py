@@ -1,12 +1,12 @@
 """Names of a package, and entries of a registry, that are imported on first use: importing the package itself costs nothing."""
 
+import ast
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
+from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, TypeVar
-
-__all__ = ["Registry", "on_use"]
 
 T = TypeVar("T")
 
@@ -31,25 +31,26 @@ class Registry(Mapping[str, T]):
         return name in self._addresses
 
 
-def on_use(package: str, module_of: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` (PEP 562) of a package whose names lie in modules below it.
+def on_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Return ``__getattr__``, ``__dir__`` (PEP 562) and ``__all__`` of a package whose names are imported when they are used.
 
-    ``module_of`` is the module of each name, relative to the package. A package calls it where type checkers do not look, for
-    them a module with ``__getattr__`` has every name::
+    The names are those that the package imports where type checkers look; its source is read for them, so that each stands
+    there once, marked as exported by ``as``::
 
         if TYPE_CHECKING:
-            from controller.law import Law
+            from controller.law import Law as Law
         else:
-            __getattr__, __dir__ = on_use(__name__, {"Law": "law"})
+            __getattr__, __dir__, __all__ = on_use(__name__)
 
     ``help`` of such a package prints its docstring, which is therefore where the names are introduced. `pydoc` finds what it
     prints by `inspect.getmembers`, which would import every name; all classes in full are 8500 lines for ``identification``.
     """
+    module_of = _modules(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
 
     def get(name: str) -> Any:
         if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(f"{package}.{module_of[name]}"), name)
+        value = getattr(import_module(module_of[name]), name)
         setattr(sys.modules[package], name, value)
         return value
 
@@ -58,4 +59,18 @@ def on_use(package: str, module_of: Mapping[str, str]) -> tuple[Callable[[str], 
         for_inspect = sys._getframe(1).f_globals.get("__name__") == "inspect"
         return sorted(own if for_inspect else {*own, *module_of})
 
-    return get, names
+    return get, names, sorted(module_of)
+
+
+def _modules(source: str) -> dict[str, str]:
+    """Return the module of each name that a package imports under ``if TYPE_CHECKING``."""
+    for statement in ast.parse(source).body:
+        match statement:
+            case ast.If(test=ast.Name(id="TYPE_CHECKING"), body=imports):
+                return {
+                    name.name: str(line.module)
+                    for line in imports
+                    if isinstance(line, ast.ImportFrom)
+                    for name in line.names
+                }
+    return {}

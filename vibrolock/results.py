@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Result"]
-
 _FIGURES, _TABLES = "rig.figures", "rig.show"
 """Packages that draw and tabulate; imported by name on use, so that the libraries do not depend on the bench."""
 

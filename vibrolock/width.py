@@ -1,5 +1,3 @@
 """How many numbers a vector of `vibrolock.lanes` has, for those who lay out arrays and call no kernel."""
 
-__all__ = ["WIDTH"]
-
 WIDTH = 8

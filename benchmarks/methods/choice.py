@@ -5,8 +5,6 @@ import statistics
 from collections.abc import Callable, Sequence
 from typing import Any
 
-__all__ = ["DAMPING_WITHIN", "FREQUENCY_WITHIN", "cheapest", "meets", "together"]
-
 FREQUENCY_WITHIN, DAMPING_WITHIN = 2e-4, 0.02
 """Bounds of the errors of a backbone: of every level, relative."""
 FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0)

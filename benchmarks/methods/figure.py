@@ -9,8 +9,6 @@ from benchmarks.methods.rigs import RIGS
 from rig.drawing.page import grid, legend_below, page_for
 from rig.drawing.style import COLOURS, MARKERS, REJECTED, title
 
-__all__ = ["draw"]
-
 
 def draw(runs: Runs, file: Path) -> None:
     """Draw all whole backbones under the noise as shipped. Filled: the exciter's force; open: a sinusoidal one."""

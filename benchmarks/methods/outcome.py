@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import rig
 from benchmarks.methods.plans import plan_of
@@ -15,10 +14,8 @@ from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.evaluation.vibrations import channels_from, vibration_from
 from rig.errors import RigError
 from simulators.analysis import NotConvergedError
+from vibrolock.arrays import Float
 
-__all__ = ["Measured", "Outcome", "carried_out", "covered", "driven", "turns"]
-
-Real = NDArray[np.float64]
 UNKNOWN = math.nan
 
 
@@ -26,11 +23,11 @@ UNKNOWN = math.nan
 class Measured:
     """A backbone as measured, one entry a level; standard errors are NaN where the method states none."""
 
-    amplitude_m: Real
-    frequency_hz: Real
-    damping_ratio: Real
-    frequency_std_hz: Real
-    damping_std: Real
+    amplitude_m: Float
+    frequency_hz: Float
+    damping_ratio: Float
+    frequency_std_hz: Float
+    damping_std: Float
 
 
 @dataclass(frozen=True)
@@ -68,18 +65,18 @@ class Outcome:
         return asdict(self)
 
 
-def turns(theta_rad: Real) -> float:
+def turns(theta_rad: Float) -> float:
     """Return the periods that an oscillator phase, wrapped to a period, passes through."""
     return float(np.sum(np.mod(np.diff(theta_rad), 2.0 * np.pi)) / (2.0 * np.pi)) if theta_rad.size else 0.0
 
 
-def driven(output_v: Real) -> slice:
+def driven(output_v: Float) -> slice:
     """Return the rows from the first driven sample to the last, with those at 0 V between them."""
     on = np.flatnonzero(output_v)
     return slice(int(on[0]), int(on[-1]) + 1) if on.size else slice(0, 0)
 
 
-def covered(errors: Real, stds: Real) -> list[bool]:
+def covered(errors: Float, stds: Float) -> list[bool]:
     """Return whether 1.96 standard errors hold each error; nothing where none is stated."""
     return [bool(abs(e) <= 1.96 * s) for e, s in zip(errors, stds, strict=True) if math.isfinite(s)]
 

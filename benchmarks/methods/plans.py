@@ -17,8 +17,6 @@ from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
 from rig.tuning import TuningRequest, tune
 
-__all__ = ["METHODS", "Method", "plan_of", "tuned", "usual_knob"]
-
 Table = dict[str, Any]
 
 

@@ -11,8 +11,6 @@ from benchmarks.methods.outcome import carried_out
 from benchmarks.methods.plans import METHODS, usual_knob
 from benchmarks.methods.rigs import CONDITIONS, RIGS
 
-__all__ = ["Runs", "cells", "race"]
-
 Row = dict[str, Any]
 Cell = tuple[str, str, bool, str]
 """Rig, method, whether the force is pure, condition."""

@@ -4,17 +4,13 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from rig.bench import Bench, load_bench
 from rig.drivers.virtual.driver import VirtualDAQ
 from simulators.analysis import phase_resonance_backbone
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["CONDITIONS", "CONTROLLED", "RIGS", "SHIPPED", "bench_of", "levels_of", "truth_at"]
-
-Real = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 SHIPPED = ("magnet-beam", "magnet-beam-symmetric", "friction-beam")
 RIGS = (*SHIPPED, "cubic-beam", "stop-beam", "joint-beam")
@@ -124,7 +120,7 @@ def _virtual(rig: str) -> VirtualRig:
     return VirtualDAQ(bench_of(rig)).rig
 
 
-def truth_at(rig: str, pure: bool, amplitudes_m: Real) -> tuple[Real, Real]:
+def truth_at(rig: str, pure: bool, amplitudes_m: Float) -> tuple[Float, Float]:
     """Return modal frequency (Hz) and damping ratio at amplitudes, by harmonic balance of the unworn coupled rig.
 
     ``pure``: harmonics 2 to 7 of the force are zero; else the voltage is a sine. Raises `NotConvergedError`.
@@ -142,14 +138,14 @@ def truth_at(rig: str, pure: bool, amplitudes_m: Real) -> tuple[Real, Real]:
 
 
 @cache
-def _near_levels(rig: str, pure: bool) -> tuple[Real, Real, Real]:
+def _near_levels(rig: str, pure: bool) -> tuple[Float, Float, Float]:
     """Return the truth at and closely around the levels, between which interpolation costs nothing."""
     levels = np.array(levels_of(rig, pure)[1])
     grid = np.sort(np.outer(levels, np.exp(NEAR)).ravel())
     return grid, *_balanced(rig, pure, grid)
 
 
-def _balanced(rig: str, pure: bool, rising_m: Real) -> tuple[Real, Real]:
+def _balanced(rig: str, pure: bool, rising_m: Float) -> tuple[Float, Float]:
     found = phase_resonance_backbone(_virtual(rig), amplitudes_m=rising_m, force_harmonics=CONTROLLED if pure else None)
     return found.modal_frequency_hz, found.damping_ratio
 

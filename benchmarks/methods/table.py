@@ -10,8 +10,6 @@ from benchmarks.methods.plans import METHODS, usual_knob
 from benchmarks.methods.race import Cell, Runs, cells
 from benchmarks.methods.rigs import CONDITIONS, RIGS
 
-__all__ = ["needed", "put", "tables"]
-
 Row = dict[str, Any]
 BEGIN, END = "<!-- race: begin -->", "<!-- race: end -->"
 

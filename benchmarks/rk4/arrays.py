@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from simulators.plant.compilation import aligned, pad
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["Rk4Arrays", "Rk4State", "build"]
-
 
 class Rk4Arrays(NamedTuple):
     """The continuous plant: ``derivative`` [n_input, n_row] maps ``[x, u, f]`` to the rates of the rows of a rig."""

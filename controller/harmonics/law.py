@@ -9,8 +9,6 @@ from controller.harmonics.records import CONTROLLING
 from controller.primitives import size
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-__all__ = ["drive_harmonics", "harmonics_at", "measure_harmonics", "want_harmonics"]
-
 FULL = 1.0 - 1e-9  # of the largest voltage: above it harmonics are held back
 LEFT_ALONE = 0.5  # of the smallest amplitude: an error below it moves nothing
 

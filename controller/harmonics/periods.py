@@ -7,8 +7,6 @@ from controller.harmonics.records import CONTROLLING, LISTENING, PROBING, WAITIN
 from controller.primitives import size
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["end_harmonics_period", "left_alone"]
-
 NOISY = 1.0  # times its scatter: judged error that noise may cause; about four of its standard errors
 QUIET = 10.0  # times the smallest mean square of late: more scatter is no noise
 LEAK = 1.01  # by which that smallest grows in a period

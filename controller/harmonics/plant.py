@@ -6,8 +6,6 @@ from controller.harmonics.records import CONTROLLING, LISTENING, PROBING, WAITIN
 from controller.primitives import size
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["begin_to_control", "knows_plant", "measure_plant"]
-
 WAIT_PERIODS = 6  # for filter and exciter after the step
 MOST_UNSTEADY = 8  # periods in a row, at a lock, that do not end the measurement of the plant
 MEAN_PERIODS = 4  # of the averages before and under the step

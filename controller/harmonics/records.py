@@ -6,8 +6,6 @@ import numpy as np
 
 from controller.adaptive_filter import MOST_HARMONICS
 
-__all__ = ["HARMONICS", "HARMONICS_STATE", "ORDERS", "HarmonicStage"]
-
 ORDERS = (MOST_HARMONICS + 1,)
 
 

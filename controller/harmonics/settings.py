@@ -12,8 +12,6 @@ from controller.adaptive_filter import MOST_HARMONICS
 from controller.harmonics.records import HARMONICS, ORDERS
 from controller.settings import Settings
 
-__all__ = ["HarmonicsSettings", "check_wanted", "harmonic_ratios"]
-
 LARGEST_WANTED = 10.0
 SMALLEST_MARGIN_DEG = 35.0
 HIGHEST_TURN = 0.8 * math.pi  # of the highest harmonic from sample to sample

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.tuning.exact import exact_phase_law, frequencies_for
 from controller.tuning.hippold import hippold_gains
@@ -14,11 +13,8 @@ from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
 from controller.tuning.stability import Margins, closed_loop_poles, margins, unstable_poles
 from controller.tuning.steps import settling_s, step_response
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["Design", "Settling", "Steps", "assess", "design_phase_law", "worst"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 LEVEL_STEP = 0.3  # relative step, about that of a backbone with ten levels over a decade
 POOR_SENSITIVITY = 3.0
 POOR_FIT = 0.1
@@ -28,15 +24,15 @@ POOR_FIT = 0.1
 class Steps:
     """Step responses of the demodulated quantities, one entry per instant."""
 
-    time_s: Real
+    time_s: Float
     """Instants [n]."""
-    lag_after_target: Real
+    lag_after_target: Float
     """Lag after a unit step of the wanted lag [n]."""
-    lag_after_frequency_rad: Real
+    lag_after_frequency_rad: Float
     """Lag after the rig's frequencies have shifted by D w_0, half the bandwidth [n]; 45 deg without a frequency law."""
-    log_response_after_level: Real
+    log_response_after_level: Float
     """ln|A| after a unit step of the logarithm of the level [n]."""
-    lag_after_level_rad: Real
+    lag_after_level_rad: Float
     """Lag after a unit step of the logarithm of the level [n]."""
 
 
@@ -79,7 +75,7 @@ class Design:
     """Which design was chosen, and why."""
     reasons: tuple[str, ...]
     """Reasons why the gains are not fit for use; empty if they are fit."""
-    omega_rad_s: Real
+    omega_rad_s: Float
     """Modulation frequencies [n] (rad/s)."""
     frequency_loop_gain: Complex
     """Loop gain L of the frequency law at i omega [n]."""
@@ -171,7 +167,7 @@ def _steps(loop: ControlLoop, end_s: float) -> Steps:
     return Steps(time, target, half_bandwidth * shifted, response, lag)
 
 
-def _step(loop: ControlLoop, transfer: Callable[[Complex], Complex], end_s: float) -> tuple[Real, Real]:
+def _step(loop: ControlLoop, transfer: Callable[[Complex], Complex], end_s: float) -> tuple[Float, Float]:
     """Return a step response without content above half the frequency, where the fitted plant does not represent the rig."""
     return step_response(transfer, end_s, highest_rad_s=0.5 * loop.omega_rad_s)
 

@@ -5,16 +5,11 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.tuning.laws import ComplexResponseLaw, FrequencyErrorLaw, LinearAmplitudeLaw, PhaseLaw
 from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
-
-__all__ = ["complex_response_law", "exact_phase_law", "exact_scheduled_law", "frequency_error_law"]
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 def exact_phase_law(
@@ -77,7 +72,7 @@ def complex_response_law(
     return ComplexResponseLaw(gain / -pole, gain, force_share * low_pass_rad_s, smoothing_rad_s)
 
 
-def frequencies_for(plant: PlantModel, n: int = 1500) -> Real:
+def frequencies_for(plant: PlantModel, n: int = 1500) -> Float:
     """Return modulation frequencies [n] (rad/s) from 1e-4 to 0.5 times the mode's frequency, spaced geometrically."""
     return np.geomspace(1e-4, 0.5, n) * plant.frequency_rad_s
 

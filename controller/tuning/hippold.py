@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from controller.tuning.laws import PhaseLaw
 from controller.tuning.plant import PlantModel
 
-__all__ = ["HippoldGains", "hippold_gains"]
-
 DETUNED = 0.5  # fraction of the coupled pole's decay; a larger |w_p - w_0| counts as far
 REACTIVE_DEG = 20.0  # largest phase between voltage and force of an exciter that counts as phase neutral
 

@@ -10,26 +10,11 @@ from dataclasses import dataclass
 from typing import ClassVar, assert_never
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.amplitude import AmplitudeLaw
 from controller.pll import PhaseLockedLoop
 from controller.tuning.plant import PlantModel
-
-__all__ = [
-    "ComplexResponseLaw",
-    "ForceLaw",
-    "FrequencyErrorLaw",
-    "LinearAmplitudeLaw",
-    "LinearFrequencyLaw",
-    "LogForceLaw",
-    "LogResponseLaw",
-    "PhaseLaw",
-    "linear_amplitude_law",
-    "linear_frequency_law",
-]
-
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from controller.amplitude import AmplitudeLaw
 from controller.pll import PhaseLockedLoop
@@ -32,10 +32,7 @@ from controller.tuning.laws import (
     linear_frequency_law,
 )
 from controller.tuning.plant import PlantModel
-
-__all__ = ["ControlLoop", "SlowChanges", "control_loop", "lag_per_frequency", "slow_changes"]
-
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex
 
 
 def envelope(response: Callable[[Complex], Complex], s: Complex, omega: float) -> tuple[Complex, Complex]:

@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-__all__ = ["LowPassChoice", "low_pass_from_densities", "low_pass_from_noise"]
+from vibrolock.arrays import Float
 
-Real = NDArray[np.float64]
 HIGHEST, LOWEST = 1.0 / 5.0, 1.0 / 20.0  # of the frequency: above, it does not average a period; below, it is too slow
 
 
@@ -79,7 +78,7 @@ def low_pass_from_noise(
     )
 
 
-def _density(signal: Real, basis: Real, omega: float, sample_rate_hz: float) -> tuple[float, float]:
+def _density(signal: Float, basis: Float, omega: float, sample_rate_hz: float) -> tuple[float, float]:
     """Return the mean one-sided noise density around omega (unit^2/Hz), and the amplitude of the fundamental."""
     coefficients, *_ = np.linalg.lstsq(basis, signal, rcond=None)
     window = np.hanning(signal.size)

@@ -18,11 +18,10 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-__all__ = ["PlantModel"]
+from vibrolock.arrays import Complex
 
-Complex = NDArray[np.complex128]
 STANDARD_ERRORS = ("frequency_std_rad_s", "damping_ratio_std", "drive_shape_std", "force_v_n_std")
 
 

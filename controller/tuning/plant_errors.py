@@ -10,15 +10,11 @@ line; where it varies slowly over the band, the errors are larger. The fits to s
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["parameter_covariance"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 
-def parameter_covariance(jacobian: Real, residuals: Real, weights: Real, covariance: Complex | None) -> Real:
+def parameter_covariance(jacobian: Float, residuals: Float, weights: Float, covariance: Complex | None) -> Float:
     """Return the covariance of the parameters' errors, float[p, p]; infinite if the lines do not determine them.
 
     ``residuals`` float[4 n + m] are the weighted errors of n lines, real parts of both responses, then imaginary parts, and
@@ -48,7 +44,7 @@ def parameter_covariance(jacobian: Real, residuals: Real, weights: Real, covaria
     return np.asarray(spread * max(1.0, misfit))
 
 
-def _real_covariance(covariance: Complex) -> Real:
+def _real_covariance(covariance: Complex) -> Float:
     """float[4, 4, n]: covariance of real and imaginary parts of circular errors with complex covariance [2, 2, n]."""
     real, imaginary = 0.5 * covariance.real, 0.5 * covariance.imag
     above = [np.concatenate([real[row], -imaginary[row]]) for row in range(2)]
@@ -56,6 +52,6 @@ def _real_covariance(covariance: Complex) -> Real:
     return np.stack([*above, *below])
 
 
-def _quadratic(rows: Real, noise: Real) -> Real:
+def _quadratic(rows: Float, noise: Float) -> Float:
     """float[p, p]: covariance of linear combinations ``rows`` float[p, 4, n] of errors with ``noise`` float[4, 4, n]."""
     return np.asarray(np.einsum("pin,ijn,qjn->pq", rows, noise, rows, optimize=True))

@@ -4,14 +4,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from controller.tuning.plant_errors import parameter_covariance
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["fitted"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 NO_RESONANCE = "force_per_v, acceleration_per_v: their ratio shows no damped resonance inside the band"
 UNRESOLVED = 3.0  # lines: width of a resonance below which its damping cannot be told from noise
 NARROWEST = 0.2  # of the spacing of the lines: width from which the fit begins then
@@ -66,19 +63,19 @@ def fitted(
     errors = _checked_covariance(covariance, frequency.size)
     centre, start = _start(s, h_f, h_a)
 
-    def residuals(x: Real) -> Real:
+    def residuals(x: Float) -> Float:
         model_f, model_a = _model(x, s, centre)
         error = np.concatenate([(model_f - h_f) * weight_f, (model_a - h_a) * weight_a])
         return np.concatenate([error.real, error.imag, prior(x)])
 
     least_mass = 1e-3 * float(np.max(np.abs(start[9:])))
 
-    def prior(x: Real) -> Real:
+    def prior(x: Float) -> Float:
         if exciter_prior is None:
             return np.zeros(0)
         return np.asarray(x[[9, 12]] / (exciter_prior * max(abs(x[11]), least_mass)))
 
-    def jacobian_of(x: Real) -> Real:
+    def jacobian_of(x: Float) -> Float:
         of_f, of_a = _derivatives(x, s, centre)
         error = np.concatenate([of_f * weight_f, of_a * weight_a], axis=1)
         of_prior = np.zeros((x.size, 0))
@@ -128,7 +125,7 @@ def fitted(
     }
 
 
-def _alpha_std(coefficients: Real, covariance: Real, z: float) -> float:
+def _alpha_std(coefficients: Float, covariance: Float, z: float) -> float:
     """Standard error of ``|alpha|`` at ``s = i z`` (relative to the centre), from the covariance [4, 4] of its coefficients.
 
     If the lines do not determine alpha at all, this is `UNDETERMINED` times alpha: nothing may be concluded from it.
@@ -146,7 +143,7 @@ def _finite(std: float) -> float | None:
     return std if math.isfinite(std) else None
 
 
-def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike) -> tuple[Real, Complex, Complex]:
+def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike) -> tuple[Float, Complex, Complex]:
     frequency = np.asarray(frequency_hz, float)
     h_f, h_a = np.asarray(force, np.complex128), np.asarray(acceleration, np.complex128)
     if frequency.ndim != 1 or h_f.shape != frequency.shape or h_a.shape != frequency.shape:
@@ -176,7 +173,7 @@ def _rms(values: Complex) -> float:
     return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
-def _model(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
+def _model(x: Float, s: Complex, centre: float) -> tuple[Complex, Complex]:
     z = s / centre
     w = math.exp(x[0])
     accelerance = math.exp(x[2]) * z**2 / (z**2 + 2.0 * math.exp(x[1]) * w * z + w**2) + x[3] + x[4] * z**2
@@ -186,7 +183,7 @@ def _model(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
     return force, accelerance * force
 
 
-def _derivatives(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
+def _derivatives(x: Float, s: Complex, centre: float) -> tuple[Complex, Complex]:
     """Return the derivatives of `_model` by each parameter, complex[13, n] each."""
     z = s / centre
     w, damped = math.exp(x[0]), 2.0 * math.exp(x[1] + x[0]) * z
@@ -211,7 +208,7 @@ def _derivatives(x: Real, s: Complex, centre: float) -> tuple[Complex, Complex]:
     return of_force, of_accelerance * force + accelerance * of_force
 
 
-def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
+def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Float]:
     """Return the scaling frequency (rad/s), and start values of log w, log D, log phi_d^2, residuals, alpha, beta."""
     y = h_a / h_f
     centre = float(np.abs(s[np.argmax(np.abs(y))]))
@@ -243,7 +240,7 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Real]:
     return centre, np.concatenate([mode, exciter])
 
 
-def _light(start: Real) -> Real:
+def _light(start: Float) -> Float:
     """Return start values of the same responses whose exciter has neither spring nor jerk term.
 
     The prior is relative to the moving mass. From a spring and a mass that together tune an attached mass to the mode, a fit
@@ -258,7 +255,7 @@ def _light(start: Real) -> Real:
     return out
 
 
-def _real_least_squares(columns: Complex, target: Complex) -> Real:
+def _real_least_squares(columns: Complex, target: Complex) -> Float:
     """Return the real least-squares solution x of the complex equations ``columns x = target``; columns are normalised."""
     left, right = np.vstack([columns.real, columns.imag]), np.concatenate([target.real, target.imag])
     scale = np.linalg.norm(left, axis=0)

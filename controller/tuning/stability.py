@@ -11,25 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.tuning.laws import ComplexResponseLaw
 from controller.tuning.loop import ControlLoop, SlowChanges, slow_changes
 from controller.tuning.plant import PlantModel
+from vibrolock.arrays import Complex, Float
 
-__all__ = [
-    "LARGEST_AT_HALF",
-    "Margins",
-    "changes_of_hardening",
-    "closed_loop_poles",
-    "gains_at_half",
-    "hardening_margins",
-    "margins",
-    "unstable_poles",
-]
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 REACH = 0.8  # of W: radius within which poles are searched
 HALF = 0.5  # of W: changes within two periods, the fastest that an average over one period can follow
 LARGEST_AT_HALF = 2.2
@@ -85,7 +72,7 @@ def hardening_margins(loop: ControlLoop, known: SlowChanges | None = None) -> tu
     return _first_slope(-real), _first_slope(real)
 
 
-def _first_slope(real: Real) -> float:
+def _first_slope(real: Float) -> float:
     """Return the smallest kappa above 0 for which kappa times one of the values is 1; infinite if there is none."""
     most = float(np.max(real, initial=0.0))
     return 1.0 / most if most > 0.0 else math.inf
@@ -186,7 +173,7 @@ def _distinct(found: Complex, known: Complex, apart: float) -> Complex:
     return np.array(sorted(out, key=lambda pole: (abs(pole), pole.imag)), np.complex128)
 
 
-def margins(omega: Real, loop_gain: Complex) -> Margins:
+def margins(omega: Float, loop_gain: Complex) -> Margins:
     """Return the margins of a stable loop from L(i omega) [n] at rising frequencies; of both signs if L is complex."""
     sensitivity = 1.0 / np.abs(1.0 + loop_gain)
     size, angle = np.abs(loop_gain), np.angle(-loop_gain)

@@ -4,17 +4,13 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["settling_s", "step_response"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 
 def step_response(
     transfer: Callable[[Complex], Complex], end_s: float, n: int = 2048, *, highest_rad_s: float = math.inf
-) -> tuple[Real, Real]:
+) -> tuple[Float, Float]:
     """Return times [n] up to ``end_s`` and the response of a stable transfer function to a unit step.
 
     The Laplace transform is inverted along a vertical line, as a Fourier series of period ``4 end_s`` (Dubner and Abate,
@@ -35,7 +31,7 @@ def step_response(
     return time, np.asarray(damped * (fine / period) * np.exp(shift * time), np.float64)
 
 
-def settling_s(time_s: Real, error: Real, within: float) -> float:
+def settling_s(time_s: Float, error: Float, within: float) -> float:
     """Return the time (s) after which ``|error|`` stays within a bound; infinite if it does not."""
     outside = np.flatnonzero(np.abs(error) > within)
     if outside.size == 0:

@@ -3,17 +3,14 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.continuation.newton import solved
 from identification.continuation.path import Ending, Path, Steps, System
 from identification.continuation.walk import Point, Walk
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
-
-__all__ = ["continued"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def continued(

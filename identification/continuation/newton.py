@@ -1,13 +1,10 @@
 """Newton's method at a fixed parameter, and the linear equations that every step solves."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.continuation.path import Steps, System
-
-__all__ = ["evaluated", "solution", "solved", "tangent_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def solved(

@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import positive
+from vibrolock.arrays import Float
 
-__all__ = ["Ending", "Path", "Steps", "System"]
-
-Float = NDArray[np.float64]
 System = Callable[[Float, float], tuple[Float, Float, Float]]
 """``F(z, p)`` float[n] with its derivatives float[n, n] with respect to z and float[n] with respect to p."""
 Ending = Literal["range", "size", "closed", "points", "step", "stopped"]

@@ -3,15 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.continuation.newton import evaluated, solution, solved, tangent_of
 from identification.continuation.path import Steps, System
 from identification.errors import IdentificationError
-
-__all__ = ["Point", "Walk"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _GROWTH = 1.5
 _EASY = 3

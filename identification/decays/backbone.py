@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.channels import MOTION_ORDER, Channel
 from identification.decays.demodulation import Demodulated, demodulated, noise_variance, windowed
@@ -21,11 +21,7 @@ from identification.decays.with_force import decay_with_force
 from identification.errors import IdentificationError
 from identification.slow_flows.slow_flow import slow_flow
 from identification.validation import finite_array, positive
-
-__all__ = ["decay_backbone"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _MIN_SAMPLES_PER_PERIOD = 8.0
 _FEWEST_INSTANTS = 20

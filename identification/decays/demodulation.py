@@ -9,12 +9,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["REACH_PERIODS", "Demodulated", "demodulated", "leak", "noise_variance", "window_correlation", "windowed"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 POINTS_PER_WINDOW = 2
 """Instants per P periods."""

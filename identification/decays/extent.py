@@ -3,14 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.decays.demodulation import POINTS_PER_WINDOW
 from identification.errors import IdentificationError
-
-__all__ = ["FLOOR", "beginning_s", "fallen", "reached_floor"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 FLOOR = 4.0
 """Amplitude over the RMS of the noise in it at which a decay ends; below, its logarithm is no longer unbiased."""

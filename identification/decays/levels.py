@@ -9,15 +9,10 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.decays.local_fits import Rates, Series, rates_at
 from identification.errors import IdentificationError
-
-__all__ = ["LevelFits", "fitted_levels"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _HALF_WIDTHS = (0.12, 0.2, 0.32, 0.5, 0.75, 1.1)  # in ln(amplitude)
 _NEIGHBOURS = 2

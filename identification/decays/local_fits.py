@@ -14,14 +14,9 @@ the phase theta of the demodulation; this is subtracted.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.decays.demodulation import Demodulated, window_correlation
-
-__all__ = ["Rates", "Series", "rates_at"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 DEGREE, HIGHER_DEGREE = 3, 5
 _LEAST_SPAN = 3.0  # in units of P periods

@@ -10,12 +10,8 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["DecayBackbone", "DecayMode"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _TABLE = (
     *("amplitude_m", "time_s", "frequency_hz", "modal_frequency_hz", "modal_frequency_std_hz"),

@@ -4,16 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.decays.demodulation import demodulated, leak, noise_variance
 from identification.decays.extent import FLOOR
 from identification.decays.tracks import Ridge, Track, found_frequencies, improved, ridge
 from identification.errors import IdentificationError
-
-__all__ = ["Candidate", "separated"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _NAMED_WITHIN = 0.25
 _HIGHEST_HARMONIC, _MOST_MODES = 9, 6

@@ -12,12 +12,7 @@ from numpy.typing import NDArray
 from identification.decays.demodulation import demodulated, noise_variance
 from identification.decays.extent import FLOOR
 from identification.errors import IdentificationError
-
-__all__ = ["Ridge", "Track", "found_frequencies", "improved", "ridge"]
-
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Bool, Float
 
 _WINDOWS = (8, 16, 32, 64)  # periods
 _FEWEST_PERIODS = 4.0

@@ -21,11 +21,7 @@ from identification.errors import IdentificationError
 from identification.slow_flows.continuous import fit_around
 from identification.slow_flows.fits import noise_variances
 from identification.slow_flows.slow_flow import SlowFlow
-
-__all__ = ["decay_with_force"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _HALF_WIDTHS = (0.35, 0.5, 0.8, 1.2)  # in ln(amplitude)
 _DEGREE, _HIGHER_DEGREE = 1, 2

@@ -4,17 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel, find_role
 from identification.errors import IdentificationError
 from identification.hammer.faults import double_hit, overloaded
 from identification.hammer.hits import Pulse, found_pulses, noise_rms
 from identification.hammer.result import Hit
-
-__all__ = ["Block", "blocks_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _APART_S = 0.25
 """Hits that follow within this time are bounces of one: nobody hits twice on purpose as quickly."""

@@ -4,14 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.hammer.hits import Pulse, noise_rms
-
-__all__ = ["double_hit", "overloaded"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _SECOND = 0.03
 """Least height of a second pulse, relative to the first."""

@@ -18,11 +18,7 @@ from identification.hammer.result import HammerTest
 from identification.hammer.windows import decay_rate, exponential_window, force_window
 from identification.multisine.estimators import Estimator, estimated_responses
 from identification.validation import finite_array, positive
-
-__all__ = ["hammer_test"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _WEAKEST = 0.1
 """The band ends where the force's spectrum falls below this share of its largest line (20 dB)."""

@@ -8,13 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-
-__all__ = ["Pulse", "found_pulses", "noise_rms"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _NOISE = 8.0
 """Least height of a pulse, in standard deviations of the noise."""

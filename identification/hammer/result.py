@@ -11,11 +11,8 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.validation import finite_array
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["HammerTest", "Hit"]
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

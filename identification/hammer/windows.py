@@ -7,13 +7,9 @@ away at the end: ``L{exp(-a t) y}(i w) = Y(a + i w)``. A model that is evaluated
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.hammer.hits import Pulse
-
-__all__ = ["decay_rate", "exponential_window", "force_window"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _BEFORE, _AFTER = 1.0, 4.0
 """Length of the force window before and after the pulse, in widths of the pulse; a filter's ringing belongs to the pulse."""

@@ -9,26 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
+from vibrolock.arrays import Complex, Float
 
-__all__ = [
-    "WeightedResponses",
-    "Weighting",
-    "first_weighting",
-    "known_covariance",
-    "motion_factors",
-    "pooled",
-    "relative_weights",
-    "weighted_accelerance",
-    "weighted_responses",
-]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 Weighting = Literal["auto", "total", "noise", "relative"]
 
 _NEIGHBOURS = 4

@@ -14,16 +14,11 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
-
-__all__ = ["Regression", "auto_regression", "regressed_responses"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _LARGEST_ORDER = 80
 _COLUMNS = 160

@@ -20,16 +20,11 @@ is the most likely force, given the model and the data. Using F instead of F_0 w
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.linear.accelerance import WeightedResponses, Weighting, known_covariance, motion_factors, pooled
 from identification.linear.response_matrix import FrequencyResponseMatrix
-
-__all__ = ["DrivenResponses", "driven_responses", "is_driven", "over_force"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _LOCAL = 4
 """Lines on either side that the first guess of the responses averages; the first guess determines only the weights."""

@@ -12,15 +12,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes, mac_matrix
 from identification.validation import one_specimen
-
-__all__ = ["extrapolated_to_zero"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _SAME_HZ = 0.03
 _SAME_MAC = 0.8

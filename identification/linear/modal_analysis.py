@@ -22,14 +22,10 @@ from identification.linear.model_errors import (
 from identification.linear.modes import LinearModes
 from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.linear.stabilisation import StabilisationDiagram
-from identification.linear.stabilisation import diagram as stability
+from identification.linear.stabilisation import StabilisationDiagram, diagram as stability
 from identification.linear.starts import poles_of, searched, start_of
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["ModalAnalysis", "linear_modes"]
-
-Float = NDArray[np.float64]
 
 _NEEDED = 2.0
 """A pole must be a mode if the misfit without it grows by this factor, whatever number of modes was requested."""

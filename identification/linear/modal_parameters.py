@@ -1,18 +1,13 @@
 """Convert the parameters of a fit to modes: normalisation by the drive-point residue, standard errors, rejections, notes."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.linear.accelerance import WeightedResponses
 from identification.linear.modes import LinearModes, mac_matrix
 from identification.linear.rational_fractions import RESIDUAL_TERMS, ModalFit, fit_modes
 from identification.linear.response_matrix import FrequencyResponseMatrix
-
-__all__ = ["accepted", "as_linear_modes", "modal_notes", "phase_collinearity"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _SIGNIFICANT = 3.0
 _LARGEST_DAMPING = 0.25

@@ -3,16 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
 from identification.validation import finite_array, read_only
-
-__all__ = ["ModeShapes", "mac"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,18 +16,7 @@ from numpy.typing import NDArray
 
 from identification.linear.accelerance import WeightedResponses, pooled, relative_weights
 from identification.linear.rational_fractions import ModalFit, fit_modes, modal_basis
-
-__all__ = [
-    "is_mostly_distortion",
-    "line_scatter",
-    "systematic_misfit",
-    "with_common_distortion",
-    "with_line_scatter",
-    "with_model_error",
-]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _WINDOW = 9
 """Lines over which the misfit is taken as smooth, that is as a parabola; 6 degrees of freedom are left for its scatter."""

@@ -24,12 +24,8 @@ from identification.errors import IdentificationError
 from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.validation import finite_array
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["LinearModes", "mac_matrix"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _POLES = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std", "phase_collinearity")
 _SHAPES = ("shapes", "shapes_std")

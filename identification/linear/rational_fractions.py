@@ -21,14 +21,9 @@ responses are a mean over records with known deviations e_r, the middle is ``n /
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.linear.accelerance import WeightedResponses
-
-__all__ = ["RESIDUAL_TERMS", "ModalFit", "fit_modes", "misfit_of", "modal_basis", "pole_derivatives"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 RESIDUAL_TERMS = 5
 """Number of residual terms per channel, from modes outside the band."""

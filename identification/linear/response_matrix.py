@@ -10,12 +10,8 @@ from numpy.typing import NDArray
 from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
 from identification.validation import finite_array
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["FrequencyResponseMatrix"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _ARRAYS = ("frequency_hz", "value", "noise_covariance", "total_covariance", "deviations")
 

@@ -12,13 +12,8 @@ from identification.linear.errors_in_variables import driven_responses, is_drive
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.subspace import observable_space, telling_rows
 from identification.validation import read_only
+from vibrolock.arrays import Bool, Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["StabilisationDiagram", "stabilisation"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 _ORDERS = tuple(range(2, 41, 2))
 _LOWEST = 6

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, pooled
@@ -18,10 +17,7 @@ from identification.linear.modes import LinearModes
 from identification.linear.rational_fractions import misfit_of
 from identification.linear.stabilisation import StabilisationDiagram
 from identification.validation import finite_array
-
-__all__ = ["poles_of", "searched", "start_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _NEAR = 0.05
 """A starting frequency is replaced by the nearest pole of the diagram within this relative distance."""

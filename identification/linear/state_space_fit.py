@@ -13,18 +13,13 @@ Jacobian, without the flat directions (McKelvey, Helmersson and Ribarits, Automa
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_responses
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.linear.subspace import StateSpace
 from identification.validation import positive
-
-__all__ = ["StateSpaceFit", "fit_state_space", "response_jacobian", "spectral_radius"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _FLAT = 1e-11
 """Relative singular value below which a direction is flat: a similarity transform, or lost in rounding."""

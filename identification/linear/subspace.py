@@ -13,17 +13,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_responses
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.validation import positive
-
-__all__ = ["ObservableSpace", "StateSpace", "observable_space", "subspace", "telling_rows"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _TELLING = 1e-7
 """A block row must have at least this part independent of the rows before it, relative to the first row."""

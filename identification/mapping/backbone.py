@@ -19,8 +19,6 @@ from identification.mapping.base import (
 )
 from identification.measurements import PeriodicVibration
 
-__all__ = ["BackboneMapping", "map_backbone"]
-
 
 class FundamentalMapping(ChannelMapping):
     """A channel and its fundamental at every point."""

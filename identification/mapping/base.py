@@ -11,26 +11,13 @@ from pydantic import ConfigDict, Field, model_validator
 from identification.channels import Channel, Role
 from identification.errors import IdentificationError
 from identification.mapping.units import UNITS, si_of
+from vibrolock.arrays import Complex
 from vibrolock.described import Described
-
-__all__ = [
-    "ChannelMapping",
-    "ComplexPaths",
-    "MappingTable",
-    "Path",
-    "PhaseUnit",
-    "as_levels",
-    "complex_at",
-    "in_si",
-    "numbers",
-    "value_at",
-]
 
 _STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 _PATH = re.compile(r"([^.\[\]]+|\[\d+\])(\.[^.\[\]]+|\[\d+\])*")
 Path = Annotated[str, Field(min_length=1)]
 PhaseUnit = Literal["deg", "rad"]
-Complex = NDArray[np.complex128]
 
 
 def value_at(data: Any, path: str, where: str) -> Any:

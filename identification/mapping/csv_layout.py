@@ -6,8 +6,6 @@ from pydantic import Field
 
 from identification.mapping.base import MappingTable
 
-__all__ = ["CsvLayout"]
-
 
 class CsvLayout(MappingTable):
     """How a table of numbers is written."""

@@ -11,8 +11,6 @@ from identification.hammer.hammer_test import hammer_test
 from identification.hammer.result import HammerTest
 from identification.mapping.base import ChannelMapping, MappingTable, Path, as_levels, in_si, numbers, value_at
 
-__all__ = ["HammerTestMapping", "map_hammer_test"]
-
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 

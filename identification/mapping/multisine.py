@@ -12,8 +12,6 @@ from identification.mapping.sampling import common_rate_hz, instants_at
 from identification.multisine.design import MultisineDesign
 from identification.multisine.spectra import PeriodicSpectra, periodic_spectra
 
-__all__ = ["MultisineMapping", "map_multisine"]
-
 
 class SignalMapping(ChannelMapping):
     """A channel and its samples."""

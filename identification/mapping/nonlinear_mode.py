@@ -9,8 +9,6 @@ from identification.mapping.base import MappingTable, Path, numbers, value_at
 from identification.mapping.units import si_of
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 
-__all__ = ["NonlinearModeMapping", "map_nonlinear_mode"]
-
 _ORDER = {"m": 0, "m/s": 1, "m/s2": 2}
 
 

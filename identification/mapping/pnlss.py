@@ -10,10 +10,7 @@ from identification.errors import IdentificationError
 from identification.mapping.base import ChannelMapping, MappingTable, Path, in_si, value_at
 from identification.pnlss.features import Features
 from identification.pnlss.model import PnlssModel
-
-__all__ = ["PnlssMapping", "map_pnlss"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 class PnlssMapping(MappingTable):

@@ -18,8 +18,6 @@ from identification.mapping.base import (
     value_at,
 )
 
-__all__ = ["ResponseMatrixMapping", "map_response_matrix"]
-
 
 class PathMapping(MappingTable):
     """Frequency response of one output to one input."""

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.mapping.base import numbers, value_at
 
-__all__ = ["common_rate_hz", "instants_at"]
-
 _SAME = 1e-6
 """Largest relative difference of sample rates that count as one."""
 _UNEVEN = 1e-3

@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-
-__all__ = ["Series", "common_length", "series"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,8 @@ from identification.errors import IdentificationError
 from identification.frequency_responses import Controlled, FrequencyResponse
 from identification.mapping.base import MappingTable, Path, as_levels, numbers, value_at
 from identification.mapping.units import si_of
+from vibrolock.arrays import Complex
 
-__all__ = ["FrequencyResponseMapping", "LevelSet", "PhaseConvention", "Units", "map_frequency_responses"]
-
-Complex = NDArray[np.complex128]
 PositiveFloat = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 _FREQUENCY: dict[str, float] = {"Hz": 1.0, "rad/s": 1.0 / (2.0 * np.pi)}

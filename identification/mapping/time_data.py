@@ -8,8 +8,6 @@ from pydantic import Field, model_validator
 from identification.mapping.base import ChannelMapping, MappingTable, Path
 from identification.mapping.csv_layout import CsvLayout
 
-__all__ = ["Axis", "SampledChannel", "Stretch", "TimeDataMapping"]
-
 Axis = Literal["sample", "channel", "period", "realisation", "level"]
 Count = Annotated[int, Field(ge=0)]
 Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.mapping.base import as_levels, in_si, value_at
@@ -16,10 +15,7 @@ from identification.signals.decimation import EDGE_SAMPLES, decimated
 from identification.time_data.experiments import resampled_periods
 from identification.time_data.periodicity import check_periods, period_remark
 from identification.time_data.records import TimeRecord, TimeRecords
-
-__all__ = ["map_time_data"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _WHOLE = 0.05
 """Largest part of a sample by which the beginnings of two channels may miss the common grid."""

@@ -2,8 +2,6 @@
 
 from identification.errors import IdentificationError
 
-__all__ = ["UNITS", "si_of"]
-
 GRAVITY = 9.80665  # m/s2, standard
 _INCH, _POUND = 0.0254, 4.4482216152605  # m; N per pound-force
 

@@ -7,16 +7,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.multisine.estimators import Estimator, chosen, estimated_responses
 from identification.multisine.spectra import PeriodicSpectra
-
-__all__ = ["Estimator", "best_linear_approximation", "coherence"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _DEPENDENT = 1e-9  # smallest singular value of the inputs' powers, scaled to a unit diagonal
 

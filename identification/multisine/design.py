@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.multisine.grids import Grid, check_grid, excited_lines
 from identification.validation import finite_array, positive
-
-__all__ = ["MultisineDesign"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _ROUNDING = 1e-9
 _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte

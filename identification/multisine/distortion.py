@@ -16,19 +16,14 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
+from vibrolock.arrays import Bool, Complex, Float
 from vibrolock.results import Result
 
-__all__ = ["DistortionLevels", "Lines", "distortion_levels"]
-
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 Lines = Literal["excited", "odd", "even"]
 
 _OTHER_DESIGN = 0.1  # amplitude of the instrument at detection lines against the excited ones

@@ -22,16 +22,12 @@ from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel, Role, find_name
 from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["Estimator", "chosen", "estimated_responses"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 Estimator = Literal["instrument", "H1", "H2", "Hv"]
 """How a frequency response is estimated: with the generator's signal as instrument, or as H1, H2 or Hv."""
 

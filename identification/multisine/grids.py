@@ -7,13 +7,10 @@ even nonlinearity appears only at even lines, an odd one only at odd lines. A ra
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from vibrolock.arrays import Int
 
-__all__ = ["Grid", "check_grid", "excited_lines"]
-
-Lines = NDArray[np.int64]
 Grid = Literal["full", "odd", "odd-random"]
 
 _APART = 2**32 - 1  # a key that no realisation has
@@ -29,14 +26,14 @@ def check_grid(grid: str, detection_group: int, grid_seed: int) -> None:
         raise IdentificationError(f"grid_seed: is {grid_seed}, needs zero or more")
 
 
-def excited_lines(band: Lines, grid: Grid, detection_group: int, grid_seed: int) -> Lines:
+def excited_lines(band: Int, grid: Grid, detection_group: int, grid_seed: int) -> Int:
     """int[n]: the excited lines of ``band``; empty if there is none, or if ``odd-random`` finds no complete group.
 
     ``odd-random`` leaves out one of every ``detection_group`` odd lines in turn; an incomplete last group is fully excited.
     """
     if grid == "full":
         return band
-    odd: Lines = band[band % 2 == 1]
+    odd: Int = band[band % 2 == 1]
     if grid == "odd":
         return odd
     groups = odd.size // detection_group

@@ -17,12 +17,8 @@ from identification.errors import IdentificationError
 from identification.multisine.design import MultisineDesign
 from identification.multisine.estimators import estimated_responses
 from identification.validation import finite_array
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["InstrumentResponse", "PeriodicSpectra", "periodic_spectra"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _LOW_DEGREE = 3  # highest degree of the products that a weak nonlinearity mainly generates
 

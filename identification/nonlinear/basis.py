@@ -11,16 +11,12 @@ as strongly as the tested mode.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.backbones import Backbone
 from identification.errors import IdentificationError
 from identification.linear.mode_shapes import ModeShapes, mac
 from identification.linear.modes import LinearModes
-
-__all__ = ["shapes_for"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _NEAR = 0.25  # relative distance in frequency up to which other modes are included in the shapes
 _FURTHEST = 0.1  # largest relative distance in frequency of the tested mode from the lowest level of the backbone

@@ -9,12 +9,8 @@ from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import read_only
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["QUANTITIES", "STANDARD_ERRORS", "NonlinearMode"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 STANDARD_ERRORS = {
     "force_n": "force_std_n",

@@ -25,7 +25,6 @@ force.
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.backbones import Backbone
 from identification.channels import find_role
@@ -38,11 +37,7 @@ from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
 from identification.nonlinear.uncertainty import ErrorModel, propagated
 from identification.validation import one_specimen
-
-__all__ = ["nonlinear_mode"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _NO_SHAPE = (
     "no mass-normalised mode shape: damping, modal amplitude and the correction for the phase error cannot be had; "

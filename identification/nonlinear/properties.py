@@ -8,12 +8,8 @@ counted as damping. To first order ``D = w^2 - W^2 + 2 i W (w z + sigma)``.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["States", "properties"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,17 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.backbones import Backbone
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
 from identification.nonlinear.phase_resonance import nonlinear_mode
-
-__all__ = ["Repeatability", "combined", "repeatability"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

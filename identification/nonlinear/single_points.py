@@ -17,17 +17,12 @@ is 1 % per 10 degrees, with opposite signs below and above resonance, so that po
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
-
-__all__ = ["single_point_mode"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _FAR_DEG = 30.0
 

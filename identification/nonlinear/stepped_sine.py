@@ -26,11 +26,7 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.nonlinear.nonlinear_modes import NonlinearMode
-
-__all__ = ["stepped_sine_mode"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _LEVEL_TOLERANCE = 0.02
 _ENOUGH_POINTS = 5  # with fewer points the window is widened

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.backbones import Backbone
 from identification.channels import MOTION_ORDER, find_role
@@ -23,11 +22,7 @@ from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
 from identification.nonlinear.properties import States, properties
 from identification.signals.fourier import batches_of
 from identification.signals.rounding import part_of_each
-
-__all__ = ["ErrorModel", "propagated"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _BOUNDED = ("mac", "force_purity", "response_purity")
 _TAILS = (2.5, 97.5)

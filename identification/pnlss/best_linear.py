@@ -17,11 +17,7 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
 from identification.pnlss.experiment import Experiment, excited_band, same_channels
-
-__all__ = ["best_linear_responses", "check_periodic", "periodic_ones"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex
 
 _DIFFERENCE = 0.3
 """Largest RMS difference of two periods relative to the signal; a larger one is not noise, or the noise hides the signal."""

@@ -14,8 +14,6 @@ from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.model import PnlssModel
 
-__all__ = ["STARTS", "best_of_starts", "interrupted"]
-
 STARTS = 4
 _ROUNDS = (10, 30)
 """Numbers of iterations, counted from the beginning, after which only the better half of the starts continues."""

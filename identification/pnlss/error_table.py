@@ -14,8 +14,6 @@ from identification.pnlss.many import ModelJob
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulators import Simulator
 
-__all__ = ["SAME_LEVEL", "ErrorCell", "ErrorTable", "ModelTest"]
-
 SAME_LEVEL = "same level"
 """Name of the test on the realisations that a model's own training set left out."""
 

@@ -15,10 +15,7 @@ from identification.pnlss.fitting.records import records_of
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulators import Follower, SimulatedMotion, Simulator
 from identification.validation import read_only
-
-__all__ = ["PnlssErrors", "estimated_initial_state", "pnlss_errors"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _ENOUGH = 1e3
 """The search for the sizes of states ends once the response of the outputs exceeds this multiple of the largest so far."""

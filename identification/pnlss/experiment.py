@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.arrays import Float
 
-__all__ = ["Experiment", "InitialState", "excited_band", "same_channels", "same_data"]
-
-Float = NDArray[np.float64]
 InitialState = Literal["zero", "estimated"]
 
 

@@ -19,17 +19,13 @@ from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.errors import IdentificationError
 from identification.pnlss.kernels import CUBE, SQUARE, TANH, Table, feature_derivatives, feature_values
 from identification.pnlss.user_functions import UserFunction, is_users, user_function
 from identification.validation import finite_array, read_only
-
-__all__ = ["FUNCTIONS", "FeatureFunction", "Features", "function_of", "with_weights"]
-
-Float = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from vibrolock.arrays import Float, Int
 
 
 class FeatureFunction(NamedTuple):
@@ -90,7 +86,7 @@ class Features:
     """
 
     variables: int
-    exponents: Integers = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    exponents: Int = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     weights: Float = field(default_factory=lambda: np.zeros((0, 0)))
     functions: tuple[str, ...] = ()
     limits: Float = field(default_factory=lambda: np.zeros(0))

@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
@@ -25,9 +24,6 @@ from identification.pnlss.linear_model import linear_pnlss, varying_inputs
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.saturating_starts import saturating_starts
 
-__all__ = ["identify_pnlss"]
-
-Float = NDArray[np.float64]
 Variables = Literal["all", "states"] | Sequence[int]
 
 

@@ -7,24 +7,6 @@ import numpy as np
 from vibrolock.by_address import call_at
 from vibrolock.compiled import inner_kernel, kernel
 
-__all__ = [
-    "CUBE",
-    "SQUARE",
-    "TANH",
-    "Matrices",
-    "Table",
-    "Workspace",
-    "feature_derivatives",
-    "feature_values",
-    "function_slope",
-    "outputs_at",
-    "simulate",
-    "state_after",
-    "weighted_sum",
-    "within_limits",
-    "workspace",
-]
-
 TANH, SQUARE, CUBE = 0, 1, 2
 """Codes of the function g in features ``g(w . v + b) - g(b)``; they are listed in `features.FUNCTIONS`."""
 _ADDRESSES = 4096

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.auto_regression import regressed_responses
@@ -18,17 +17,7 @@ from identification.linear.subspace import StateSpace, subspace, telling_rows
 from identification.pnlss.best_linear import best_linear_responses
 from identification.pnlss.experiment import Experiment, excited_band, same_channels
 from identification.pnlss.model import PnlssModel
-
-__all__ = [
-    "hardly_seen_states",
-    "linear_pnlss",
-    "linear_start",
-    "reflected",
-    "varying_inputs",
-    "with_independent_states",
-]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FIRST_ITERATIONS = 20
 """Number of iterations for every candidate; the fit continues with the best."""

@@ -12,17 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features
 from identification.pnlss.kernels import Matrices, simulate, workspace
 from identification.pnlss.model import PnlssModel
-
-__all__ = ["Residual", "linear_residual"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _NOISE_FLOOR = 1e-8
 """Smallest mean square of e, relative to that of the output."""

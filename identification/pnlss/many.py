@@ -22,8 +22,6 @@ from joblib import Parallel, delayed
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment, same_data
 
-__all__ = ["MIXED", "IdentifiedModel", "ModelJob", "identify_many", "realisation_combinations"]
-
 MIXED = "mixed"
 """Name of the training set that holds all levels."""
 _FEWEST = 3

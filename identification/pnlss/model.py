@@ -20,11 +20,8 @@ from identification.pnlss.kernels import Matrices, simulate, workspace
 from identification.pnlss.model_arrays import MATRICES, model_arrays, model_values
 from identification.pnlss.simulation import Simulation, use_of
 from identification.validation import finite_array, positive, read_only
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["PnlssModel"]
-
-Float = NDArray[np.float64]
 
 _UNBOUNDED = 1e4
 """A simulation counts as unbounded once a state exceeds this multiple of its largest value in the training data."""

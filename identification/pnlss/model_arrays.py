@@ -9,8 +9,6 @@ from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.pnlss.features import Features
 
-__all__ = ["MATRICES", "model_arrays", "model_values"]
-
 MATRICES = ("a", "b", "e", "c", "d", "f")
 _FEATURES = ("state_features", "output_features")
 _PARTS = ("exponents", "weights", "limits")

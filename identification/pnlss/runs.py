@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.errors import estimated_initial_state
@@ -12,10 +11,7 @@ from identification.pnlss.fitting.checks import check_not_zero
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulators import Follower, SimulatedMotion, Simulator
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
-
-__all__ = ["error_spectra", "output_stretch", "run_of", "simulated_run"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def simulated_run(

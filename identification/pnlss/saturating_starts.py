@@ -11,17 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.features import Features, function_of
 from identification.pnlss.linear_residual import Residual, linear_residual
 from identification.pnlss.model import PnlssModel
-
-__all__ = ["saturating_starts"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _MOBILITIES = (1e-2, 1e-1, 1e-3)
 """Of the disturbances; starts take turns."""

@@ -2,15 +2,9 @@
 
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.channels import Channel
 from identification.pnlss.experiment import Experiment
-
-__all__ = ["Follower", "SimulatedMotion", "Simulator"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 class SimulatedMotion(Protocol):

@@ -8,14 +8,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from vibrolock.arrays import Float
 from vibrolock.by_address import call_each
-
-__all__ = ["UserFunction", "is_users", "user_function"]
-
-Float = NDArray[np.float64]
 
 _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
 _POINTER: Any = _PROTOTYPE.__base__ or object  # base class of every C function object

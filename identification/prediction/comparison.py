@@ -5,18 +5,15 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.prediction.properties import FLAGGED_BEYOND
 from identification.prediction.steady_prediction import SteadyPrediction, peak_of
+from vibrolock.arrays import Float
 from vibrolock.results import Result
 
-__all__ = ["Comparison", "Over", "PredictionError", "compare", "error_table"]
-
-Float = NDArray[np.float64]
 Over = Literal["frequency", "phase"]
 
 

@@ -22,12 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["PARAMETERS", "Exciter", "ExciterLines", "VoltagePath"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 PARAMETERS = (
     "force_per_volt_n_v",

@@ -17,18 +17,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.multisine.spectra import PeriodicSpectra
 from identification.prediction.exciter import PARAMETERS, Exciter, ExciterLines, VoltagePath
 from identification.validation import positive
-
-__all__ = ["beside_resonance", "identify_exciter"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _COMPLIANCE = PARAMETERS.index("stinger_compliance_m_n")
 _STINGER_TIME = PARAMETERS.index("stinger_damping_time_s")

@@ -5,7 +5,6 @@ from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
@@ -14,10 +13,8 @@ from identification.prediction.properties import HIGHER_LEVELS, ExtrapolationErr
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.steady_states import OneMode, Path, fundamental_motion, range_notes
 from identification.validation import positive
+from vibrolock.arrays import Float
 
-__all__ = ["HeldForce", "frequency_response", "steady_predictions"]
-
-Float = NDArray[np.float64]
 HeldForce = Literal["fundamental", "rms", "pure-sine"]
 
 _FARTHEST = 20.0

@@ -4,8 +4,6 @@ import numpy as np
 
 from vibrolock.compiled import kernel
 
-__all__ = ["DIVERGED", "DONE", "cubic", "inverse", "modal_rate", "slow_flow"]
-
 DONE = 0
 DIVERGED = 1
 

@@ -17,8 +17,6 @@ from identification.prediction.uncertainty import ResponseBand
 from identification.signals.transients import Transient
 from vibrolock.results import Result
 
-__all__ = ["Predictions"]
-
 _PARTS: dict[str, type] = {
     "steady": SteadyPrediction,
     "steady_references": FrequencyResponse,

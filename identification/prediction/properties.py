@@ -17,10 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.validation import finite_array
+from vibrolock.arrays import Float
 
-__all__ = ["FLAGGED_BEYOND", "HIGHER_LEVELS", "REFUSED_BEYOND", "Damping", "ExtrapolationError", "ModalProperties"]
-
-Float = NDArray[np.float64]
 Damping = Literal["fundamental", "total-power"]
 
 FLAGGED_BEYOND = 1.25

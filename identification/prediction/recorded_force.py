@@ -15,11 +15,7 @@ from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.prediction.steady_states import OneMode, fundamental_motion, range_notes
-
-__all__ = ["recorded_force_response"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _FARTHEST = 20.0
 _SAME_LAG_DEG = 1.0

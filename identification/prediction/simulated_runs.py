@@ -3,14 +3,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import read_only
-
-__all__ = ["ErrorSpectra", "OutputStretch", "SimulatedRun"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def _unknown() -> Float:

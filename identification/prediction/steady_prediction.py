@@ -6,12 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["Peak", "SteadyPrediction", "peak_of"]
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _NEAR_THE_TOP = 0.9
 

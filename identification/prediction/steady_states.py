@@ -29,11 +29,7 @@ from identification.linear.modes import LinearModes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.properties import FLAGGED_BEYOND, REFUSED_BEYOND, ModalProperties
 from identification.validation import one_specimen
-
-__all__ = ["OneMode", "Path", "fundamental_motion", "modal_stiffness", "range_notes"]
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 _LOWEST_SHARE = 1e-4
 _GRID = 4000

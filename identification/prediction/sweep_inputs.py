@@ -3,18 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.signals.half_periods import HalfPeriods
 from identification.signals.transients import Transient
 from identification.validation import positive
-
-__all__ = ["BY_ZERO_CROSSINGS", "SweepInput", "VoltageSweep", "force_input", "voltage_input"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 BY_ZERO_CROSSINGS = "force by zero crossings"
 """Origin of a force without the phase of the sweep; predictions from it have no phase to compare."""

@@ -13,12 +13,8 @@ from identification.prediction.comparison import PredictionError
 from identification.prediction.properties import ModalProperties
 from identification.prediction.sweep_inputs import BY_ZERO_CROSSINGS, SweepInput
 from identification.signals.transients import Transient
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["SweepPrediction", "as_recorded", "compare_sweep"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _ARRAYS = ("time_s", "frequency_hz", "modal_amplitude", "drive_m", "drive_m_s", "drive_m_s2", "force")
 _ATTRIBUTES = ("largest_identified", "window_periods", "origin", "simulated_range_use", "unbounded_at_s")

@@ -24,7 +24,6 @@ The equation of the founding paper is the same with ``G = 2 i W`` and without u'
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
@@ -43,11 +42,7 @@ from identification.prediction.sweep_prediction import SweepPrediction
 from identification.signals.half_periods import HalfPeriods
 from identification.signals.transients import Transient
 from identification.validation import one_specimen
-
-__all__ = ["predict_sweep"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _Tables = tuple[Float, Float, Float, Float, Float]
 

@@ -9,17 +9,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.frequency_response import HeldForce, frequency_response
 from identification.prediction.steady_prediction import SteadyPrediction
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["ResponseBand", "band_of_responses", "response_band"]
-
-Float = NDArray[np.float64]
 
 _POINTS = 121
 _INTERVAL = (2.5, 97.5)

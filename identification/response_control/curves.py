@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.validation import positive
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["ConstantForceCurve", "Section", "cut"]
-
-Float = NDArray[np.float64]
 
 _LAG_STEP_DEG = 0.5
 """Half step of the finite differences that show where the frequency falls with the lag."""

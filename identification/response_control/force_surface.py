@@ -15,17 +15,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.response_control.curves import ConstantForceCurve, Section, cut
 from identification.response_control.levels import LevelFit, LevelPoints, best_degree, check_level, fit_level
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["ForceSurface", "force_surface"]
-
-Float = NDArray[np.float64]
 
 LEAST_LEVELS = 3
 _SAME_LEVEL = 1e-6

@@ -13,14 +13,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-
-__all__ = ["LevelFit", "LevelPoints", "best_degree", "check_level", "fit_level"]
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 HIGHEST_DEGREE = 4
 _LEAST_POINTS = 4

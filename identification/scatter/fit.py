@@ -5,7 +5,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment, same_channels
@@ -17,10 +16,8 @@ from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Effect, Scattered, effects_of, shifted
 from identification.scatter.widths import width_of
 from identification.structured.fit import StructuredFit
+from vibrolock.arrays import Float
 
-__all__ = ["fit_with_scatter"]
-
-Float = NDArray[np.float64]
 Fit = StructuredFit | PnlssFit
 
 _SETTLED, _SEEN = 0.02, 0.1

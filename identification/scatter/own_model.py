@@ -14,8 +14,6 @@ from identification.scatter.own_shifts import own_shift
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Scattered, shifted
 
-__all__ = ["OwnModel"]
-
 
 @dataclass(frozen=True, eq=False)
 class OwnModel:

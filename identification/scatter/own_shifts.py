@@ -4,16 +4,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.runs import run_of
 from identification.scatter.shifts import Effect, Scattered, shifted
-
-__all__ = ["OwnShift", "own_shift"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _STEP = 1e-5
 """Step of the central differences by the shifts."""

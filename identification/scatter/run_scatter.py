@@ -15,11 +15,9 @@ from identification.pnlss.runs import run_of
 from identification.scatter.shifts import Effect, Scattered, shifted
 from identification.scatter.widths import Width
 from identification.validation import read_only
+from vibrolock.arrays import Float
 from vibrolock.results import Result
 
-__all__ = ["OutputBand", "RunScatter"]
-
-Float = NDArray[np.float64]
 Arrays = Mapping[str, NDArray[Any]]
 
 _LARGEST = 0.3

@@ -4,17 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment, excited_band
 from identification.pnlss.model import PnlssModel
 from identification.structured.model import StructuredModel
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["Effect", "Scattered", "effects_of", "modes_of", "shifted"]
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Scattered = StructuredModel | PnlssModel
 
 KINDS = ("frequency", "damping", "gain")

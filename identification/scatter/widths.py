@@ -3,11 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["Width", "width_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _LARGEST = 1e4
 """Largest width that is looked for, relative to the spread of the estimates."""

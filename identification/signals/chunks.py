@@ -5,15 +5,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.validation import finite_array
-
-__all__ = ["CHUNK", "ArrayRecord", "Line", "Phase", "Record", "spans", "unwrapped"]
-
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from vibrolock.arrays import Bool, Float
 
 CHUNK = 65536
 """Samples that are evaluated at once. Sums over a shorter record are those over the whole record, to the last bit."""

@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 
 from identification.signals.chunks import Line, Phase, Record, spans
 from identification.validation import finite
-
-__all__ = ["Columns", "Stretch", "least_squares"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _MOST_KEPT = 2**22
 """Numbers that are kept in memory rather than computed again."""

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
 
-__all__ = ["EDGE_SAMPLES", "decimated"]
-
 EDGE_SAMPLES = 32
 """Number of samples of the slower signal at either end that are affected by values beyond the record."""
 LARGEST_FACTOR = 1000

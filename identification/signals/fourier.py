@@ -25,11 +25,7 @@ from identification.signals.chunks import ArrayRecord, Phase, Record
 from identification.signals.columns import Columns, least_squares
 from identification.signals.rounding import JUDGED, part_of_each, rounding_errors, turns_of
 from identification.validation import finite_array, positive
-
-__all__ = ["batches_of", "periodic_vibration", "vibration_in"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _MAX_BATCHES = 20
 _MIN_BATCHES = 4

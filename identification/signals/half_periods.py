@@ -8,14 +8,11 @@ the force near resonance; `identification.demodulate` is then the better choice.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
-
-__all__ = ["HalfPeriods", "zero_crossings"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 @dataclass(frozen=True, eq=False)

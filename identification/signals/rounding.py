@@ -16,12 +16,8 @@ with the fundamental: it is one of the amplitude, not of the phase. Both parts a
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["JUDGED", "part_of_each", "rounding_errors", "turns_of"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 JUDGED = 16384
 """Number of samples of a record from which its rounding is judged; a longer record has no more of it."""

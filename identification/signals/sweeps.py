@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
 from identification.signals.transients import Transient
+from vibrolock.arrays import Float
 
-__all__ = ["ForceDropOut", "force_drop_out"]
-
-Float = NDArray[np.float64]
 Band = tuple[float, float]
 
 _BEFORE = 0.15

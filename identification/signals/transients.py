@@ -18,12 +18,8 @@ from identification.channels import Channel, find_name, find_role, in_newtons
 from identification.errors import IdentificationError
 from identification.signals.chunks import unwrapped
 from identification.validation import finite_array, positive
+from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-__all__ = ["Transient", "demodulate"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _MIN_SAMPLES_PER_PERIOD = 8.0
 _POINTS_PER_PERIOD = 16

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.backbones import Backbone
 from identification.errors import IdentificationError
@@ -20,12 +20,8 @@ from identification.slow_flows.resonance import Amplitudes, amplitudes_at, fit_a
 from identification.slow_flows.signals import WINDOW_VARIANCE
 from identification.slow_flows.slow_flow import SlowFlow
 from identification.validation import finite_array
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["ContinuousBackbone", "continuous_backbone", "fit_around"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 
 _DEGREE, _NOISY_DEGREE = 2, 1
 _NOISE_SPAN = 1.0  # in the logarithm of the amplitude

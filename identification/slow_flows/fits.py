@@ -18,11 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.slow_flows.signals import window_correlations
-
-__all__ = ["LocalFit", "as_settled", "local_fit", "local_fits", "noise_variances"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)

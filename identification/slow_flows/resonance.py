@@ -8,7 +8,6 @@ under the force ``i c w X / phi_d^2``. In this form an estimate from a transient
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
@@ -16,11 +15,7 @@ from identification.measurements import PeriodicVibration
 from identification.slow_flows.fits import LocalFit, as_settled, local_fit
 from identification.slow_flows.signals import window_correlations
 from identification.slow_flows.slow_flow import SlowFlow
-
-__all__ = ["Amplitudes", "amplitudes_at", "fit_at", "resonant_vibration"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,6 @@ from identification.slow_flows.fits import noise_variances
 from identification.slow_flows.resonance import amplitudes_at, fit_at, resonant_vibration
 from identification.slow_flows.slow_flow import SlowFlow
 
-__all__ = ["ShortPoint", "short_point"]
-
 _FEWEST_PERIODS = 2.0
 _STEADY = 0.02  # relative change of the amplitude below which properties are taken as linear in time
 _LARGEST_CHANGE = 0.5

@@ -9,12 +9,8 @@ run over the whole record; slices are taken afterwards.
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["WINDOW_PERIODS", "amplitudes", "between_harmonics", "derivatives", "window_correlations"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 WINDOW_PERIODS = 3.0
 """Length of the Blackman window: its zeros lie at all other multiples of the fundamental frequency, including zero."""

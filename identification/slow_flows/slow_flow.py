@@ -19,11 +19,7 @@ from identification.signals.chunks import unwrapped
 from identification.slow_flows.fits import LocalFit, as_settled, local_fits, noise_variances
 from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, between_harmonics, derivatives
 from identification.validation import finite_array, positive
-
-__all__ = ["SlowFlow", "slow_flow"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _MIN_FIT_PERIODS = 1.0
 _NOISE_FITS = 2.0  # factor by which the fits that estimate the noise are longer

@@ -16,8 +16,6 @@ from identification.structured.fit import StructuredFit
 from identification.structured.laws import law_from_dict
 from identification.structured.model import StructuredModel
 
-__all__ = ["fit_arrays", "fit_from", "model_arrays", "model_from"]
-
 Arrays = Mapping[str, NDArray[Any]]
 Attributes = Mapping[str, Any]
 

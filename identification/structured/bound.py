@@ -22,16 +22,12 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.structured.elements import Tables
 from identification.structured.model import StructuredModel
 from identification.structured.steps import System
 from identification.validation import positive
-
-__all__ = ["Bound", "bound_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _EPS = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)
 """Tried values of eps, relative to the smallest damping."""

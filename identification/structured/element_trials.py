@@ -4,16 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.errors import pnlss_errors
 from identification.pnlss.experiment import Experiment
 from identification.structured.further import ElementPlan
 from identification.structured.model import StructuredModel
-
-__all__ = ["ElementTrial"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _SURE = 0.95
 _LEAST_GAIN = 1.05

@@ -5,15 +5,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.structured.laws import Damper, Joint, Law, Spring
 from identification.validation import finite_array, positive
-
-__all__ = ["NonlinearElement", "Tables", "changes_of", "tables_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 NODES = 513
 """Nodes of a table. Between them a cubic follows a polynomial of degree 5 to 1e-8 of its largest force."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.errors import IdentificationError
@@ -24,11 +23,8 @@ from identification.structured.model import LEAD, StructuredModel
 from identification.structured.parameters import HIGHEST, Parameters
 from identification.structured.problem import Problem
 from identification.structured.start import linear_start, with_element
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["StructuredFit", "fit_structured"]
-
-Float = NDArray[np.float64]
 
 _ROUGH, _FINE = 3e-2, 2e-4
 """Relative gains of a step below which the fits before the last one, and the last one, end."""

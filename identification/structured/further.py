@@ -6,7 +6,6 @@ from itertools import combinations, product
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
@@ -25,11 +24,7 @@ from identification.structured.laws import (
 from identification.structured.modal_motion import LOWEST, modal_spectra
 from identification.structured.model import StructuredModel
 from identification.structured.start import HIGHEST, softened, started
-
-__all__ = ["ElementPlan", "with_further_element"]
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 _ANGLES = np.pi * np.arange(1, 8) / 8.0
 """Angles of directions between two modes that are tried."""

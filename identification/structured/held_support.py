@@ -8,13 +8,9 @@ periods to settle. The mean over exactly one period contains no line, and is kno
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.structured.steps import System
-
-__all__ = ["held", "periods_of", "renew"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def held(system: System) -> System:

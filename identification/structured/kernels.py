@@ -12,8 +12,6 @@ import numpy as np
 
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["damping_at", "mean_spring", "slide", "slide_along", "spring_at", "step_force"]
-
 NEAR = 1e-3  # of the reach: over shorter ways the mean force is that of two Gauss points, which is exact to rounding
 GAUSS = 0.5 - 0.5 / math.sqrt(3.0)
 

@@ -13,31 +13,9 @@ from itertools import product
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-
-__all__ = [
-    "FROM_ZERO",
-    "LAWS",
-    "POSITIVE",
-    "Damper",
-    "Iwan",
-    "Jenkins",
-    "Joint",
-    "Law",
-    "MagnetSpring",
-    "Masing",
-    "PolynomialDamper",
-    "PolynomialSpring",
-    "SplineSpring",
-    "Spring",
-    "Stop",
-    "UserSpring",
-    "law_from_dict",
-]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _LARGEST_SLIP = 0.9
 """Largest slip x of a joint's sliders: one that the training data hardly reach is a spring to them, of any stiffness."""

@@ -9,15 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.structured.held_support import held, periods_of
 from identification.structured.model import ends_of_steps
 from identification.structured.steps import System, led
-
-__all__ = ["Lead", "not_led"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 @dataclass(frozen=True, eq=False)

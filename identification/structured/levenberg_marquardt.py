@@ -8,11 +8,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["Minimum", "minimum", "triangle_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FIRST, _FACTOR = 1e-3, 3.0
 _SMALLEST, _LARGEST = 1e-12, 1e6

@@ -4,15 +4,10 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER
 from identification.pnlss.experiment import Experiment
-
-__all__ = ["LOWEST", "measured_velocity", "modal_spectra", "prolonged", "settling_periods"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 LOWEST = 0.2
 """Lines below this share of the first frequency are left out: sensors of acceleration do not show such motion."""

@@ -1,16 +1,12 @@
 """What a modal test says of the small vibrations of a model, as rows of its least-squares problem."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.linear.modes import LinearModes
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
 from identification.structured.small_vibrations import at_rest
-
-__all__ = ["ModalTest"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FREQUENCY_STD, _DAMPING_STD, _SHAPE_STD, _RESIDUAL_STD = 1e-3, 0.1, 0.02, 0.3
 """What a modal test is trusted to: relative errors that are added to its own, and those of the residual mode."""

@@ -15,11 +15,8 @@ from identification.structured.modal_motion import measured_velocity, prolonged,
 from identification.structured.small_vibrations import small_vibrations
 from identification.structured.steps import Room, System, led, run
 from identification.validation import finite_array, positive
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["Motion", "StructuredModel", "ends_of_steps", "motion_of", "outputs_of", "room_for"]
-
-Float = NDArray[np.float64]
 
 _SOFTEST, _STIFFEST = -0.5, 4.0
 """Slopes of the springs beyond their reach, relative to the static stiffness in their direction, all elements together."""

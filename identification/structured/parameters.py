@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.structured.elements import NonlinearElement, changes_of, laws_in_order
 from identification.structured.held_support import renew
@@ -11,10 +10,7 @@ from identification.structured.leading import Lead, not_led
 from identification.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
 from identification.structured.sensitivities import Sensitivities, run_with_sensitivities
 from identification.structured.steps import System
-
-__all__ = ["HIGHEST", "Parameters"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 HIGHEST = 0.45
 """Largest frequency of a mode times the length of a step."""

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
@@ -16,10 +15,7 @@ from identification.structured.levenberg_marquardt import minimum, triangle_of
 from identification.structured.modal_test import ModalTest
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
-
-__all__ = ["Problem"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _EVALUATIONS = 100
 """Simulations with derivatives at most."""

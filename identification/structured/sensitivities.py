@@ -19,8 +19,6 @@ from identification.structured.steps import (
 )
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["Sensitivities", "run_with_sensitivities"]
-
 
 class Sensitivities(NamedTuple):
     """Derivatives of a state by P parameters.

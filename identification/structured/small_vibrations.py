@@ -3,15 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.structured.elements import NonlinearElement
-
-__all__ = ["at_rest", "small_vibrations"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 def at_rest(omega: Float, zeta: Float, elements: Sequence[NonlinearElement]) -> tuple[Float, Float]:

@@ -6,7 +6,6 @@ from itertools import product
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_name
 from identification.errors import IdentificationError
@@ -18,11 +17,7 @@ from identification.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, L
 from identification.structured.levenberg_marquardt import triangle_of
 from identification.structured.modal_motion import LOWEST, modal_spectra
 from identification.structured.model import StructuredModel
-
-__all__ = ["HIGHEST", "linear_start", "softened", "started", "with_element"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 HIGHEST = 6.0
 """Highest line of the regression, relative to the frequency of the mode."""

@@ -20,19 +20,6 @@ from identification.structured.elements import Tables
 from identification.structured.kernels import damping_at, slide, spring_at, step_force
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = [
-    "Room",
-    "System",
-    "accelerate",
-    "along",
-    "end_step",
-    "led",
-    "run",
-    "solve",
-    "take_input",
-    "take_step",
-]
-
 NEWTON = 60  # iterations at most; a step that is not solved by then is counted
 CAREFUL = 12  # iterations with whole steps; those after them are halved
 CLOSE = 1e-7  # change of w that ends Newton's iteration, relative to the velocities it is made of: its square is left

@@ -3,16 +3,12 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.structured.fit import StructuredFit
 from identification.structured.model import StructuredModel
 from identification.structured.parameters import Parameters
-
-__all__ = ["drawn", "std_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _SHARE = 0.1
 """Steps of the central differences relative to the standard errors of the numbers."""

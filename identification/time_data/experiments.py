@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import chosen_rows
 from identification.errors import IdentificationError
@@ -18,10 +17,7 @@ from identification.signals.decimation import EDGE_SAMPLES, decimated
 from identification.time_data.periodicity import check_periods
 from identification.time_data.records import TimeRecord, TimeRecords
 from identification.validation import positive
-
-__all__ = ["SAMPLES_PER_PERIOD", "resampled_periods", "round_rate_hz", "suitable_rate_hz", "time_experiments"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 SAMPLES_PER_PERIOD = 25
 """Samples per period of the highest excited frequency."""

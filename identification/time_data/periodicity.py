@@ -11,8 +11,6 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.time_data.records import TimeRecords
 
-__all__ = ["check_periods", "period_remark"]
-
 _REFUSED = 0.5
 """Difference of the periods from which a record is not periodic."""
 _REMARKED = 0.05

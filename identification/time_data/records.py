@@ -10,11 +10,8 @@ from numpy.typing import NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array, positive
+from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-__all__ = ["TimeRecord", "TimeRecords"]
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -15,8 +15,6 @@ from identification.multisine.spectra import PeriodicSpectra
 from identification.time_data.periodicity import check_periods
 from identification.time_data.records import TimeRecords
 
-__all__ = ["time_responses", "time_spectra"]
-
 _EXCITED = 1e-2
 """A line counts as excited above this share of the strongest line of the force, or of the instrument."""
 

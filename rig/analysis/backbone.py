@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Backbone", "backbone", "draw_backbone", "neglected"]
-
 _WORTH_A_NUMBER = 0.001
 _ROUNDING_J = 1e-15
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ConstantForce", "constant_force", "draw_curves", "folds_of"]
-
 _DEFAULT_SHARES = (0.1, 0.3, 1.0)
 _LAGS_DEG = (-175.0, -5.0)
 _RESONANCE_DEG = -90.0

@@ -5,7 +5,6 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.backbone import neglected
 from rig.analysis.levels import highest_resonance, most_points, samples_for
@@ -16,13 +15,11 @@ from rig.drawing.style import MAIN, REJECTED, SECOND
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import NotConvergedError, PeriodicResponses, forced_response, phase_resonance_backbone
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Forced", "draw_forced", "forced", "joined", "part", "turned"]
-
-Real = NDArray[np.float64]
 
 _DEFAULT_SHARE = 0.5
 _SPAN = (0.7, 1.3)
@@ -48,7 +45,7 @@ class Forced(Study):
         return f"steady response to {self.voltage_v:.4g} V"
 
     @property
-    def differ_hz(self) -> Real:
+    def differ_hz(self) -> Float:
         """Frequencies at which the two directions differ; empty if they never do, or if a direction is incomplete."""
         if not self.complete:
             return np.zeros(0)
@@ -136,7 +133,7 @@ def forced(
     )
 
 
-def _followed(subject: Subject, voltage_v: float, grid: Real, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
+def _followed(subject: Subject, voltage_v: float, grid: Float, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
     """Follow the vibrations in the order of the grid until none is found; also return why none is found."""
     try:
         with refusing():
@@ -174,7 +171,7 @@ def _resonance(subject: Subject, voltage_v: float, how: dict[str, Any]) -> tuple
     return subject.frequency_hz, resonance_hz, damping * resonance_hz
 
 
-def _grid(low: float, high: float, points: int, resonance: tuple[float, float, float]) -> Real:
+def _grid(low: float, high: float, points: int, resonance: tuple[float, float, float]) -> Float:
     """Return frequencies from low to high: half evenly spaced, half around the linear and the nonlinear resonance."""
     linear_hz, resonance_hz, width_hz = resonance
     first = min(linear_hz, resonance_hz) - _DENSE_WIDTHS * width_hz

@@ -3,15 +3,12 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.subject import Subject, positive, refusing
 from rig.errors import ConfigurationError
 from simulators.analysis import NotConvergedError, PeriodicResponses, phase_resonance_backbone
+from vibrolock.arrays import Float
 
-__all__ = ["By", "highest_resonance", "level_range", "most_points", "samples_for"]
-
-Real = NDArray[np.float64]
 By = Literal["force", "voltage"]
 
 _LOWEST_SHARE = 0.01
@@ -22,7 +19,7 @@ _MOST_POINTS = 20_000
 
 def level_range(
     subject: Subject, by: By, lowest: float | None, highest: float | None, points: int, harmonics: int
-) -> Real:
+) -> Float:
     """Return geometrically spaced levels [points]: peaks of the fundamental force (N) or voltages (V).
 
     Without ``highest`` they end where the bench's limits or the valid range of the rig end the backbone.
@@ -62,7 +59,7 @@ def highest_resonance(subject: Subject, harmonics: int) -> tuple[PeriodicRespons
     return path, count - 1
 
 
-def _over_voltages(subject: Subject, volts: Real, harmonics: int) -> PeriodicResponses:
+def _over_voltages(subject: Subject, volts: Float, harmonics: int) -> PeriodicResponses:
     """Return the backbone over voltages, as far as it is found; raise `ConfigurationError` if nothing is."""
     try:
         with refusing():

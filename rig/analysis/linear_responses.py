@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.levels import most_points
 from rig.analysis.study import Study
@@ -14,14 +13,11 @@ from rig.drawing.style import COLOURS, MAIN
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import FrequencyResponses, frequency_response
+from vibrolock.arrays import Complex, Float
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Responses", "draw_responses", "responses"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 _BELOW_LOWEST_MODE = 0.5
 _ABOVE_HIGHEST_MODE = 1.2
@@ -126,7 +122,7 @@ def responses(
 
 
 def draw_responses(
-    page: "Figure", frequency_hz: Real, force: Complex, per_v: dict[str, Complex], per_n: dict[str, Complex]
+    page: "Figure", frequency_hz: Float, force: Complex, per_v: dict[str, Complex], per_n: dict[str, Complex]
 ) -> None:
     """Draw three columns; each channel has the same colour in all of them."""
     from matplotlib.ticker import MultipleLocator

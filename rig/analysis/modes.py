@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.study import Study
 from rig.analysis.subject import Subject
@@ -14,14 +13,11 @@ from rig.text.console import number, print_table
 from simulators.modes import LinearModes
 from simulators.structures.meshed import MeshedBeam
 from simulators.virtual_rig import VirtualRig
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["Modes", "draw_modes", "modes"]
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,9 +28,9 @@ class Modes(Study):
     """Modes of the structure alone."""
     coupled: LinearModes
     """Modes of structure, stinger and exciter, driven by the voltage."""
-    channel_shapes: dict[str, Real]
+    channel_shapes: dict[str, Float]
     """Mass-normalised shapes (kg^-1/2) [n_mode] at every acceleration channel, by channel name."""
-    point_shapes: dict[str, Real]
+    point_shapes: dict[str, Float]
     """Mass-normalised shapes at every named point; at a joint's site in the coordinate of the joint."""
 
     @property

@@ -20,16 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "Study",
-    "check_ending",
-    "draw",
-    "length_unit",
-    "plain",
-    "points_of",
-    "roomy",
-]
-
 
 def plain(value: Any) -> Any:
     """Convert ``value``: arrays to lists, dataclasses to dictionaries, complex numbers to ``[re, im]``."""

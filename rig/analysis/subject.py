@@ -15,10 +15,7 @@ from rig.errors import ConfigurationError
 from simulators.analysis import PeriodicResponses
 from simulators.layout import Flag
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["Demand", "Subject", "positive", "refusing", "subject_of"]
-
-Real = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _TOLERANCE = 1.0 + 1e-6
 
@@ -34,7 +31,7 @@ class Demand:
     """A quantity that the bench limits, with its values over the points of an analysis."""
 
     name: str
-    values: Real
+    values: Float
     """Largest value at each point [n]."""
     limit: float
     unit: str
@@ -143,7 +140,7 @@ def refusing() -> Iterator[None]:
         raise ConfigurationError(str(error)) from error
 
 
-def peak(harmonics: NDArray[np.complex128], samples: int = 256) -> Real:
+def peak(harmonics: NDArray[np.complex128], samples: int = 256) -> Float:
     """Return the largest absolute value over a period [n] of signals with harmonics [n, H + 1]."""
     theta = 2.0 * np.pi * np.arange(samples) / samples
     waves = np.exp(1j * np.outer(np.arange(harmonics.shape[1]), theta))

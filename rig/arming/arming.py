@@ -13,8 +13,6 @@ from rig.daq import Capabilities
 from rig.errors import NotArmed
 from rig.loop.session import Session
 
-__all__ = ["Arm", "ArmingRequest", "armed", "asked_once", "cautions_of", "unguarded_text"]
-
 CHECK = "check"
 
 

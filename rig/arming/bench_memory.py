@@ -20,17 +20,6 @@ from rig.errors import RecordingError
 from rig.system.text_files import read_text
 from rig.system.whole_file import whole_file
 
-__all__ = [
-    "BenchMemory",
-    "RememberedCheck",
-    "RememberedTrip",
-    "fingerprint",
-    "memory_of",
-    "memory_path",
-    "now",
-    "remember",
-]
-
 LARGEST_BYTES = 1_000_000
 
 

@@ -6,8 +6,6 @@ from rig.arming.bench_memory import fingerprint, memory_of
 from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 
-__all__ = ["known_scale", "unproven_phase"]
-
 
 def known_scale(
     bench: Bench, identity: Mapping[str, str], given: CheckedScale | None, *, virtual: bool

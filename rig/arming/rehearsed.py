@@ -11,8 +11,6 @@ from rig.arming.run_facts import user_name
 from rig.bench import Bench
 from rig.errors import NotArmed
 
-__all__ = ["Rehearsed", "rehearsal_facts", "subject_digest"]
-
 BESIDE = {"name", "description", "arming"}
 """Keys of plan and bench that no test depends on."""
 

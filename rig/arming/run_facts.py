@@ -9,8 +9,6 @@ from typing import Any
 from rig.bench import Bench
 from rig.errors import ConfigurationError
 
-__all__ = ["About", "calibration_remarks", "user_name"]
-
 
 @dataclass(frozen=True)
 class About:

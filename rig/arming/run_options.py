@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from rig.tick.tick import Tick
 
-__all__ = ["Progress", "RemarksOnce", "RunOptions", "Silent"]
-
 LARGEST_SEED = 2**63 - 1
 
 

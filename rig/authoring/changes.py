@@ -7,8 +7,6 @@ from typing import Any
 
 from rig.authoring.draft7 import Schema
 
-__all__ = ["Loosened", "reachable", "requirements"]
-
 
 def requirements(node: Schema, definitions: Schema) -> Schema:
     """Return the schema that asks for the required keys of a table, and of the tables in it, and for nothing else."""

@@ -12,8 +12,6 @@ from typing import Any
 
 from rig.authoring.draft7 import Schema
 
-__all__ = ["commented"]
-
 WIDTH = 110
 
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from rig.text.units import titled
 
-__all__ = ["DRAFT", "Schema", "draft7", "plain"]
-
 DRAFT = "http://json-schema.org/draft-07/schema#"
 
 Schema = dict[str, Any]

@@ -15,8 +15,6 @@ from rig.errors import ConfigurationError
 from rig.system.whole_file import whole_file
 from rig.text.printable import shown
 
-__all__ = ["new_driver", "new_file", "schema_text", "written"]
-
 BENCH_OF_DRIVER = "box-bench.toml"
 
 

@@ -14,8 +14,6 @@ from rig.authoring.draft7 import DRAFT, Schema, draft7, plain
 from rig.errors import ConfigurationError
 from rig.text.printable import shown
 
-__all__ = ["bench_schema", "plan_schema", "rig_schema", "schema_names", "schema_of", "sensors_schema"]
-
 
 def schema_names() -> tuple[str, ...]:
     """Names of all schemas: ``bench``, ``plan``, ``rig``, ``sensors``, and every kind of plan."""

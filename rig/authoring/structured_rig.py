@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import IdentificationError, NonlinearElement, StructuredModel
 from identification.channels import find_role
@@ -21,10 +20,7 @@ from rig.measurements import bench_of_recording
 from rig.models.files.files import load_as
 from rig.models.files.structured import STRUCTURED, functions_of
 from rig.recording.reader import Recording
-
-__all__ = ["bench_like", "structured_bench", "structured_model"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FAITHFUL = 1e-6
 """Largest error of a spline through fewer nodes, over the largest force, in the range of the training data and in the reach."""

@@ -13,17 +13,6 @@ from rig.bench.sensors import with_sensors
 from rig.errors import ConfigurationError
 from rig.text.printable import shown
 
-__all__ = [
-    "Arming",
-    "Bench",
-    "DriverChoice",
-    "EmergencyStop",
-    "Limits",
-    "SpecimenFacts",
-    "load_bench",
-    "shipped_benches",
-]
-
 HIGHEST_PART = 0.45  # of the sample rate; a phase-locked loop keeps to a quarter of its own accord
 
 

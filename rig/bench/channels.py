@@ -11,8 +11,6 @@ from rig.bench.configuration import Configured
 from rig.bench.data_sheet import volts_per_unit
 from rig.text.printable import shown
 
-__all__ = ["DATE", "Channel", "Role", "check_day"]
-
 UNITS = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}
 """Unit of a channel by its role; a monitor has any."""
 DATE = r"^(\d{4}-\d{2}-\d{2})?$"

@@ -14,17 +14,6 @@ from rig.system.text_files import read_text
 from rig.text.printable import shown
 from vibrolock.described import Described
 
-__all__ = [
-    "Configured",
-    "explain",
-    "find_toml",
-    "merged",
-    "read_toml",
-    "shipped_descriptions",
-    "shipped_names",
-    "validated",
-]
-
 LARGEST_TOML_BYTES = 1_000_000
 MOST_DOTS = 100  # between two commas of a line: the parser's time grows with the square of the number of a key's parts
 MOST_FAULTS = 5  # in one message

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.bench.channels import Channel
 
-__all__ = ["Objection", "cautions", "objections", "refuse"]
-
 LONGEST_BLOCK_S = (
     0.2  # a person's reaction time at the stop button: a loop that checks less often protects less than a person
 )

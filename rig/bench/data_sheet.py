@@ -6,8 +6,6 @@ from fractions import Fraction
 from identification.errors import IdentificationError
 from identification.mapping.units import si_of
 
-__all__ = ["volts_per_unit"]
-
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _VOLTS = {"V": Fraction(1), "mV": Fraction(1, 1000), "uV": Fraction(1, 1_000_000)}  # in V
 _CHARGES = {"pC": Fraction(1), "nC": Fraction(1000)}  # in pC

@@ -14,8 +14,6 @@ from rig.bench.data_sheet import volts_per_unit
 from rig.errors import ConfigurationError
 from rig.text.printable import shown
 
-__all__ = ["Sensor", "SensorFile", "load_sensors", "with_sensors"]
-
 
 class Sensor(Configured):
     """A sensor: what its data sheet and its calibration say."""

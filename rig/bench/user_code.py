@@ -5,8 +5,6 @@ import sys
 from rig.bench import Bench
 from rig.errors import ConfigurationError
 
-__all__ = ["imported_code", "named_code", "refuse_code"]
-
 
 def named_code(bench: Bench) -> list[str]:
     """Return every ``function`` in the options of the driver, at any depth, sorted."""

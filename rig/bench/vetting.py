@@ -9,8 +9,6 @@ from unicodedata import category
 
 from rig.text.printable import shown
 
-__all__ = ["DEEPEST", "LARGEST", "SMALLEST", "objection_to"]
-
 DEEPEST = 16
 """Largest number of nested tables and lists."""
 SMALLEST, LARGEST = 1e-30, 1e30

@@ -8,8 +8,6 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.planning.plan import Column, Plan
 from rig.recording.reader import Recording
 
-__all__ = ["Campaign"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:

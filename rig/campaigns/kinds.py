@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from rig.campaigns.campaign import Campaign
 from vibrolock.on_use import Registry
 
-__all__ = ["KINDS", "kinds_that_yield"]
-
 KINDS: Mapping[str, Campaign] = Registry(
     {
         "backbone": "rig.campaigns.backbone.points:BACKBONE",

@@ -11,8 +11,6 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
 from rig.text.printable import shown
 
-__all__ = ["bench_of", "load_plan", "plan_from", "shipped_plans"]
-
 
 def _folder() -> Path:
     return Path(str(resources.files("rig.campaigns"))) / "shipped"

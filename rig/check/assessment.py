@@ -29,8 +29,6 @@ from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 from vibrolock.results import Result
 
-__all__ = ["Assessment", "assess", "checked_scale", "responses_in"]
-
 SKIPPED = 0.1  # part of the silence that is left out at its beginning because of the transient of the filters
 CUT_SHORT = "the multisine was not played to its end"
 

@@ -5,8 +5,6 @@ from datetime import date
 from rig.bench import Bench
 from rig.check.findings import Finding, Verdict
 
-__all__ = ["calibration_findings"]
-
 
 def calibration_findings(bench: Bench, day: str) -> list[Finding]:
     """Return a finding for each channel that states when its calibration is due; ``day`` of the check is YYYY-MM-DD.

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_check", "draw_recorded_check", "write_check"]
-
 VERDICTS = {"fail": SECOND, "warn": "#7a5c00", "not tested": REJECTED}
 """Colours of the verdicts other than ok, the worst first."""
 _LETTER, _LINE = 0.5, 1.3

@@ -4,8 +4,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Finding", "Verdict", "failed", "graded"]
-
 Verdict = Literal["ok", "warn", "fail", "not tested"]
 
 

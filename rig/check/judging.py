@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
 from rig.check.responses import BAND, FITS, Mode, Responses, fit_mode
+from vibrolock.arrays import Float
 
-__all__ = ["ALIKE", "best_assignment", "by_magnitude", "by_shape", "driven_findings", "latency_findings"]
-
-Float = NDArray[np.float64]
 ALIKE = 0.03  # log ratio below which two channels cannot be distinguished
 BETTER = 0.5  # part of the misfit as wired that another assignment must not exceed
 WRONG = 0.05  # RMS log ratio above which the wiring is in doubt

@@ -5,8 +5,6 @@ from typing import Any
 
 from rig.recording.reader import Recording
 
-__all__ = ["PURPOSE", "about", "is_check"]
-
 PURPOSE = "check"
 
 

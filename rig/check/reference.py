@@ -7,10 +7,7 @@ from rig.bench import Bench
 from rig.check.findings import Finding, graded
 from rig.check.judging import SIZE_OK, SIZE_TOLERATED, best_assignment, by_shape
 from rig.check.responses import Responses
-
-__all__ = ["on_lines_of", "reference_findings"]
-
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex
 
 
 def on_lines_of(frequency_hz: NDArray[np.float64], reference: Responses) -> Complex:

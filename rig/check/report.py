@@ -10,8 +10,6 @@ from rig.text.printable import printable_strings
 if TYPE_CHECKING:
     from rig.check.assessment import Assessment
 
-__all__ = ["say", "summary"]
-
 
 def summary(found: "Assessment") -> dict[str, Any]:
     """Return verdict, findings and mode as a dictionary for JSON."""

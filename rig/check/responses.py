@@ -18,11 +18,8 @@ from numpy.typing import NDArray
 
 from identification import PeriodicSpectra
 from rig.bench import Bench
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["BAND", "FITS", "Mode", "Responses", "fit_mode", "responses_of"]
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 BAND = (0.7, 1.4)  # of the linear frequency: band of the fit
 FITS = 0.15  # largest misfit of a fit that describes the responses
 ROUNDS = 12

@@ -15,8 +15,6 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 
-__all__ = ["SEARCH", "check", "seen_in"]
-
 BAND = (0.4, 2.5)  # of the linear frequency: band of the multisine
 LINES = 200.0  # number of lines up to the linear frequency
 ENOUGH = 0.999  # coherence of the worst channel that suffices

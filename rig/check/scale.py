@@ -8,8 +8,6 @@ from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 from rig.check.responses import Mode, Responses
 
-__all__ = ["scale_of"]
-
 BANDWIDTHS = (
     8.0  # half width of the band around the mode in which volts per acceleration are fitted, in half bandwidths
 )

@@ -3,13 +3,11 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
 from rig.daq import Channel
-
-__all__ = ["floor", "hum", "silent_findings"]
+from vibrolock.arrays import Float
 
 MAINS_HZ = (50.0, 60.0)
 HUM_HARMONICS = 3
@@ -17,8 +15,6 @@ NOISY = 3.0  # times the expected floor
 CALM = 0.3
 FAR_OFF = 0.1  # of the range: an offset that eats into it
 SIGNIFICANT = 5.0  # standard deviations of a line of noise
-
-Float = NDArray[np.float64]
 
 
 def silent_findings(bench: Bench, readings: Float) -> list[Finding]:

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from rig.analysis.study import Study
     from rig.analysis.subject import Subject
 
-__all__ = ["app"]
-
 app = typer.Typer(cls=Group, no_args_is_help=True, help="What can be known of a virtual bench without a test.")
 
 BenchName = Annotated[str, typer.Option("--bench", help="Shipped bench or TOML file, with the virtual driver.")]

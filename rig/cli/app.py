@@ -34,8 +34,6 @@ from rig.cli.stop import stop
 from rig.cli.tune import tune_
 from rig.cli.watch import watch_
 
-__all__ = ["app", "main"]
-
 STOPPED = 130
 
 app = typer.Typer(

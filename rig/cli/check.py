@@ -12,8 +12,6 @@ from rig.cli.run_options import of_a_recording, shown, with_run_options
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
 
-__all__ = ["check_"]
-
 
 @with_run_options(of_a_recording)
 def check_(

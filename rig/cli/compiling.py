@@ -5,8 +5,6 @@ import time
 
 from vibrolock.compiling import on_compiling
 
-__all__ = ["say_what_is_compiled"]
-
 FEW = 5  # kernels that are compiled without a word
 EVERY_S = 5.0
 

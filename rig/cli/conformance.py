@@ -8,8 +8,6 @@ import typer
 
 from rig.cli.options import Json
 
-__all__ = ["conformance"]
-
 
 def conformance(
     bench: Annotated[str, typer.Option(help="Bench whose driver is tested: a shipped name or TOML file.")],

@@ -10,8 +10,6 @@ import typer
 if TYPE_CHECKING:
     from rig.reference.words import Hit
 
-__all__ = ["docs"]
-
 BUILD = (
     "the documentation site is not built here; in a clone of the repository: "
     "pip install -e '.[docs]' && sphinx-build -W docs rig/site"

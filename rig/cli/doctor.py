@@ -12,8 +12,6 @@ from rig.cli.options import Json
 if TYPE_CHECKING:
     from rig.bench import Bench
 
-__all__ = ["doctor"]
-
 UNITS = {"block": "samples", "queue_blocks": "blocks", "watchdog_s": "s", "largest_rate_hz": "Hz"}
 MATRIX_BENCH = "magnet-beam"
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.emulator.process import Ready
 
-__all__ = ["emulate"]
-
 WRITTEN = "# Written by `rig emulate`, which replaces this file."
 SHORTEST_BLOCK_S = 0.002
 """Shortest block of the written bench, s. A host with ordinary scheduling keeps up with it."""

@@ -7,8 +7,6 @@ import typer
 
 from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
 
-__all__ = ["export_", "import_"]
-
 
 def import_(
     file: Annotated[Path, typer.Argument(help="MAT, UFF, CSV, HDF5, WAV, TDMS, MDF 4 or SEP005 file.")],

@@ -11,8 +11,6 @@ from typing import Any
 import typer
 from typer.main import get_command
 
-__all__ = ["flags", "with_flags"]
-
 
 def flags(app: typer.Typer) -> dict[str, str]:
     """Return the option for each field name, over all commands."""

@@ -4,8 +4,6 @@ from typing import Any
 
 from typer.core import TyperGroup
 
-__all__ = ["Group"]
-
 
 class Group(TyperGroup):
     """Lists its commands with whole sentences; typer cuts them off where a line ends."""

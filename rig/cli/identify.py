@@ -8,8 +8,6 @@ import typer
 
 from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
 
-__all__ = ["identify"]
-
 
 def identify(
     files: Annotated[
@@ -199,8 +197,9 @@ def identify(
     from rig.models.files.files import save
     from rig.models.identify.data_request import DataOptions
     from rig.models.identify.decay_request import DecayOptions
-    from rig.models.identify.identify import Request, identify_model
+    from rig.models.identify.identify import identify_model
     from rig.models.identify.pnlss_request import PnlssOptions
+    from rig.models.identify.request import Request
     from rig.models.identify.structured_request import StructuredOptions
     from rig.show.progress import FitLines
     from rig.system.stop_signals import insisting

@@ -7,8 +7,6 @@ from typing import Annotated, Any
 
 import typer
 
-__all__ = ["list_"]
-
 
 def list_(
     part: Annotated[str | None, typer.Argument(help="A part of a virtual rig, whose keys are printed.")] = None,

@@ -10,8 +10,6 @@ from rig.cli.run_options import with_options
 if TYPE_CHECKING:
     from rig.monitor.process import Serving
 
-__all__ = ["monitor", "of_a_page"]
-
 Port = Annotated[int, typer.Option(help="Port of the page; a free one if left out.", min=0, max=65535)]
 Bind = Annotated[
     str, typer.Option(metavar="ADDRESS", help="Address of this machine that others can reach; by TLS only.")

@@ -9,8 +9,6 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["Json", "Output", "Overwrite", "keep_existing", "say_what_is_imported", "show_file"]
-
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="File to write.")]

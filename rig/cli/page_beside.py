@@ -12,8 +12,6 @@ from contextlib import contextmanager
 from rig.system.child import child_environment
 from rig.text.printable import printable
 
-__all__ = ["page_beside"]
-
 START_S = 20.0
 """Time in which a page must have said where it is, once the run is over."""
 

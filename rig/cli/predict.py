@@ -7,8 +7,6 @@ import typer
 
 from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
 
-__all__ = ["predict"]
-
 
 def predict(
     model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model, structured model or force surface.")],

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from rig.models.rehearse import Listener, Subject
     from rig.rehearsal.comparison import Comparison
 
-__all__ = ["Rehearsing", "rehearse_"]
-
 
 def rehearse_(
     plan: Annotated[str, typer.Argument(help="Shipped plan or TOML file; with --compare a rehearsal (.h5).")],

@@ -15,8 +15,6 @@ from rig.cli.run_options import with_options
 if TYPE_CHECKING:
     from rig.monitor.process import Serving
 
-__all__ = ["replay_"]
-
 
 def _of_a_page_later(**given: Any) -> "Callable[[], Serving]":
     """Return what makes the options of a page: a terminal view does without the page's libraries."""

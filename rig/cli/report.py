@@ -7,8 +7,6 @@ import typer
 
 from rig.cli.options import Overwrite, keep_existing
 
-__all__ = ["report_"]
-
 
 def report_(
     files: Annotated[

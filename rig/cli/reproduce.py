@@ -10,8 +10,6 @@ import typer
 from rig.cli.options import Json
 from rig.errors import ConfigurationError
 
-__all__ = ["reproduce_"]
-
 
 def reproduce_(
     context: typer.Context,

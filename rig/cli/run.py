@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
     from rig.recording.reader import Recording
 
-__all__ = ["resume", "run"]
-
 Rehearsed = Annotated[Path | None, typer.Option(help="Rehearsal of the plan on this bench, for arming and the record.")]
 Check = Annotated[Path | None, typer.Option(help="Check of this bench to compare with, in place of the last one.")]
 Override = Annotated[

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from rig.arming.arming import Arm, ArmingRequest
     from rig.arming.run_options import RunOptions
 
-__all__ = ["ask", "of_a_further_part", "of_a_recording", "shown", "with_options", "with_run_options"]
-
 Seed = Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)]
 SeedOfTheRest = Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)]
 Realtime = Annotated[bool, typer.Option("--realtime", help="Hold a virtual rig back to the wall clock.")]

@@ -7,8 +7,6 @@ import typer
 
 from rig.cli.options import Overwrite
 
-__all__ = ["new", "schema"]
-
 
 def schema(
     what: Annotated[str, typer.Argument(help="bench, plan, rig (parts of a virtual rig), sensors or a kind of plan.")],

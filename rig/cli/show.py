@@ -7,8 +7,6 @@ import typer
 
 from rig.cli.options import Json, show_file
 
-__all__ = ["plot_", "show"]
-
 
 def show(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")], json: Json = False

@@ -7,8 +7,6 @@ from typing import Annotated
 
 import typer
 
-__all__ = ["stop"]
-
 LOOK_S = 0.02
 
 

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
     from rig.tuning.tuning import Tuning
 
-__all__ = ["tune_"]
-
 
 @with_run_options(of_a_recording)
 def tune_(

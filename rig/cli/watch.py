@@ -11,8 +11,6 @@ import typer
 if TYPE_CHECKING:
     from rig.live.reader import LiveRun
 
-__all__ = ["watch_"]
-
 LOOK_S = 0.2
 NICE = 5
 

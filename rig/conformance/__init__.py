@@ -4,8 +4,8 @@ For a driver's own tests derive from `DriverContract`; for any installed driver 
 ``pytest --pyargs rig.conformance --rig-bench BENCH``.
 """
 
+from rig.conformance.answers import with_loopback
 from rig.conformance.contract import DriverContract
-from rig.conformance.loopback import with_loopback
 from rig.conformance.subject import NotApplicable, Unproven
 from rig.conformance.without_host import last_output_v
 

@@ -12,8 +12,6 @@ from rig.bench import Bench
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
 from rig.daq import CONTINUED, DAQ, HELD, LOST, Channel, flag_names
 
-__all__ = ["FILTER_SAMPLES", "Answer", "Heard", "HearingTheOutput", "with_loopback"]
-
 FILTER_SAMPLES = 32  # over which a filter spreads an output
 LONGEST_RUN_S = 30.0
 SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks

@@ -10,8 +10,6 @@ from rig.conformance.subject import has_clock
 from rig.daq import DAQ
 from rig.errors import DaqWatchdog
 
-__all__ = ["ContinuingTests"]
-
 PERIOD = 12.4
 """Samples: no whole number, and few, so that a copy of a copy shows after a while."""
 OFF_SHARE = 0.1  # of the amplitude: the cut of a peak between two samples takes 3 %, the cubic 0.2 %

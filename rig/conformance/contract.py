@@ -19,8 +19,6 @@ from rig.conformance.samples import SamplesTests
 from rig.conformance.ways_out import WaysOutTests
 from rig.conformance.without_host import WithoutHostTests
 
-__all__ = ["DriverContract"]
-
 
 class DriverContract(
     LifeCycleTests, SamplesTests, LoopbackTests, ContinuingTests, WaysOutTests, WithoutHostTests, GoneTests

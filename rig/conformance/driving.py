@@ -13,8 +13,6 @@ import numpy as np
 from rig.bench import Bench
 from rig.drivers import make_daq
 
-__all__: list[str] = []
-
 
 def main() -> None:
     """Drive; ends by itself only where the process that wanted it is gone."""

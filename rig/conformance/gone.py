@@ -9,8 +9,6 @@ from rig.conformance.timing import TimingTests
 from rig.daq import State
 from rig.errors import DaqError
 
-__all__ = ["GoneTests"]
-
 BLOCKS = 1000
 """Blocks that a driver may have in store."""
 

@@ -6,8 +6,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-__all__ = ["HostWatch"]
-
 NAP_S = 0.002
 LATE_S = 0.004  # beyond a nap: more than a quiet machine is, and far below what a device is judged by
 AROUND_S = 0.1  # before and after: who was not run then may not have been run in between

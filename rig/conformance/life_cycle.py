@@ -11,8 +11,6 @@ from rig.conformance.subject import DriverUnderTest
 from rig.daq import State
 from rig.errors import DaqRefused
 
-__all__ = ["LifeCycleTests"]
-
 CYCLES = 3
 DESCRIPTORS = Path("/proc/self/fd")
 

@@ -11,8 +11,6 @@ from rig.conformance.subject import DriverUnderTest
 from rig.daq import DAQ, State
 from rig.errors import DaqError
 
-__all__ = ["LOOKS_S", "STILL", "UNSEEN", "LookingAtTheOutput", "Seen", "loopback_of", "replaced"]
-
 STILL = 0.1  # of the amplitude: an output below it counts as 0 V
 LOOKS_S = 0.02
 UNSEEN = (

@@ -2,11 +2,9 @@
 
 import numpy as np
 
-from rig.conformance.answers import FILTER_SAMPLES, Heard, HearingTheOutput, with_loopback
+from rig.conformance.answers import FILTER_SAMPLES, Heard, HearingTheOutput
 from rig.conformance.subject import TOO_BUSY, has_clock
 from rig.errors import DaqOverrun, DaqTimeout, DaqWatchdog
-
-__all__ = ["LoopbackTests", "with_loopback"]
 
 LATE_SAMPLES = 0.25  # as `rig check` allows
 LEAST_TAP = 0.05  # of the largest: below it is noise

@@ -10,8 +10,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from rig.bench import Bench
+from rig.conformance.answers import with_loopback
 from rig.conformance.contract import DriverContract
-from rig.conformance.loopback import with_loopback
 from rig.conformance.subject import NotApplicable, Unproven
 from rig.conformance.timing import SLOW_TEST
 from rig.conformance.without_host import KILLING_TEST, last_output_v
@@ -19,8 +19,6 @@ from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import DaqError, NotArmed
-
-__all__ = ["OUTCOMES", "Finding", "check_driver", "require_arming", "unproven"]
 
 Outcome = Literal["passed", "failed", "not applicable", "unproven"]
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)

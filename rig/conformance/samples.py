@@ -7,8 +7,6 @@ import numpy as np
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest
 from rig.daq import DAQ, HELD, LOST
 
-__all__ = ["SamplesTests"]
-
 KEPT_BLOCKS = 50
 KNOWN_SAMPLES = 2000
 KNOWN_SHARE = 0.05  # of what is known, RMS

@@ -12,8 +12,6 @@ from rig.conformance.host import HostWatch
 from rig.daq import DAQ
 from rig.errors import DaqOverrun, DaqRefused, DaqTimeout, DaqWatchdog
 
-__all__ = ["TOO_BUSY", "DriverUnderTest", "NotApplicable", "Unproven", "has_clock"]
-
 TOO_BUSY = "this machine was too busy to judge the device: try again when it is idle"
 
 

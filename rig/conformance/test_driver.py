@@ -3,8 +3,8 @@
 import pytest
 
 from rig.bench import Bench
+from rig.conformance.answers import with_loopback
 from rig.conformance.contract import DriverContract as _Contract
-from rig.conformance.loopback import with_loopback
 from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.hil.subject import Subject

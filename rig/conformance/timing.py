@@ -12,8 +12,6 @@ import numpy as np
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
 from rig.daq import DAQ
 
-__all__ = ["SLOW_TEST", "TimingTests"]
-
 SLOW_TEST = "test_a_block_takes_no_longer_than_it_lasts"
 BLOCK_S = 0.05
 BLOCKS = 5

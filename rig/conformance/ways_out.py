@@ -9,8 +9,6 @@ from rig.conformance.subject import TOO_BUSY
 from rig.daq import HELD, State
 from rig.errors import DaqError
 
-__all__ = ["WaysOutTests"]
-
 
 class WaysOutTests(LookingAtTheOutput):
     """Tests that look at the output from outside."""

@@ -10,8 +10,6 @@ from pathlib import Path
 from rig.bench import Bench
 from rig.conformance.looking import LOOKS_S, STILL, LookingAtTheOutput, Seen, loopback_of
 
-__all__ = ["KILLING_TEST", "WithoutHostTests", "last_output_v"]
-
 KILLING_TEST = "test_the_output_comes_to_0_v_without_the_host"
 NOTHING_TO_LOOK_AT = "nothing is left to look at once the process is dead: no witness (override witness), no loopback"
 

@@ -11,8 +11,6 @@ from rig.drawing.style import height_is_free, rc
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["areas", "broad", "is_narrow"]
-
 _PANEL_IN = 1.65
 
 

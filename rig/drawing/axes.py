@@ -7,8 +7,6 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["from_zero", "log_axis", "widen"]
-
 
 def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
     """Make an axis logarithmic that spans at least a factor, with plain numbers at 1, 2, 5 where it spans few decades."""

@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["RESOLVED", "folds_back"]
-
 RESOLVED = 2e-5
 """Smallest relative fall of the frequency between points that counts: less is within the scatter of a measurement."""
 

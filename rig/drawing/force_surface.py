@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_force_surface", "draw_measured_surface"]
-
 _CURVES = 4
 _SECTIONS_DEG = (30.0, 90.0, 150.0)
 _MOST_NAMED = 8

@@ -1,11 +1,8 @@
 """Values at the lines of a spectrum, made fit for drawing."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["pooled", "without_wraps"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def pooled(errors: Float, lines: int = 21) -> Float:

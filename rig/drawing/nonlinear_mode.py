@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SHAPE_FLOOR", "draw_mode", "draw_properties"]
-
 _GAIN_ERROR = 0.02
 SHAPE_FLOOR = _GAIN_ERROR**2 / 4.0
 """1 - MAC of two equal components, one of them wrong by 2 %: a smaller change of shape is not told from a sensor's error."""

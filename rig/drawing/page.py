@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["NARROW_IN", "columns_for", "grid", "legend_below", "page_for", "svg_of", "text_below"]
-
 NARROW_IN = 5.0
 """On narrower pages panels stand below one another."""
 _WIDE = 1.6

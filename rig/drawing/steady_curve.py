@@ -10,8 +10,6 @@ from rig.drawing.areas import broad
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["BEYOND", "UNSTABLE", "draw_curve", "draw_ends", "ends_within", "why_it_ends"]
-
 BEYOND = 1.0
 """Range use above which a model extrapolates."""
 UNSTABLE = (0, (1.2, 1.2))

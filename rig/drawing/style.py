@@ -20,31 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "COLOURS",
-    "MAIN",
-    "MARKERS",
-    "PRESETS",
-    "REJECTED",
-    "SECOND",
-    "STYLE",
-    "THIRD",
-    "TRACE_BINS",
-    "Preset",
-    "engineering",
-    "height_is_free",
-    "lines_on",
-    "page_in",
-    "plain_log",
-    "points",
-    "rc",
-    "restyle",
-    "say_why_empty",
-    "shade",
-    "title",
-    "unit_text",
-]
-
 MAIN, SECOND, THIRD = "#0072b2", "#d55e00", "#009e73"
 REJECTED = "#767676"
 """Grey of everything that is not accepted, and of reference lines: still readable as text on white (contrast 4.5 to 1)."""

@@ -13,8 +13,6 @@ from rig.wire.can.link import CanLink
 from rig.wire.can.slcan import SlcanBus
 from rig.wire.link import Link
 
-__all__ = ["CanDAQ", "CanOptions", "make_bus"]
-
 
 class CanOptions(WireOptions):
     """Where the bus is, how fast it is, and which node the device has."""

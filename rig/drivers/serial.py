@@ -7,8 +7,6 @@ from rig.bench.configuration import validated
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.wire.serial.link import SerialLink
 
-__all__ = ["SerialDAQ", "SerialOptions"]
-
 
 class SerialOptions(WireOptions):
     """Port and baud rate, besides the options that all wires share."""

@@ -30,8 +30,6 @@ from rig.wire.messages import (
     Stream,
 )
 
-__all__ = ["Device"]
-
 BEAT_S = 1.0 / HEARTBEATS_HZ
 COUNTED = {DeviceFlag.OUTPUT_HELD: "held_blocks", DeviceFlag.OUTPUT_CONTINUED: "continued_blocks"}
 MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED

@@ -15,8 +15,6 @@ from rig.bench import Bench, DriverChoice
 from rig.bench.configuration import validated
 from rig.emulator.settings import EmulatorSettings
 
-__all__ = ["Emulator", "driver_options", "emulated"]
-
 ENDING_S = 10.0
 LOCKSTEP_S = 60.0
 """Watchdog and time-out of a bench whose device waits for the host, s."""

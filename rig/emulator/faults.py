@@ -8,8 +8,6 @@ from rig.errors import DaqError
 from rig.wire.link import Link
 from rig.wire.messages import Message, Readback, Samples
 
-__all__ = ["Block", "Faults", "FaultySender"]
-
 
 @dataclass(frozen=True)
 class Faults:

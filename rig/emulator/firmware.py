@@ -23,8 +23,6 @@ from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqDisconnected, DaqProtocol
 from rig.wire.messages import DeviceFlag
 
-__all__ = ["Firmware", "description", "started"]
-
 STARTING_S = 30.0
 """Time in which a program has to say that it can be reached, s."""
 ENDING_S = 5.0

@@ -11,8 +11,6 @@ import numpy as np
 from rig.continuation import SOURCE, begin, count_at, forget, keep, ring_for
 from rig.wire.messages import Output
 
-__all__ = ["Converter", "Due", "OutputQueue"]
-
 
 class Converter:
     """The output converter: passes outputs, holds the last one where one is missing, or goes to 0 V.

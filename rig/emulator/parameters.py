@@ -6,8 +6,6 @@ from rig.wire.link import Link
 from rig.wire.messages import LOWEST_VERSION, VERSION, Parameter, Status
 from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_words
 
-__all__ = ["SETTINGS", "Parameters", "Words", "carried", "described"]
-
 Words = dict[tuple[int, int], int]
 """Words by parameter and item."""
 

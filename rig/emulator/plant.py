@@ -18,8 +18,6 @@ from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.layout import Flag
 
-__all__ = ["LoggedPlant", "Plant", "VirtualPlant", "Wiring", "check_log"]
-
 WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
 
 

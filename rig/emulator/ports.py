@@ -14,8 +14,6 @@ from rig.wire.serial.port import open_pseudo_terminal
 if TYPE_CHECKING:
     from rig.wire.can.bus import FrameBus
 
-__all__ = ["device_end", "driver_options_of", "largest_block", "named", "pseudo_terminal"]
-
 
 @contextmanager
 def device_end(settings: EmulatorSettings) -> Iterator[tuple[Link, dict[str, Any]]]:

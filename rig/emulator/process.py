@@ -19,8 +19,6 @@ from rig.emulator.settings import EmulatorSettings
 from rig.system.privileges import prepare
 from rig.wire.link import Link
 
-__all__ = ["Ready", "ask_for_priority", "keep_serving", "run_emulator"]
-
 PRIORITY = 60
 """Of SCHED_FIFO: below the wall-clock loop's, above the kernel's interrupt threads."""
 MOST_AT_ONCE = 64  # messages read after a late deadline

@@ -17,8 +17,6 @@ from rig.emulator.ports import named, pseudo_terminal
 from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqRefused
 
-__all__ = ["Running", "is_for_arm", "running"]
-
 ARM_MACHINE = 40  # e_machine of an ELF file
 QEMU = "qemu-system-arm"
 STARTING_S = 30.0

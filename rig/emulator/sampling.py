@@ -9,8 +9,6 @@ from rig.emulator.outputs import Converter, OutputQueue
 from rig.emulator.plant import Plant
 from rig.wire.messages import DeviceFlag, Output
 
-__all__ = ["Measured", "Sampling"]
-
 ROUNDING_SAMPLES = 1e-6  # an instant that falls on a sample is that sample's
 
 

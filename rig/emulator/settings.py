@@ -11,8 +11,6 @@ from rig.bench.configuration import Configured
 from rig.emulator.faults import Faults
 from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
 
-__all__ = ["EmulatorSettings"]
-
 
 class EmulatorSettings(Configured):
     """A virtual bench behind a wire, and how it behaves there."""

@@ -8,8 +8,6 @@ from rig.emulator.parameters import Parameters
 from rig.emulator.sampling import Sampling
 from rig.wire.messages import ARM_KEY, DeviceFlag, DeviceState, Parameter, Status
 
-__all__ = ["Life"]
-
 
 class Life:
     """States and the transitions between them.

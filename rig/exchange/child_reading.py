@@ -10,8 +10,6 @@ from rig.exchange.child_values import read_values
 from rig.system.child import ChildFailed, ask_child
 from rig.system.text_files import read_bytes
 
-__all__ = ["NAMES", "ImportFailed", "read_in_child"]
-
 NAMES = {
     "mat": "MAT file",
     "hdf5": "HDF5 file",

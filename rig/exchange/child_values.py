@@ -10,8 +10,6 @@ from rig.errors import RigError
 from rig.recording.examination import LARGEST_RATIO, SMALL_BYTES
 from rig.system.child import MEMORY_BYTES
 
-__all__ = ["TooMuchData", "most_bytes", "read_values", "reason", "write_values"]
-
 MOST_BYTES = 2_000_000_000
 """Data of a file of any size."""
 _ITEM_BYTES = 100

@@ -23,8 +23,6 @@ from rig.text.contents import Contents
 if TYPE_CHECKING:
     from identification.mapping.csv_layout import CsvLayout
 
-__all__ = ["columns_in", "read_csv", "table_lines", "table_of_ours", "units_of_csv", "write_csv"]
-
 LARGEST_BYTES = 1_000_000_000
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 _KIND, _OTHERS = "# vibrolock: ", "# others: "

@@ -28,8 +28,6 @@ from rig.system.whole_file import whole_file
 from rig.text.contents import Contents
 from rig.text.printable import shown
 
-__all__ = ["DATA", "export_file", "read_objects", "write_contents"]
-
 DATA = ("results", "time")
 """Choices of data to take from a recording."""
 ENCODINGS = ("ascii", "binary")

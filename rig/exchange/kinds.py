@@ -27,8 +27,6 @@ from rig.exchange.time_data import TimeData, time_data_from, time_data_parts, tr
 from rig.measurements.backbone_table import backbone_from, backbone_parts
 from rig.text.contents import Contents, Labels, unit_of
 
-__all__ = ["KINDS", "put_together", "taken_apart"]
-
 
 def _nonlinear_mode(mode: NonlinearMode) -> Contents:
     arrays, attributes = mode.to_arrays()

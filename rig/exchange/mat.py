@@ -14,8 +14,6 @@ import numpy as np
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.text.contents import Contents
 
-__all__ = ["parsed_mat", "read_mat", "structures_of_ours", "write_mat"]
-
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
 _LONGEST = 31  # largest number of characters of a field name that every reader of version 5 accepts
 

@@ -8,8 +8,6 @@ import numpy as np
 from identification import PnlssModel
 from rig.text.contents import Contents
 
-__all__ = ["pnlss_from", "pnlss_parts"]
-
 _NAMES = {
     **{name.upper(): name for name in ("a", "b", "c", "d", "e", "f")},
     "xpowers": "state_features/exponents",

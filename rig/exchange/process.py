@@ -12,8 +12,6 @@ from rig.exchange.child_reading import NAMES
 from rig.exchange.child_values import most_bytes, reason, write_values
 from rig.system.child import confine
 
-__all__ = ["main"]
-
 _READERS = {
     "mat": "rig.exchange.mat:parsed_mat",
     "hdf5": "rig.exchange.foreign.hdf5:read_hdf5",

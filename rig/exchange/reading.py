@@ -14,14 +14,6 @@ from rig.text.printable import shown
 if TYPE_CHECKING:
     from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra
 
-__all__ = [
-    "ImportFailed",
-    "import_file",
-    "import_sep005",
-    "read_frequency_responses",
-    "read_mapping",
-]
-
 _DEFAULT_KIND = "frequency-responses"
 _PROPOSAL = "say by `mapping` what is where in it; `rig new mapping` proposes one for time data"
 

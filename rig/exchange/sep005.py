@@ -13,8 +13,6 @@ from rig.exchange.child_reading import ImportFailed
 from rig.system.text_files import read_text
 from rig.text.printable import shown
 
-__all__ = ["data_of_series", "series_in"]
-
 _LARGEST_JSON_BYTES = 500_000_000
 _HIGHEST_HZ = 1e100  # of any number
 

@@ -10,8 +10,6 @@ from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 if TYPE_CHECKING:
     from identification.mapping.csv_layout import CsvLayout
 
-__all__ = ["EXPORTS", "FORMATS", "format_of", "read_data"]
-
 FORMATS = {
     "mat": (".mat",),
     "uff": (".uff", ".unv", ".uf", ".bunv"),

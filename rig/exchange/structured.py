@@ -10,8 +10,6 @@ from identification.structured.arrays import model_arrays, model_from
 from identification.structured.laws import Damper, Joint, Spring, UserSpring
 from rig.text.contents import Contents
 
-__all__ = ["structured_from", "structured_parts"]
-
 _POINTS = 201
 """Displacements of the tables, from minus to plus the reach."""
 _UNITS = {

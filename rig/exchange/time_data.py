@@ -11,16 +11,6 @@ from identification import Channel, IdentificationError, TimeRecord, TimeRecords
 from rig.campaigns.evaluation.point import point_name
 from rig.text.contents import Contents
 
-__all__ = [
-    "TimeData",
-    "records_of_series",
-    "series_of_records",
-    "time_data_from",
-    "time_data_parts",
-    "transient_from",
-    "transient_parts",
-]
-
 
 @dataclass(frozen=True, eq=False)
 class TimeData:

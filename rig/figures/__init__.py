@@ -11,13 +11,11 @@ Begin with `plot`: it draws a file, a run, a recording, or a result of identific
 
 from typing import TYPE_CHECKING
 
-from rig.drawing.style import restyle
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from rig.figures.curves import View
-    from rig.figures.results import plot
+    from rig.drawing.style import restyle as restyle
+    from rig.figures.curves import View as View
+    from rig.figures.results import plot as plot
 else:
-    __getattr__, __dir__ = on_use(__name__, {"View": "curves", "plot": "results"})
-
-__all__ = ["View", "plot", "restyle"]
+    __getattr__, __dir__, __all__ = on_use(__name__)

@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["band", "branches", "length_factor"]
-
 LENGTHS = {"mm": 1e3, "µm": 1e6}
 
 

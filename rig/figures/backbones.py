@@ -12,8 +12,6 @@ from simulators.analysis import PeriodicResponses
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_continuous", "draw_periodic"]
-
 
 def draw_continuous(page: "Figure", found: ContinuousBackbone) -> None:
     """Draw modal frequency and damping over the amplitude: the mean of both ramps with its 95 % band, and each ramp."""

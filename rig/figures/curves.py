@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 
 from identification import Channel
 from rig.errors import RecordingError
-
-__all__ = ["Curves", "Line", "Panel", "Quantity", "Trace", "View", "channel_of", "peak"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _DERIVATIVE = {"m": 0, "m/s": 1, "m/s2": 2, "m/s^2": 2}
 """Which derivative of the displacement a channel measures, by its unit."""

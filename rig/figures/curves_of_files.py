@@ -30,14 +30,13 @@ from rig.drawing.folding import folds_back
 from rig.drawing.style import unit_text
 from rig.errors import RecordingError
 from rig.figures.curves import Curves, Line, Panel, Quantity, Trace, View, channel_of, peak
-from rig.models.files.files import KINDS, load
+from rig.models.files.files import load
+from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from rig.models.files.structured import IdentifiedStructured
-
-__all__ = ["FAMILIES", "curves_of", "family_of"]
 
 FREQUENCY = Quantity("frequency", "Hz", "frequency")
 LAG = Quantity("phase lag of displacement", "deg")

@@ -15,14 +15,13 @@ from rig.errors import RecordingError
 from rig.figures.curves import View
 from rig.figures.lateness import draw_lateness
 from rig.figures.overlay import overlay
-from rig.models.files.files import KINDS, load, understood
+from rig.models.files.files import load, understood
+from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-__all__ = ["drawing", "drawing_of", "plot"]
 
 CHECK = "rig.check.figure:draw_recorded_check"
 

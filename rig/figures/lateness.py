@@ -13,8 +13,6 @@ from rig.recording.reader import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["PACED", "TIMES", "draw_lateness", "exceedance"]
-
 PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
 """Printed name of each recorded pacing."""
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["overlay"]
-
 DENSE = 80
 """Curves with more points are drawn without markers."""
 MOST_LEVELS = len(MARKERS)

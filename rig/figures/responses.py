@@ -24,16 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "as_predictions",
-    "draw_band",
-    "draw_comparison",
-    "draw_constant_force",
-    "draw_prediction",
-    "draw_response",
-    "draw_surface",
-]
-
 _FREQUENCY, _LAG = "frequency, Hz", "phase lag of displacement, deg"
 _LAGS_DEG = (30.0, 90.0, 150.0)
 

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["RESULTS", "plot"]
-
 
 class ResultFigure(NamedTuple):
     """How one type of result is drawn."""

@@ -10,8 +10,6 @@ from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title, unit_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_distortion", "draw_stabilisation", "draw_transient"]
-
 _FLOOR = 1e-6  # of the largest amplitude: smaller values are rounding
 
 

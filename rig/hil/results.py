@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-__all__ = ["Results"]
-
 PACKAGES = ("vibrolock", "numpy", "scipy", "numba", "h5py", "pyserial", "python-can", "pytest")
 
 

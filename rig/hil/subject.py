@@ -19,8 +19,6 @@ from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, NotArmed
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["ArmedRig", "Subject", "refuse_sharing", "subject"]
-
 EMULATED_BLOCK_S = 0.004  # a wire carries blocks, no single samples at the rate of a virtual rig
 
 

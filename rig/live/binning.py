@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["put_bin"]
-
 
 def put_bin(one: np.void, rows: np.ndarray, *, end_s: float, part: int, level: float) -> None:
     """Fill a record of `rig.live.layout.bin_dtype` from the rows within it: least and greatest values, NaN where none is known.

@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["BINS", "BIN_S", "FRAME", "HEAD", "WINDOW_BYTES", "bin_dtype", "window_rows"]
-
 FRAME = np.dtype(
     [
         ("written_ns", "i8"),

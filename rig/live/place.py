@@ -19,20 +19,6 @@ from pathlib import Path
 from rig.errors import RecordingError
 from rig.system.locking import is_locked, lock
 
-__all__ = [
-    "FACTS",
-    "FRAME_FILE",
-    "LINES",
-    "LOCK",
-    "STOP",
-    "TRACES",
-    "base_folder",
-    "lives",
-    "new_folder",
-    "remove",
-    "runs",
-]
-
 FACTS, FRAME_FILE, TRACES, LINES = "facts.json", "frame", "traces", "lines.jsonl"
 STOP, LOCK = "stop", "lock"
 WHERE = "VIBROLOCK_LIVE"

@@ -26,8 +26,6 @@ from rig.recording.jsontext import encode
 from rig.text.printable import error_text
 from rig.tick.layout import recorded_row
 
-__all__ = ["Live", "Publisher", "Unpublished", "published"]
-
 FRAMES_PER_S = 30.0
 LATENESS_S = 1.0
 

@@ -17,8 +17,6 @@ from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, base_folder, lives,
 from rig.live.stopping import request_stop
 from rig.tick.layout import recorded_row
 
-__all__ = ["Frame", "LiveRun", "View", "left_behind", "run_into"]
-
 TRIES = 20
 
 

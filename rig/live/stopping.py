@@ -15,8 +15,6 @@ from rig.errors import RecordingError
 from rig.live.place import STOP
 from rig.text.printable import printable
 
-__all__ = ["heeding", "request_stop"]
-
 LOOK_S = 0.05
 LONGEST = 300
 

@@ -7,8 +7,6 @@ import numpy as np
 from rig.tick.layout import TickArrays
 from rig.tick.sequencer.layout import Drive, Outcome, SegmentKind
 
-__all__ = ["time_left_s"]
-
 NO_SETTLING_YET = 3.0  # times the settled periods that the rule asks for at least
 
 

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 
-__all__ = ["lateness_s", "reached_blocks_s"]
-
 HORIZON_S = 0.5  # a block is late only if the device's clock is seen to go on within this time
 
 

@@ -10,8 +10,6 @@ from typing import Any
 from rig.bench import Bench
 from rig.errors import RigError
 
-__all__ = ["examine", "examine_bench", "measure_bench"]
-
 RATE_HZ = 1000.0
 SECONDS = 1.0
 MEASURED_S = 1.5  # of a device, before settings are recommended and tried

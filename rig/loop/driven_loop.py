@@ -10,9 +10,6 @@ from rig.tick.safety.layout import GuardMode
 from rig.tick.safety.limits import end_reason_of
 from rig.tick.tick import Tick
 
-__all__ = ["Block", "DrivenLoop", "end_by_driver"]
-
-
 Block: TypeAlias = tuple[np.ndarray, np.ndarray]
 """A block of inputs, V [n, n_channels], and the device's flags [n]."""
 

@@ -15,8 +15,6 @@ from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
 
-__all__ = ["FusedDAQ", "Loop", "LoopStatistics", "RunningLoop"]
-
 CHUNK_S = 0.5
 PACED_CHUNK_S = 0.02
 

@@ -22,20 +22,6 @@ from typing import NamedTuple
 
 from rig.daq import Adjustable
 
-__all__ = [
-    "BUSY",
-    "REACHED",
-    "Recommendation",
-    "Settings",
-    "Timing",
-    "answer_s",
-    "complaints",
-    "milliseconds",
-    "queue_reason",
-    "recommend",
-    "shortest_queue",
-]
-
 RESERVE = 1.5  # of the largest lateness: one or two seconds do not see the largest of a test
 BUSY = 0.5  # of a block for the driver's computing; controller and recorder need the rest
 GAPS = 3.0  # of the longest time between two blocks

@@ -18,8 +18,6 @@ from rig.loop.loop import Loop, RunningLoop
 from rig.loop.worker.queue_choice import QueueChoice, settle_queue
 from rig.tick.tick import TickSettings
 
-__all__ = ["Session", "open_session"]
-
 NO_PROCESS = "this system has no process for the loop alone: it shares its time with the recorder, nothing is promised"
 
 

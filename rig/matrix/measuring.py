@@ -23,8 +23,6 @@ from rig.loop.worker.probe import smallest_steps_v
 from rig.matrix.rows import Row, Verified
 from rig.matrix.ways import Way, way_benches
 
-__all__ = ["device_row", "machine", "matrix_rows", "row_from"]
-
 MEASURED_S = 1.5
 DRIVE_V = 0.05  # as much as the conformance suite
 DRIVE_S = 0.4

@@ -12,8 +12,6 @@ from rig.bench.configuration import Configured, validated
 from rig.errors import ConfigurationError
 from rig.system.whole_file import whole_file
 
-__all__ = ["Row", "Verified", "read_rows", "write_rows"]
-
 
 class Verified(Configured):
     """What the conformance suite has found (`rig.conformance`)."""

@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from rig.matrix.rows import Row
 from rig.text.console import number, print_table
 
-__all__ = ["print_matrix"]
-
 HEADINGS = (
     *("way", "rate Hz", "reached Hz", "highest Hz", "block", "queue", "latency ms", "late p99.9 ms", "latest ms"),
     *("held", "lost", "step mV", "watchdog s", "0 V after s", "suite", "on"),

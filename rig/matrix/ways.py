@@ -9,8 +9,6 @@ from typing import Any
 from rig.bench import Bench
 from rig.emulator.emulated import emulated
 
-__all__ = ["EMULATED_BLOCK", "Way", "way_benches"]
-
 EMULATED_BLOCK = 10  # samples, 2 ms at 5 kHz: what a host with ordinary scheduling keeps up with
 ARM = 40  # machine in the header of an ELF file
 CLASSICAL_PART = 0.5  # of the bench's rate: classical CAN cannot carry 5 kHz sample by sample

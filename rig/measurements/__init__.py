@@ -1,17 +1,16 @@
 """Read recordings as measurements in memory, and as experiments for nonlinear state-space models."""
 
+from identification.multisine.estimators import Estimator
+from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
 from rig.measurements.measurements import (
     STEPPED,
-    Estimator,
     backbone,
-    bench_of_recording,
     continuous_backbones,
     decays,
     dwell_course,
     force_surface,
     frequency_responses,
     load_backbone,
-    point_rows,
     response_matrices,
     spectra,
     sweeps,

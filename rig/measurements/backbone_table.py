@@ -8,8 +8,6 @@ import numpy as np
 from identification import Backbone, Channel, PeriodicVibration
 from rig.text.contents import Contents
 
-__all__ = ["backbone_from", "backbone_parts"]
-
 
 def backbone_parts(backbone: Backbone) -> Contents:
     """Return the arrays over the points, including derived quantities (force, amplitude, lag) for the reader."""

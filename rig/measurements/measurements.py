@@ -12,31 +12,13 @@ from identification import (
     FrequencyResponseMatrix,
     PeriodicSpectra,
     Transient,
+    force_surface as surface_of,
 )
-from identification import force_surface as surface_of
-from identification.multisine.best_linear_approximation import Estimator
+from identification.multisine.estimators import Estimator
 from rig.campaigns.dwell.points import DwellCourse
-from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
 from rig.campaigns.kinds import KINDS, kinds_that_yield
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
-
-__all__ = [
-    "STEPPED",
-    "Estimator",
-    "backbone",
-    "bench_of_recording",
-    "continuous_backbones",
-    "decays",
-    "dwell_course",
-    "force_surface",
-    "frequency_responses",
-    "load_backbone",
-    "point_rows",
-    "response_matrices",
-    "spectra",
-    "sweeps",
-]
 
 STEPPED = kinds_that_yield(FrequencyResponse)
 """Kinds of recordings that hold frequency responses, one per level."""

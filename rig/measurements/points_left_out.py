@@ -6,8 +6,6 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.plans import plan_from
 from rig.recording.reader import Recording
 
-__all__ = ["points_left_out"]
-
 _NOT_REACHED = "the recording ended before it"
 
 

@@ -14,8 +14,6 @@ import numpy as np
 from rig.measurements.tables import selected_rows
 from rig.recording.reader import Recording
 
-__all__ = ["time_series"]
-
 QUANTITIES = {"N": "f", "m/s^2": "a", "m/s2": "a", "m/s": "v", "m": "d"}
 """Letter of a quantity by its unit; others have none."""
 VOLTAGE = "output_v"

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-__all__ = ["points_table", "selected_rows", "telemetry"]
-
 ABOUT = ("direction", "repeat", "settled", "quality", "reason")
 """What is known of a point of any kind besides its level and results."""
 

@@ -10,7 +10,8 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
-from rig.models.files.files import KINDS, load, load_as, save
+from rig.models.files.files import load, load_as, save
+from rig.models.files.kinds import KINDS
 from rig.models.files.rehearsal import REHEARSAL
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
@@ -21,17 +22,6 @@ from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
 from rig.rehearsal.knowledge import gathered
 from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse
 from rig.rehearsal.remedies import Effect, improve
-
-__all__ = [
-    "Listener",
-    "Subject",
-    "compare_with",
-    "improve_into",
-    "load_rehearsal",
-    "rehearse_into",
-    "request_for",
-    "twin_into",
-]
 
 FURTHER_SEED = 1
 """Added to the seed of a rehearsal for that of the improved plan, which was chosen by the first one's twins."""

@@ -13,8 +13,6 @@ from rig.errors import ConfigurationError
 from rig.live.place import base_folder
 from rig.text.printable import error_text
 
-__all__ = ["fingerprint", "from_files", "self_signed"]
-
 VALID_D = 30
 EARLIER_D = 1  # the phone's clock may be behind
 

@@ -11,8 +11,6 @@ from rig.live.reader import LiveRun
 from rig.live.stopping import request_stop
 from rig.tick.safety.layout import GuardMode
 
-__all__ = ["HARDWARE", "ComingDown", "Outcome"]
-
 HARDWARE = "USE THE HARDWARE STOP"
 REST_S = 10.0
 """Time beyond the ramp for what a run may be doing: kernels that are compiled, a device that is opened, a block on its way."""

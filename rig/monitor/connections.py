@@ -13,8 +13,6 @@ from rig.monitor.first_message import with_token
 from rig.monitor.security import Keys
 from rig.monitor.visits import Visit
 
-__all__ = ["FeedConnection", "WebConnection"]
-
 REQUEST_S = 10.0
 """Time in which a request must have come in whole."""
 STUCK_S = 60.0

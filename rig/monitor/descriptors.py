@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 from rig.monitor.visits import MOST_FEEDS, MOST_KNOWN
 
-__all__ = ["Room", "room"]
-
 FILES = 64
 """Descriptors for everything but connections."""
 LEAST = 8

@@ -20,8 +20,6 @@ from rig.monitor.first_message import LARGEST, is_whole, shows_key
 from rig.monitor.security import Keys
 from rig.monitor.visits import Visit, Visits
 
-__all__ = ["BACKLOG", "Door"]
-
 BACKLOG = 1024
 """Connections that the system keeps until they are accepted."""
 AT_ONCE = 16

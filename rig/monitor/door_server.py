@@ -12,8 +12,6 @@ from rig.monitor.door import Door
 from rig.monitor.security import Keys
 from rig.monitor.visits import Visit
 
-__all__ = ["DoorServer"]
-
 
 class DoorServer(uvicorn.Server):
     """Serves at one socket that listens, by TLS if there is a context for it."""

@@ -27,8 +27,6 @@ from rig.live.reader import View
 from rig.monitor.shown import as_json, shown_bins, shown_frame, shown_line
 from rig.text.printable import error_text
 
-__all__ = ["Feed", "Look", "Moment", "Place"]
-
 TICK_S = 1.0 / 15.0
 STILL_S = 0.25
 """Longest time between two messages where nothing changes: they show that the server lives."""

@@ -7,8 +7,6 @@ from starlette.datastructures import Headers
 
 from rig.monitor.security import Keys
 
-__all__ = ["LARGEST", "LARGEST_HEADERS", "is_whole", "shows_key", "with_token"]
-
 LARGEST_HEADERS = 16384
 RECORD_HEAD, LARGEST_RECORD = 5, 16384
 HANDSHAKE = 22

@@ -13,8 +13,6 @@ from typing import Any, NamedTuple
 from rig.recording.journal import journal_path
 from rig.system.child import ChildFailed, child_environment
 
-__all__ = ["Folder"]
-
 MOST_FILES = 500
 """So many files are listed, the youngest."""
 MOST_KEPT = 64

@@ -12,7 +12,8 @@ import tempfile
 from pathlib import Path
 
 from rig.errors import RigError
-from rig.recording.journal import journal_path, read_journal
+from rig.recording.journal import journal_path
+from rig.recording.journal_blocks import read_journal
 from rig.recording.layout import kind_in, open_unchecked, reading
 from rig.system.child import confine
 from rig.text.printable import one_line, printable

@@ -14,8 +14,6 @@ from pathlib import Path
 from rig.errors import RecordingError
 from rig.live.place import base_folder
 
-__all__ = ["open_in_browser"]
-
 PREFIX = "open-"
 HEAD = '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>vibrolock</title>'
 _FILE = re.compile(rf"{PREFIX}[0-9a-f]{{16}}\.html")

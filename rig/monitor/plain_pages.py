@@ -4,8 +4,6 @@ from html import escape
 
 from starlette.responses import HTMLResponse
 
-__all__ = ["HARDWARE", "plain_page"]
-
 HARDWARE = "USE THE HARDWARE STOP"
 
 

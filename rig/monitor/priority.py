@@ -3,8 +3,6 @@
 import os
 from contextlib import suppress
 
-__all__ = ["lower_priority"]
-
 NICE = 5
 
 

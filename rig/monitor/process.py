@@ -32,8 +32,6 @@ from rig.monitor.sources import always, of_an_earlier_run
 from rig.monitor.stopping import Stopping
 from rig.system.stop_signals import ended_in_order
 
-__all__ = ["Address", "PageServer", "Serving", "serve"]
-
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 DEFAULT_PORTS = {"http": 80, "https": 443}
 LARGEST_MESSAGE = 1024

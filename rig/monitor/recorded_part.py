@@ -20,8 +20,6 @@ from rig.tick.safety.layout import GuardMode
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import segment_table
 
-__all__ = ["PlanOfPart", "RecordedPart"]
-
 MANY = 100
 """Points whose end is looked for by bisection, each by itself, at most."""
 

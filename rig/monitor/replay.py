@@ -21,8 +21,6 @@ from rig.monitor.shown import fundamentals_of
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode
 
-__all__ = ["Replay"]
-
 FASTEST = 1000.0
 STRETCH = 100
 """Bins that are made at once and kept: ten seconds."""

@@ -31,8 +31,6 @@ from rig.system.child import ChildFailed
 if TYPE_CHECKING:
     from rig.monitor.folder import Folder
 
-__all__ = ["Site", "application"]
-
 PAGE = Path(__file__).parent / "page"
 TYPES = {
     ".css": "text/css; charset=utf-8",

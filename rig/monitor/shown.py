@@ -11,8 +11,6 @@ from rig.live.reader import Frame
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind
 
-__all__ = ["as_json", "fundamentals_of", "shown_bins", "shown_frame", "shown_line", "state_of"]
-
 SCOPE_PERIODS = 3
 SCOPE_POINTS = 400
 HARMONICS = 10

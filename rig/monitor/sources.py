@@ -14,8 +14,6 @@ from rig.monitor.shown import shown_line
 if TYPE_CHECKING:
     from rig.monitor.replay import Replay
 
-__all__ = ["Latest", "always", "chosen", "of_an_earlier_run", "recorded"]
-
 LOOK_S = 0.2
 Wanted = Callable[[Mapping[str, Any]], bool]
 

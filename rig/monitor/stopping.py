@@ -8,8 +8,6 @@ from rig.monitor.feed import Moment
 from rig.monitor.plain_pages import HARDWARE
 from rig.text.printable import error_text
 
-__all__ = ["Stopping"]
-
 SILENT_S = 2.0
 REST_S = 10.0
 """Time beyond the ramp for what a run may be doing before it looks."""

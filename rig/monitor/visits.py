@@ -3,8 +3,6 @@
 import asyncio
 from collections.abc import Callable
 
-__all__ = ["MOST_FEEDS", "MOST_KNOWN", "MOST_SOCKETS", "Visit", "Visits"]
-
 TURN_S = 0.2
 """Time that every stranger has for its handshake and its first request, however many others there are."""
 MOST_KNOWN = 64

@@ -11,8 +11,6 @@ from rig.monitor.shown import shown_frame
 from rig.monitor.words import event_text, point_text, state_text
 from rig.text.printable import printable
 
-__all__ = ["PlainLines", "how_it_ended", "keys_of_the_terminal", "watch"]
-
 LOOK_S = 0.1
 DRAWINGS_PER_S = 5.0
 DEAD = "its process has ended without a word: what the output does is not known, USE THE HARDWARE STOP"

@@ -7,17 +7,6 @@ from typing import Any
 from rig.text.console import number
 from rig.text.printable import one_line, printable
 
-__all__ = [
-    "duration",
-    "event_text",
-    "figure",
-    "point_cells",
-    "point_headings",
-    "point_text",
-    "share_word",
-    "state_text",
-]
-
 CLOSE = 0.8
 
 

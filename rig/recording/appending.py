@@ -12,8 +12,6 @@ from typing import Self
 from rig.recording.blocks import BlockKind, pack
 from rig.system.locking import lock
 
-__all__ = ["SYNC_INTERVAL_S", "BlockFile", "NameLost"]
-
 SYNC_INTERVAL_S = 0.5
 """The disk is synchronised at most this often while blocks are appended."""
 

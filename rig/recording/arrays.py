@@ -15,8 +15,6 @@ from rig.recording.layout import identify, kind_in, new_file, open_file, reading
 from rig.recording.tables import StoredTexts, write_object
 from rig.text.printable import error_text
 
-__all__ = ["kind_of", "read_arrays", "write_arrays"]
-
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
 _COMPRESSED_FROM_BYTES = 65536
 

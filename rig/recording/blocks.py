@@ -16,19 +16,6 @@ from typing import Any, BinaryIO
 
 from rig.recording import jsontext
 
-__all__ = [
-    "LARGEST_PAYLOAD",
-    "MAGIC",
-    "TWICE",
-    "BadBlockError",
-    "Block",
-    "BlockKind",
-    "Gap",
-    "following_block",
-    "pack",
-    "read_block",
-]
-
 MAGIC = b"VLJB"
 VERSION = 2
 LARGEST_PAYLOAD = 16 * 2**20

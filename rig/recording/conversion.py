@@ -17,8 +17,6 @@ from rig.recording.layout import new_file, open_file
 from rig.recording.parts import Part
 from rig.system.locking import exclusive
 
-__all__ = ["check_continuation", "continue_recording", "finalise"]
-
 
 def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] | None = None) -> Path | None:
     """Turn a journal into the HDF5 file ``output`` and remove the journal.

@@ -6,8 +6,6 @@ from typing import Any
 
 from rig.errors import RecordingError
 
-__all__ = ["LARGEST_RATIO", "MOST_OBJECTS", "SMALL_BYTES", "check_attributes", "examine", "objects_in"]
-
 MOST_OBJECTS = 200_000
 """Groups and datasets of a file; a recording of 1000 parts has about 60 000."""
 LARGEST_RATIO = 200

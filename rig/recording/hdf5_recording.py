@@ -14,8 +14,6 @@ from rig.recording.layout import file_integrity, identify, kind_in, open_uncheck
 from rig.recording.parts import Part, rows_at_once
 from rig.recording.tables import StoredTexts, write_object, write_table
 
-__all__ = ["StoredPart", "opened_recording", "read_recording", "taken_over", "write_recording"]
-
 _COMPRESSED: dict[str, Any] = {"compression": "lzf", "shuffle": True, "fletcher32": True}
 _WORTH_IT = 0.6  # of its size: a field that stays larger when compressed is stored as it is
 _TAKEN_OVER = "taken over from an unverified file"

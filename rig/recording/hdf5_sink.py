@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer, WriteableBuffer
 
-__all__ = ["Sink"]
-
 
 class Sink(io.RawIOBase):
     """A new file at ``path``, where nothing may be; opened and closed as any file object.

@@ -11,8 +11,6 @@ import numpy as np
 from rig.errors import RecordingError
 from rig.recording import jsontext
 
-__all__ = ["FORMAT", "SCHEMA", "Column", "Header", "check_schema", "packed"]
-
 FORMAT = "vibrolock"
 """Value of the attribute ``format`` of every file."""
 

@@ -12,8 +12,6 @@ from typing import BinaryIO
 from rig.errors import RecordingError
 from rig.system.child import MEMORY_BYTES, ChildFailed, ask_child
 
-__all__ = ["FIRST_WITH_DIGEST", "VERIFIED", "append_trailer", "digest_matches", "integrity_of"]
-
 _MAGIC, _VERSION = b"VLDIGEST", 1
 _TRAILER = struct.Struct("<8sI32sQ")
 _AT_ONCE = 2**20

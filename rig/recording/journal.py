@@ -18,12 +18,10 @@ from rig.errors import RecordingError
 from rig.recording import jsontext
 from rig.recording.appending import BlockFile, NameLost
 from rig.recording.blocks import LARGEST_PAYLOAD, MAGIC, TWICE, BlockKind
-from rig.recording.header import Column, Header, packed
-from rig.recording.journal_blocks import Tail, read_journal
+from rig.recording.header import Header, packed
+from rig.recording.journal_blocks import Tail
 from rig.recording.journal_contents import JournalContents
 from rig.system.locking import synchronise_folder
-
-__all__ = ["Column", "Header", "JournalWriter", "check_journal", "journal_path", "read_journal", "set_aside"]
 
 _ROWS_BLOCK_BYTES = 2**20
 

@@ -9,8 +9,6 @@ from rig.errors import RecordingError
 from rig.recording.blocks import TWICE, BadBlockError, Block, BlockKind, Gap, following_block, read_block
 from rig.recording.header import Header
 
-__all__ = ["EMPTY", "JournalBlocks", "Tail", "read_journal"]
-
 EMPTY = "is empty: its run was killed before it began, and nothing was recorded; start it again"
 
 

@@ -16,8 +16,6 @@ from rig.recording.header import Header
 from rig.recording.journal_blocks import Tail, read_journal
 from rig.recording.parts import Part, missing_rows, rows_at_once
 
-__all__ = ["JournalContents", "JournalPart"]
-
 MISSING = -1
 """Offset of rows that cannot be read."""
 MOST_TOLD = 20

@@ -8,8 +8,6 @@ import numpy as np
 
 from rig.errors import RecordingError
 
-__all__ = ["decode", "encode"]
-
 
 def _plain(value: object) -> object:
     if isinstance(value, np.ndarray | np.generic):

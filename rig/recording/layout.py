@@ -15,8 +15,6 @@ from rig.system.locking import synchronise_folder
 from rig.system.whole_file import beginning
 from rig.text.printable import error_text
 
-__all__ = ["file_integrity", "identify", "kind_in", "new_file", "open_file", "open_unchecked", "reading"]
-
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _CACHE_BYTES = 2**20  # of each dataset: chunks are written whole and once
 _FOREIGN = {

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording.header import Column
 
-__all__ = ["Part", "missing_rows", "rows_at_once"]
-
 
 def rows_at_once(row_dtype: np.dtype[Any]) -> int:
     """Return how many rows are held in memory while reading or converting, and make one chunk of an HDF5 dataset."""

@@ -18,8 +18,6 @@ from rig.recording.parts import Part
 from rig.recording.told_values import check_told
 from vibrolock.results import Result
 
-__all__ = ["Part", "RecordedPlan", "Recording"]
-
 
 class RecordedPlan(NamedTuple):
     """A plan of a recording, from the part on with which it came into force."""

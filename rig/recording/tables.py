@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from rig.errors import RecordingError
 from rig.recording import jsontext
 
-__all__ = ["LARGEST_TEXTS_BYTES", "LARGEST_TEXT_BYTES", "StoredTexts", "write_object", "write_table"]
-
 LARGEST_TEXT_BYTES = 16 * 2**20
 """Length of one JSON text, as of a block of a journal."""
 LARGEST_TEXTS_BYTES = 128 * 2**20

@@ -9,8 +9,6 @@ from typing import Any
 from rig.errors import RecordingError
 from rig.text.printable import shown
 
-__all__ = ["LARGEST_NUMBER", "check_told"]
-
 LARGEST_NUMBER = 1e100
 """A finite number beyond it is no measurement; its square could be no number any more."""
 _LARGEST_INTEGER = 2**63

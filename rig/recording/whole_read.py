@@ -10,8 +10,6 @@ from rig.recording.examination import objects_in
 from rig.recording.layout import open_unchecked, reading
 from rig.system.child import confine
 
-__all__ = ["main"]
-
 _AT_ONCE = 2**22
 
 

@@ -6,8 +6,6 @@ from typing import Any
 
 from rig.reference.entry import Entry
 
-__all__ = ["Command", "command_entries", "commands_of", "option_names"]
-
 
 @dataclass(frozen=True)
 class Command:

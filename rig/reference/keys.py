@@ -12,8 +12,6 @@ from pydantic import AliasChoices, BaseModel
 
 from rig.reference.entry import Entry
 
-__all__ = ["Key", "key_entries", "keys_of", "parts_of", "roots", "tables"]
-
 Schema = dict[str, Any]
 
 WORDS = {"string": "text", "boolean": "true, false", "number": "number", "integer": "whole number", "object": "table"}

@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from rig.reference.entry import Entry
 from rig.text.message_pages import page_of
 
-__all__ = ["PAGES", "message_entries"]
-
 PAGES = "reference/messages"
 """Folder of their pages on the site."""
 

@@ -8,8 +8,6 @@ from itertools import pairwise
 
 from rig.reference.entry import Entry
 
-__all__ = ["MODULES", "documentation", "first_line", "name_entries", "public_names"]
-
 MODULES = (
     "rig", "rig.bench", "rig.conformance", "rig.daq", "rig.drivers", "rig.errors", "rig.figures", "rig.measurements",
     "controller", "simulators", "simulators.analysis", "simulators.ensemble", "identification",

@@ -10,19 +10,6 @@ from typing import Any
 from rig.errors import RecordingError
 from rig.reference.entry import Entry
 
-__all__ = [
-    "WORDS_FILE",
-    "Hit",
-    "Words",
-    "closest",
-    "found",
-    "known_words",
-    "read_words",
-    "site",
-    "words_of",
-    "write_words",
-]
-
 WORDS_FILE = "words.json"
 """Name of the list of words, beside the pages of the site."""
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from rig.campaigns.evaluation.point import Point
 
-__all__ = ["GRID", "LIKELY", "Comparison", "PointComparison", "compared"]
-
 LIKELY = 0.95  # probability from which on something that did not happen is a finding
 GRID = tuple(np.linspace(0.0, 1.0, 21).tolist())
 """Probabilities of the quantiles that are foreseen."""

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_rehearsal"]
-
 MOST_LIMITS, MOST_INFLUENCES = 4, 5
 ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"
 

@@ -11,8 +11,6 @@ from rig.bench import Bench
 from rig.rehearsal.remedies import Improvement
 from rig.system.whole_file import whole_file
 
-__all__ = ["write_bench", "write_plan"]
-
 
 def write_bench(bench: Bench, path: Path, comments: Sequence[str] = ()) -> None:
     """Write a bench that `rig.bench.load_bench` reads. Raises `RecordingError` if the file cannot be written."""

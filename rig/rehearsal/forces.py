@@ -12,8 +12,6 @@ import numpy as np
 
 from vibrolock.content_cache import c_function
 
-__all__ = ["describing_function", "drag", "drag_for", "hardening_for", "softening_for"]
-
 SAMPLES = 720  # of a period
 cfunction = c_function("float64(float64, CPointer(float64))")
 """Compiles a force law as `simulators.sites.elements.User` wants it."""

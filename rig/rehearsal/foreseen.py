@@ -9,8 +9,6 @@ from rig.rehearsal.comparison import GRID
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import verdict_of
 
-__all__ = ["foreseen_by", "rehearsed_in"]
-
 QUANTITIES = ("frequency_hz", "force_n", "amplitude_m", "voltage_v", "damping_ratio")
 FEW = 10  # draws with a value, below which nothing is foreseen
 

@@ -7,8 +7,6 @@ from pydantic import Field, model_validator
 
 from rig.bench.configuration import Configured, read_toml, validated
 
-__all__ = ["Hypotheses", "load_hypotheses"]
-
 
 class Hypotheses(Configured):
     """What is drawn from for a twin beyond what was measured.

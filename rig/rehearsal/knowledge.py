@@ -23,10 +23,7 @@ from rig.errors import ConfigurationError
 from rig.measurements import spectra
 from rig.recording.reader import Recording
 from rig.rehearsal.linear_rig import LinearKnowledge, Prior, Responses, known_rig
-
-__all__ = ["Knowledge", "gathered"]
-
-Real = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 BAND = (0.5, 2.2)  # of the linear frequency: band in which the linear rig is fitted
 LINES = 400  # lines at which a rig is fitted
@@ -150,12 +147,12 @@ def _names(bench: Bench) -> list[str]:
     return [c.name for role in ("force", "drive", "response") for c in bench.channels if c.role == role]
 
 
-def _inside(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
+def _inside(bench: Bench, frequency_hz: Float) -> NDArray[np.bool_]:
     linear = bench.specimen.linear_frequency_hz
     return np.asarray((frequency_hz > BAND[0] * linear) & (frequency_hz < BAND[1] * linear))
 
 
-def _std(matrix: FrequencyResponseMatrix) -> Real:
+def _std(matrix: FrequencyResponseMatrix) -> Float:
     total, noise = matrix.total_std[:, :, 0], matrix.noise_std[:, :, 0]
     variance = np.nan_to_num(np.where(np.isfinite(total), total, noise)) ** 2
     return np.asarray(np.sqrt(scipy.ndimage.uniform_filter1d(variance, SMOOTHED, axis=0, mode="nearest")))

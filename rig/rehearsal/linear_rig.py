@@ -23,11 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import ConfigurationError
-
-__all__ = ["LinearKnowledge", "LinearRig", "Prior", "Responses", "known_rig", "suitable_shaker"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 LOW, HIGH, FLOOR_DAMPING = 0.05, 2.0, 0.005  # frequencies of the far modes over the ends of the band; their damping
 ABOVE = 1.1  # of the end of the band: least frequency of the mode above it
@@ -62,11 +58,11 @@ class Prior:
 class Responses:
     """Measured responses to the voltage."""
 
-    frequency_hz: Real
+    frequency_hz: Float
     """Lines [n]."""
     value: Complex
     """Force (N/V), acceleration of the drive point and of every response channel (m/s^2/V) [n, 2 + responses]."""
-    std: Real
+    std: Float
     """Standard deviations [n, 2 + responses]."""
     sample_rate_hz: float
     """Sample rate of the hold of the output; the voltage is the number given to the converter."""
@@ -111,7 +107,7 @@ class LinearRig:
         stiffness = s**2 * v["moving_mass_kg"] + s * half * (1.0 + 1.0 / lag) + v["suspension_stiffness_n_m"]
         return v["force_per_volt_n_v"] / lag / (1.0 + stiffness * (receptance + 1.0 / v["stinger_stiffness_n_m"]))
 
-    def responses(self, frequency_hz: Real, sample_rate_hz: float) -> Complex:
+    def responses(self, frequency_hz: Float, sample_rate_hz: float) -> Complex:
         """Responses as `Responses.value` has them."""
         s: Complex = 2j * np.pi * np.asarray(frequency_hz, np.complex128)
         receptances = self.receptances(s)
@@ -126,16 +122,16 @@ class _Linearisation:
     """The fitted residuals of the responses near the most likely rig."""
 
     responses: Responses
-    weight: Real
+    weight: Float
     """Standard deviations of the residuals, misfit included [n, outputs]."""
-    jacobian: Real
+    jacobian: Float
     """Slope of the weighted residuals, real parts above imaginary ones [2 n outputs, p]."""
-    prior_std: Real
+    prior_std: Float
     """Standard deviations of the priors [p]."""
-    bounds: tuple[Real, Real]
+    bounds: tuple[Float, Float]
     """Least and largest possible values of the parameters [p]."""
 
-    def weighted(self, rig: LinearRig) -> Real:
+    def weighted(self, rig: LinearRig) -> Float:
         """Weighted model of a rig [2 n outputs]."""
         model = rig.responses(self.responses.frequency_hz, self.responses.sample_rate_hz) / self.weight
         return np.concatenate([model.ravel().real, model.ravel().imag])
@@ -149,9 +145,9 @@ class LinearKnowledge:
     """Names of the parameters, in the order of ``mean``."""
     positive: NDArray[np.bool_]
     """Which of them are logarithms [p]."""
-    mean: Real
+    mean: Float
     """Most likely values [p]."""
-    covariance: Real
+    covariance: Float
     """Covariance [p, p]."""
     channels: tuple[str, ...]
     """Response channels."""
@@ -164,7 +160,7 @@ class LinearKnowledge:
     near: _Linearisation | None = None
     """The residuals near the most likely rig; None without responses."""
 
-    def rig(self, x: Real | None = None) -> LinearRig:
+    def rig(self, x: Float | None = None) -> LinearRig:
         """Return the rig of a parameter vector [p]; by default the most likely one."""
         vector = self.mean if x is None else x
         values = np.where(self.positive, np.exp(np.where(self.positive, vector, 0.0)), vector)
@@ -189,12 +185,12 @@ class LinearKnowledge:
         drawn = self.mean + spread @ generator.standard_normal(self.mean.size)
         return self.rig(drawn if self.near is None else self._corrected(drawn, self.near))
 
-    def _corrected(self, drawn: Real, near: _Linearisation) -> Real:
+    def _corrected(self, drawn: Float, near: _Linearisation) -> Float:
         from scipy.optimize import least_squares
 
         wanted = near.weighted(self.rig()) + near.jacobian @ (drawn - self.mean)
 
-        def misses(x: Real) -> Real:
+        def misses(x: Float) -> Float:
             return np.concatenate([near.weighted(self.rig(x)) - wanted, (x - drawn) / near.prior_std])
 
         noise = float(self.mean.size)  # what the noise does, in the mean
@@ -220,7 +216,7 @@ class _Parameters:
         self.lowest: dict[str, float] = {}
 
     @property
-    def bounds(self) -> tuple[Real, Real]:
+    def bounds(self) -> tuple[Float, Float]:
         """Least and largest possible values [p]; without bounds for a parameter of any sign."""
         wide = np.where(self.positive, POSSIBLE, np.inf)
         least = [self.lowest.get(name, -np.inf) for name in self.names]
@@ -242,7 +238,7 @@ class _Parameters:
         self.centre.append(centre)
         self.std.append(std)
 
-    def vector(self, values: Mapping[str, float]) -> Real:
+    def vector(self, values: Mapping[str, float]) -> Float:
         """Return the vector of named values; what they do not name is at its centre."""
         return np.array(
             [
@@ -346,7 +342,7 @@ def _fitted(
     names, channels = tuple(parameters.names), parameters.channels
     prior = np.diag(std**2)
 
-    def knowledge(x: Real, covariance: Real, misfit: float, inflation: float, determined: float) -> LinearKnowledge:
+    def knowledge(x: Float, covariance: Float, misfit: float, inflation: float, determined: float) -> LinearKnowledge:
         return LinearKnowledge(names, positive, x, covariance, channels, misfit, inflation, determined)
 
     if responses is None:
@@ -354,11 +350,11 @@ def _fitted(
     scale = np.sqrt(np.mean(np.abs(responses.value) ** 2, axis=0))
     sigma = np.sqrt(responses.std**2 + (MODEL_FLOOR * np.abs(responses.value)) ** 2 + (0.2 * MODEL_FLOOR * scale) ** 2)
 
-    def misses(x: Real) -> Complex:
+    def misses(x: Float) -> Complex:
         model = knowledge(x, prior, 0.0, 1.0, 0.0).rig().responses(responses.frequency_hz, responses.sample_rate_hz)
         return np.asarray(model - responses.value)
 
-    def residuals(x: Real) -> Real:
+    def residuals(x: Float) -> Float:
         error = (misses(x) / sigma).ravel()
         return np.concatenate([error.real, error.imag, (x - centre) / std])
 
@@ -385,7 +381,9 @@ def _fitted(
     return replace(knowledge(found.x, covariance, misfit, inflation, determined), near=near), float(worst)
 
 
-def _as_strong(x: Real, names: Sequence[str], knowledge: Callable[..., LinearKnowledge], responses: Responses) -> Real:
+def _as_strong(
+    x: Float, names: Sequence[str], knowledge: Callable[..., LinearKnowledge], responses: Responses
+) -> Float:
     """Return a start vector with the force per volt at which its force is as large as the measured one, in the median."""
     model = knowledge(x, np.empty(0), 0.0, 1.0, 0.0).rig().responses(responses.frequency_hz, responses.sample_rate_hz)
     ratio = float(np.median(np.abs(responses.value[:, 0]) / np.abs(model[:, 0])))

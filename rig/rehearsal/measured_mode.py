@@ -4,15 +4,11 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification import NonlinearMode
 from rig.rehearsal.forces import drag, odd_polynomial
 from rig.rehearsal.linear_rig import LinearRig
-
-__all__ = ["elements_of"]
-
-Real = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 INSIDE = "inside"
 LEAST_STD = 1e-4  # relative: smallest error of a measured frequency that is believed
@@ -44,13 +40,13 @@ def elements_of(mode: NonlinearMode, rig: LinearRig, generator: np.random.Genera
     return table
 
 
-def _relative(mode: NonlinearMode, quantity: str) -> Real:
+def _relative(mode: NonlinearMode, quantity: str) -> Float:
     """Relative standard errors of a quantity [n]; 0 where they are unknown."""
     relative = np.asarray(mode.bound_95(quantity)) / 1.96 / np.abs(np.asarray(getattr(mode, quantity)))
     return np.asarray(np.nan_to_num(relative, nan=0.0, posinf=0.0))
 
 
-def _drawn_fit(terms: Real, target: Real, error: Real, lowest: float, generator: np.random.Generator) -> list[float]:
+def _drawn_fit(terms: Float, target: Float, error: Float, lowest: float, generator: np.random.Generator) -> list[float]:
     """Return coefficients of the first terms [n, m], as many as a draw among the numbers that fit says."""
     fits = []
     for count in range(1, min(terms.shape[1], target.size - 1) + 1):

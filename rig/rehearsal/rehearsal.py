@@ -22,8 +22,6 @@ from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
 from vibrolock.results import Result
 
-__all__ = ["Draw", "Rehearsal", "RehearsalRequest", "discard_draws", "draws_path", "rehearse"]
-
 MOST_DRAWS = 100_000
 _HEAD = '{"rehearsal": "'  # beginning of every journal of draws
 

@@ -16,8 +16,6 @@ from rig.errors import RigError
 from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest
 from simulators.ensemble import ensemble
 
-__all__ = ["Effect", "Improvement", "Remedy", "improve", "remedies_for"]
-
 Table = dict[str, Any]
 
 GAINS = (

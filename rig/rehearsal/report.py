@@ -6,8 +6,6 @@ from typing import Any
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import verdict_of
 
-__all__ = ["lines", "summary", "verdict_in_one_line"]
-
 CLOSE = 5  # limits that are shown
 MOST_REASONS = 3
 MOST_INFLUENCES = 6

@@ -21,8 +21,6 @@ from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
 
-__all__ = ["NOT_COMPUTED", "Trial", "TrialPoint", "not_computed", "run_trial"]
-
 FURTHER_PART = 1 << 32  # between the seeds of the parts of a run: other noise in each
 REFUSED = "REFUSED"
 """End of a trial whose plan the bench refuses before anything moves."""

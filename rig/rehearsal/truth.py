@@ -10,8 +10,6 @@ from rig.drivers.virtual import VirtualDAQ
 from rig.rehearsal.trial import Trial
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
 
-__all__ = ["NOT_BALANCED", "TrueBackbone", "true_backbone"]
-
 MOST_POINTS = 4
 HARMONICS = 9
 

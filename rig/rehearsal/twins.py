@@ -17,8 +17,6 @@ from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
 from rig.rehearsal.linear_rig import LinearRig
 
-__all__ = ["Twin", "draw_twin", "exact_twin"]
-
 MOST_TRIES = 50
 SUBSTEPS_HZ = 20_000.0  # least internal rate of a twin
 INSIDE = "inside"  # deflection of the structure itself, without that on its suspension: where springs and joints act

@@ -11,8 +11,6 @@ import scipy
 
 from rig.rehearsal.rehearsal import Draw, Rehearsal
 
-__all__ = ["ADVICE", "Band", "Influence", "PointVerdict", "Share", "TripVerdict", "Verdict", "verdict_of"]
-
 SIGNIFICANT = 0.01  # probability, over all that is tested, with which an influence may be chance
 FEW = 8  # draws with a finite value below which nothing is said of an influence
 ADVICE = {

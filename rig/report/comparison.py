@@ -14,7 +14,7 @@ from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.planning.plan import Column
 from rig.check.recorded import is_check
 from rig.drawing.style import MAIN, REJECTED, SECOND, title, unit_text
-from rig.models.files.files import KINDS
+from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.report.document import Chapter, Section, Table
@@ -26,8 +26,6 @@ from rig.show.summary import summarise_recording
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["comparisons"]
 
 COLOURS = (MAIN, SECOND, "#009e73", "#e69f00", "#7b3f98", "#56b4e9")
 MARKERS = "os^Dv<>P"

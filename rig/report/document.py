@@ -9,8 +9,6 @@ from typing import Any, ClassVar
 from rig.text.console import PrintedTable
 from rig.text.printable import printable
 
-__all__ = ["Block", "Chapter", "Facts", "Picture", "Section", "Table", "Text", "blocks_of", "typeset"]
-
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
 _DIGIT = re.compile(r"\d")
 _SHORT = 14

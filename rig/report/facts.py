@@ -9,8 +9,6 @@ from rig.report.document import Block, Facts, Section, Table, Text
 from rig.report.keys import key_rows, limit_rows
 from rig.text.console import number
 
-__all__ = ["bench_section", "endings", "files_and_versions", "plan_section", "safety_section", "subject_section"]
-
 
 def subject_section(recording: Recording) -> Section:
     """Return what was tested, by whom, on which bench, when, and how it ended."""

@@ -8,8 +8,6 @@ from rig.errors import RecordingError
 from rig.recording.journal import journal_path
 from rig.report.document import Table
 
-__all__ = ["digest_of", "files_of", "table_of_files"]
-
 _AT_ONCE = 2**20
 
 

@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["key_rows", "limit_rows"]
-
 _UNITS = (
     ("_v_per_s", " V/s"),
     ("_m_s2", " m/s^2"),

@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-from rig.models.files.files import KINDS, understood
+from rig.models.files.files import understood
+from rig.models.files.kinds import KINDS
 from rig.report.document import Chapter, Facts, Section, Text, blocks_of
 from rig.report.files import table_of_files
 from rig.report.pictures import Pictures
 from rig.show.summary import summarise
 from rig.text.console import collected
-
-__all__ = ["model_chapter"]
 
 
 def model_chapter(path: Path, pictures: Pictures) -> Chapter:

@@ -7,8 +7,6 @@ polynomial nonlinear state-space and nonlinear-mode models for near-resonant vib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-__all__ = ["SAME_LEVEL", "PaperError", "agreement"]
-
 
 class PaperError(NamedTuple):
     """Relative error of the models of one training set, tested at their own level; None where one of them was unstable."""

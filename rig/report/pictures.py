@@ -14,8 +14,6 @@ from rig.report.document import Block, Picture, Text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Pictures"]
-
 _LARGEST_WIDTH_IN = 10.0
 """Wider figures of `rig plot` are drawn so wide, at the same shape: their text stays readable on A4."""
 

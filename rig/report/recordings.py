@@ -24,8 +24,6 @@ from rig.show.summary import summarise, summarise_recording
 from rig.show.tables import loop_line, print_findings, print_rehearsal
 from rig.text.console import collected, number
 
-__all__ = ["recording_chapter"]
-
 
 def recording_chapter(path: Path, pictures: Pictures) -> Chapter:
     """Return all that a report says of a recording; raise `RecordingError` if it cannot be read."""

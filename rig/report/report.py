@@ -7,7 +7,8 @@ from importlib import resources
 from pathlib import Path
 
 from rig.errors import RecordingError
-from rig.models.files.files import KINDS, understood
+from rig.models.files.files import understood
+from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.report.comparison import comparisons
 from rig.report.document import Chapter, typeset
@@ -17,8 +18,6 @@ from rig.report.recordings import recording_chapter
 from rig.report.study import study_chapters
 from rig.system.whole_file import whole_file
 from vibrolock import __version__
-
-__all__ = ["write_report"]
 
 
 def write_report(sources: Sequence[Path], output: Path, title: str = "") -> None:

@@ -15,8 +15,6 @@ from rig.report.paper import SAME_LEVEL, agreement
 from rig.system.text_files import read_bytes, read_text
 from rig.text.console import number
 
-__all__ = ["study_chapters"]
-
 _OWN_LEVEL = "same level"
 _LARGEST_BYTES = 10_000_000
 _FIGURES = {

@@ -8,8 +8,6 @@ from rig.recording.reader import Recording
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded
 
-__all__ = ["exciter_of"]
-
 
 def exciter_of(options: Options, say: Callable[[str], None]) -> Exciter:
     """Identify the exciter that is coupled to models whose input is the force."""

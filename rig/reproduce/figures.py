@@ -18,8 +18,6 @@ from rig.reproduce.true_responses import Truth
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_study"]
-
 _SEED = 0
 _LINEAR = "linear start"
 _MOST_SHOWN, _MOST_OF_UNBOUNDED = 2.5, 1.6  # times the largest recorded value

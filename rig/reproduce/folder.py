@@ -9,8 +9,6 @@ from rig.reproduce.options import Options
 from rig.system.text_files import read_text
 from rig.system.whole_file import whole_file
 
-__all__ = ["begin", "prepare", "write_json"]
-
 
 def prepare(options: Options) -> None:
     """Create the folders; raise `RecordingError` if one contains a study with other settings, or cannot be created."""

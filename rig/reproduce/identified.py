@@ -34,8 +34,6 @@ from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded
 
-__all__ = ["Models", "identify_all"]
-
 _CHOOSES = 3
 """Every third of the experiments besides the multisines is not fitted; together with the held-out multisines it chooses the
 iterate."""

@@ -10,8 +10,6 @@ from rig.bench import Bench
 from rig.errors import ConfigurationError
 from rig.reproduce.specimens import Specimen
 
-__all__ = ["INPUTS", "PAPER", "PARTS", "Options"]
-
 PAPER = "paper"
 """Value of ``models`` that selects the numbers of models in the paper."""
 _SATURATING = 60

@@ -18,8 +18,6 @@ from rig.recording.reader import Recording
 from rig.reproduce.options import Options
 from rig.show.progress import RunProgress
 
-__all__ = ["multisines", "recorded", "segments", "training_data"]
-
 _REDRAWN = 20
 """Largest number of new draws of a realisation's phases if its peaks are beyond the bench's limits."""
 _STOPPED = "stop_requested"

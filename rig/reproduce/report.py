@@ -14,8 +14,6 @@ from rig.reproduce.study import Study
 from rig.system.text_files import read_text
 from rig.text.console import number, print_table
 
-__all__ = ["say_study", "write_tables"]
-
 _ERROR_COLUMNS = (
     "variant",
     "training_set",

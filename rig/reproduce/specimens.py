@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from identification.structured.laws import Law, MagnetSpring, Masing
 from rig.errors import ConfigurationError
 
-__all__ = ["SPECIMENS", "Specimen", "specimen_of"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Specimen:

@@ -16,8 +16,6 @@ from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.true_responses import Truth, truths
 
-__all__ = ["Steady", "steady"]
-
 
 @dataclass(frozen=True, eq=False)
 class Steady:

@@ -15,8 +15,6 @@ from rig.reproduce.steady import Steady, steady
 from rig.reproduce.sweeps import SweepResult, simulated_sweeps
 from rig.reproduce.true_responses import Truth
 
-__all__ = ["VARIANTS", "Study", "reproduce"]
-
 VARIANTS: dict[str, dict[str, Callable[[Any], PnlssModel | StructuredModel | None]]] = {
     "pnlss": {
         "chosen on validation data": lambda fit: fit.model,

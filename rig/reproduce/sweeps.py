@@ -17,8 +17,6 @@ from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded, training_data
 
-__all__ = ["COUPLED", "SweepResult", "simulated_sweeps"]
-
 COUPLED = "voltage, exciter coupled"
 _LOWEST = 0.8
 """Part of the lowest frequency of a sweep above which the exciter's reaction is exact."""

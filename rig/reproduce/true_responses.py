@@ -15,8 +15,6 @@ from simulators.analysis import (
 )
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["Truth", "truths"]
-
 Held = Literal["fundamental", "pure-sine", "voltage"]
 
 _NEAR_RESONANCE = np.linspace(-170.0, -10.0, 81)

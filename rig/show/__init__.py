@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from rig.show.results import as_html, as_text
+    from rig.show.results import as_html as as_html, as_text as as_text
 else:
-    __getattr__, __dir__ = on_use(__name__, {"as_html": "results", "as_text": "results"})
-
-__all__ = ["as_html", "as_text"]
+    __getattr__, __dir__, __all__ = on_use(__name__)

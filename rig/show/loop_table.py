@@ -6,8 +6,6 @@ from typing import Any
 from rig.figures.lateness import PACED, TIMES
 from rig.text.console import number, print_table
 
-__all__ = ["print_loop"]
-
 GRANTED = ("scheduling", "memory", "timer_slack", "processor", "garbage_collector")
 SHARES = {"p50": "p50", "p99": "p99", "p99_9": "p99.9", "largest": "largest"}
 

@@ -9,8 +9,6 @@ from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.planning.plan import Column
 from rig.show.progress import value_text
 
-__all__ = ["attempts_refused", "point_rows", "points_from", "shown_columns"]
-
 
 def points_from(kind: str, tables: Sequence[Mapping[str, Any]]) -> list[Point[Any]]:
     """Return the points of a summary of a recording as objects."""

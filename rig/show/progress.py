@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from rig.campaigns.planning.plan import Column
     from rig.tick.tick import Tick
 
-__all__ = ["FitLines", "RunProgress", "value_text"]
-
 LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
 
 

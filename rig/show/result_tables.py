@@ -32,8 +32,6 @@ from rig.tuning import Tuning
 from rig.tuning.report import lines, summary
 from simulators.analysis import PeriodicResponses
 
-__all__ = ["SAY", "say_recording"]
-
 
 def say_recording(recording: Recording) -> None:
     """Print the points of a recording with their quality, and what concerns all of them."""

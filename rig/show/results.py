@@ -8,8 +8,6 @@ from rig.recording.reader import Recording
 from rig.show import result_tables
 from rig.text.console import PrintedTable, collected, print_table
 
-__all__ = ["as_html", "as_text"]
-
 _MOST_ROWS = 20
 """Of longer tables, rows evenly apart are shown."""
 

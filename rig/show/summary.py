@@ -16,7 +16,8 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
 from rig.check.recorded import is_check
 from rig.check.report import summary
-from rig.models.files.files import KINDS, load, understood
+from rig.models.files.files import load, understood
+from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
@@ -24,8 +25,6 @@ from rig.recording.reader import Recording
 from rig.rehearsal.comparison import compared
 from rig.text.message_pages import page_of
 from rig.tick.safety.layout import EndReason
-
-__all__ = ["summarise", "summarise_recording"]
 
 BULKY = {one.name for one in fields(Spectrum)}
 """Fields of a point that a summary omits."""

@@ -8,7 +8,7 @@ from rig.arming.run_facts import About, user_name
 from rig.campaigns.evaluation.point import point_name
 from rig.check.report import say
 from rig.daq import CONTINUED
-from rig.models.files.files import KINDS
+from rig.models.files.kinds import KINDS
 from rig.recording.integrity import VERIFIED
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
@@ -16,8 +16,6 @@ from rig.text.console import number, print_table
 from rig.text.disorder import LATE_BLOCKS, LATE_FRAMES, OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, disorder_text
 from rig.text.message_pages import where_explained
 from rig.text.printable import printable, printable_strings
-
-__all__ = ["loop_line", "print_findings", "print_points", "print_rehearsal", "print_summary", "say_how_it_ended"]
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:

@@ -12,8 +12,6 @@ import sys
 import threading
 from pathlib import Path
 
-__all__ = ["MEMORY_BYTES", "ChildFailed", "ask_child", "child_environment", "confine"]
-
 MEMORY_BYTES = 4 * 2**30
 """Address space of a child."""
 

@@ -11,8 +11,6 @@ from rig.errors import RecordingError
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["exclusive", "is_locked", "lock", "synchronise_folder"]
-
 
 def lock(descriptor: int, path: Path) -> None:
     """Make this process the only writer of an open file until it is closed, or refuse.

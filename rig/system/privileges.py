@@ -6,8 +6,6 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-__all__ = ["CPU_VARIABLE", "PRIORITY", "ordinary_scheduling", "prepare"]
-
 PRIORITY = 80
 """Priority of SCHED_FIFO: above the interrupt threads of the kernel (50)."""
 

@@ -15,8 +15,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-__all__ = ["Held", "Interrupted", "Terminated", "asking", "ended_in_order", "held", "ignore_from_now_on", "insisting"]
-
 _ENDING = ("SIGTERM", "SIGHUP", "SIGQUIT")  # the last two not on every system
 _Handler = Callable[[int, FrameType | None], None]
 

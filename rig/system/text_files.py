@@ -6,8 +6,6 @@ from pathlib import Path
 
 from rig.errors import ConfigurationError, RigError
 
-__all__ = ["read_bytes", "read_text"]
-
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)  # opening a FIFO that nobody writes to would wait for ever
 _RAW = getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 

@@ -9,8 +9,6 @@ from rig.errors import RecordingError, RigError
 from rig.system.locking import synchronise_folder
 from rig.text.printable import error_text
 
-__all__ = ["beginning", "whole_file"]
-
 
 def beginning(path: Path) -> Path:
     """Return the path beside ``path`` under which a file is begun. None but this program uses it; nothing is there now.

@@ -10,8 +10,6 @@ from typing import Any
 
 from rig.text.printable import printable
 
-__all__ = ["PrintedTable", "collected", "number", "print_json", "print_table"]
-
 
 @dataclass(frozen=True)
 class PrintedTable:

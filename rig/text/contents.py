@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Contents", "Labels", "unit_of"]
-
 Array = NDArray[Any]
 Labels = tuple[tuple[str, ...], ...]
 

@@ -2,16 +2,6 @@
 
 from collections.abc import Mapping
 
-__all__ = [
-    "DISORDER",
-    "LATE_BLOCKS",
-    "LATE_FRAMES",
-    "OUT_OF_ORDER_FRAMES",
-    "REORDERED_BLOCKS",
-    "disorder_text",
-    "is_late",
-]
-
 OUT_OF_ORDER_FRAMES = "out_of_order_frames"
 """Counter of frames that came after a later one, on a bus."""
 REORDERED_BLOCKS = "reordered_blocks"

@@ -3,8 +3,6 @@
 import re
 from collections.abc import Iterable
 
-__all__ = ["page_of", "where_explained"]
-
 
 def page_of(name: str) -> str:
     """Return the page of an end reason, quality or error: ``lost-lock`` of ``LOST_LOCK``, ``daq-timeout`` of ``DaqTimeout``."""

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 from unicodedata import category
 
-__all__ = ["LONGEST_LINE", "error_text", "one_line", "printable", "printable_strings", "shown"]
-
 LONGEST_LINE = 800
 """Largest length of a message. A longer one is cut in the middle, as it begins with the field and ends with what is allowed."""
 LONGEST_VALUE = 60

@@ -1,7 +1,5 @@
 """The unit of a key of a bench, a plan or a virtual rig, which is the end of its name."""
 
-__all__ = ["titled", "unit_of"]
-
 UNITS = {
     "v_per_unit": "V per N or m/s^2", "octaves_per_min": "octaves/min", "hz_per_s": "Hz/s", "v_per_s": "V/s",
     "v_s2_m": "V s^2/m", "rms_v": "V RMS", "rms_n": "N RMS", "valid_h": "hours", "periods": "periods",

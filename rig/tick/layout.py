@@ -9,8 +9,6 @@ import numpy as np
 
 from rig.daq import LOST
 
-__all__ = ["HISTORY", "LOOP", "ROW", "ROW_COLUMNS", "TickArrays", "recorded_row"]
-
 LOOP = np.dtype(
     [
         ("sample", "i8"),

@@ -19,8 +19,6 @@ from rig.tick.sequencer.judgement import SETTLING
 from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
 
-__all__ = ["Tick", "TickSettings"]
-
 JUDGED_AGAIN = 11.0  # periods
 NEGLIGIBLE_BITS = 0.1  # amplitude of a harmonic, in bits of the converter, that counts as none
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude

@@ -8,14 +8,10 @@ amplified against the force that is controlled.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
-
-__all__ = ["bits_force_n", "input_bits_n", "periodic_beyond", "rounding"]
-
-Real = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def rounding(bit: float, noise_rms: float = 0.0) -> float:
@@ -47,7 +43,7 @@ def bits_force_n(bench: Bench, responses: FrequencyResponseMatrix, beyond_n: flo
     return math.hypot(inside, min(outside, beyond_n))
 
 
-def periodic_beyond(values: Real, period_samples: int, highest_line: float) -> float:
+def periodic_beyond(values: Float, period_samples: int, highest_line: float) -> float:
     """Return the RMS of the periodic part of a record of two or more periods above a line, without what noise has there.
 
     ``highest_line`` is in multiples of the resolution. Lines of the record between those of one period show noise alone.

@@ -31,8 +31,6 @@ from controller.tuning.exact import frequencies_for
 from identification import FrequencyResponseMatrix
 from rig.tuning.plant import TuningError, largest_outside
 
-__all__ = ["Chosen", "LawName", "choose", "gains_of"]
-
 LawName = Literal["frequency-error", "phase"]
 DAMPINGS = (1.0, 2.0, 4.0)  # damping at higher levels, as multiples of the damping in the linear test
 LOW_PASSES = (5.0, 10.0, 20.0)  # candidates: resonance frequency divided by these

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from rig.tuning import Tuning
 
-__all__ = ["check_figure", "draw_on", "draw_tuning"]
-
 _STEP = 0.3
 """Relative change of level whose effect is drawn."""
 

@@ -4,18 +4,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.adaptive_filter import MOST_HARMONICS
 from controller.harmonics.settings import HarmonicsSettings
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 from rig.errors import ConfigurationError
-
-__all__ = ["HarmonicsChoice", "band_for", "check_highest", "choose_harmonics"]
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 REACH = 0.7  # of the oscillator's frequency, on both sides of a harmonic: where its loop is examined
 GAINS = (0.04, 0.03, 0.02, 0.01, 0.005)
@@ -107,7 +102,7 @@ def _good(peaks: dict[float, dict[int, float]], gain: float, order: int) -> bool
     return peaks[gain][order] <= LARGEST_SENSITIVITY
 
 
-def _at(frequency: Real, values: Complex, at_hz: float) -> complex:
+def _at(frequency: Float, values: Complex, at_hz: float) -> complex:
     return complex(np.interp(at_hz, frequency, values.real), np.interp(at_hz, frequency, values.imag))
 
 
@@ -116,7 +111,7 @@ def _rounded(value: float) -> float:
 
 
 def _sensitivity(
-    frequency: Real, ratio: Complex, centre_hz: float, lock_hz: float, law: tuple[float, float], delay_s: float
+    frequency: Float, ratio: Complex, centre_hz: float, lock_hz: float, law: tuple[float, float], delay_s: float
 ) -> float:
     """Return max |S| of a harmonic's loop on the measured lines; infinite if it is unstable, by Nyquist's criterion.
 

@@ -12,8 +12,6 @@ from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
 from rig.tuning.converter_bits import input_bits_n
 
-__all__ = ["LevelChoice", "LowestForce", "choose_levels", "low_pass", "lowest_force", "needed_v", "reach_m"]
-
 LAG_STD_DEG = 0.75  # standard deviation of the lag before the settle rule averages it over ten periods
 RAISED = 3.0  # factor by which the lowest force may be raised
 

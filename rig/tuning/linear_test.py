@@ -20,8 +20,6 @@ from rig.recording.reader import Recording
 from rig.tuning.converter_bits import bits_force_n, periodic_beyond
 from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage_responses
 
-__all__ = ["LinearTest", "measure"]
-
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
 LINES = 400.0  # number of lines up to the linear frequency while the level is searched for
 LINES_A_BANDWIDTH = 4.0

@@ -14,8 +14,6 @@ from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.shifts import Window, ramp_periods, start_periods, start_voltage
 
-__all__ = ["plan_text"]
-
 HARMONICS = 5
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
 SHORTEST_TIME_OUT = 1000

@@ -13,30 +13,12 @@ from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix, PeriodicSpectra, best_linear_approximation
 from rig.bench import Bench
 from rig.errors import RigError
-
-__all__ = [
-    "ALLOWED_OFFSET",
-    "FIT_BAND",
-    "TuningError",
-    "coherence_of",
-    "compared_with_bench",
-    "densities",
-    "largest_outside",
-    "mass_ratios",
-    "measured_ratio_stds",
-    "measured_ratios",
-    "measured_turns_deg",
-    "near",
-    "plant_of",
-    "voltage_responses",
-]
+from vibrolock.arrays import Float
 
 
 class TuningError(RigError):
     """A rig cannot be tuned: its test shows no mode, or no gains are suitable. The message contains the numbers."""
 
-
-Real = NDArray[np.float64]
 
 FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
 NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences show what the model lacks
@@ -66,7 +48,7 @@ def voltage_responses(bench: Bench, measured: PeriodicSpectra) -> FrequencyRespo
     return best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
 
 
-def near(bench: Bench, frequency_hz: Real) -> NDArray[np.bool_]:
+def near(bench: Bench, frequency_hz: Float) -> NDArray[np.bool_]:
     """Return which lines lie in the band of the plant model."""
     linear = bench.specimen.linear_frequency_hz
     return np.asarray((frequency_hz > FIT_BAND[0] * linear) & (frequency_hz < FIT_BAND[1] * linear))

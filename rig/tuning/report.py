@@ -9,8 +9,6 @@ from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.plant import mass_ratios
 from rig.tuning.tuning import Tuning
 
-__all__ = ["lines", "summary"]
-
 SHIFT_SHOWN = 0.05
 
 

@@ -4,15 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
+from vibrolock.arrays import Float
 
-__all__ = ["Window", "frequency_window", "ramp_periods", "start_periods", "start_voltage"]
-
-Real = NDArray[np.float64]
 SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
 STANDS_OUT = 3.0  # of a mode's peak over the lowest response between it and the tested mode
 TIMES = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
@@ -69,7 +66,7 @@ def other_modes(responses: FrequencyResponseMatrix, plant: PlantModel) -> tuple[
     return out[0], out[1]
 
 
-def _first_peak(frequency: Real, size: Real) -> float | None:
+def _first_peak(frequency: Float, size: Float) -> float | None:
     """Return the frequency of the first peak, seen outwards, that stands out of the lowest response before it and after it."""
     if size.size < 5:
         return None

@@ -33,8 +33,6 @@ from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_
 from rig.tuning.shifts import frequency_window
 from vibrolock.results import Result
 
-__all__ = ["Tuning", "TuningRequest", "tune"]
-
 PURPOSE = "tuning"
 TURNED_DEG = 5.0  # of a response, from which it is worth a note
 NONLINEAR = 0.005  # distortion relative to the linear response of the force

@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 from rig.wire.messages import LOWEST_VERSION, VERSION, Message, Stream
 
-__all__ = ["LATE_SHARE", "Link", "Load"]
-
 LATE_SHARE = 0.05
 """Share of the blocks that are counted as late in the load of a wire, each with its readback (version 2)."""
 

@@ -10,27 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = [
-    "ARM_KEY",
-    "HEARTBEATS_HZ",
-    "LOWEST_VERSION",
-    "VERSION",
-    "Answer",
-    "Command",
-    "DeviceFlag",
-    "DeviceState",
-    "EmergencyStop",
-    "Heartbeat",
-    "Message",
-    "Output",
-    "Parameter",
-    "Readback",
-    "Request",
-    "Samples",
-    "Status",
-    "Stream",
-]
-
 LOWEST_VERSION, VERSION = 1, 2
 """Oldest and latest version of the protocol that this package speaks."""
 

@@ -2,8 +2,6 @@
 
 import struct
 
-__all__ = ["NAME_WORDS", "as_double", "as_float", "as_text", "double_words", "float_word", "text_words"]
-
 NAME_WORDS = 8
 """Words of four bytes of a text parameter; word w of channel c is item ``8 c + w``."""
 

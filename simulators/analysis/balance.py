@@ -11,7 +11,6 @@ Where harmonics of the force are controlled, the voltage has those harmonics as 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.analysis.condensed import CondensedRig, CondensedStructure
 from simulators.analysis.conditions import Conditions
@@ -19,11 +18,7 @@ from simulators.analysis.force_control import ForceControl
 from simulators.analysis.responses import NotConvergedError
 from simulators.analysis.site_forces import Series, SiteForces, SiteWaves
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["Balance", "Solution"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 _TOLERANCE = 1e-9
 """Largest residual, relative to the magnitude of the terms of the equation."""
@@ -37,11 +32,11 @@ _LARGEST_FREQUENCY_STEP = 0.05
 class Solution:
     """A periodic vibration: its unknowns, the Jacobian at them, and the conditions that the vibration meets."""
 
-    unknowns: Real
-    jacobian: Real
+    unknowns: Float
+    jacobian: Float
     conditions: Conditions
 
-    def tangent(self, level: float = 0.0, value: float = 0.0) -> Real:
+    def tangent(self, level: float = 0.0, value: float = 0.0) -> Float:
         """Return the change of the unknowns for a relative change ``level`` and a change ``value`` of lag or frequency."""
         change = np.zeros(self.unknowns.size)
         change[-1] = level
@@ -91,11 +86,11 @@ class Balance:
         self.series = Series(harmonics, samples)
         self.n_site = self.linear.n_site
 
-    def coefficients(self, unknowns: Real) -> Real:
+    def coefficients(self, unknowns: Float) -> Float:
         """Return the coefficients of the site coordinates [n_site, P]."""
         return unknowns[:-2].reshape(self.n_site, self.series.size)
 
-    def responses(self, unknowns: Real) -> tuple[Complex, Complex, Real]:
+    def responses(self, unknowns: Float) -> tuple[Complex, Complex, Float]:
         """Return site coordinates, force and drive displacement caused by site forces and voltage [n_site + 2, H + 1].
 
         Also return their Jacobian [n_site + 2, H + 1, len(y)], and the magnitude of the terms of each sum [n_site + 2].
@@ -116,7 +111,7 @@ class Balance:
         sizes = np.max(np.einsum("hoi,ih->oh", np.abs(transfer), np.abs(inputs)), axis=1, initial=0.0)
         return response, jacobian, sizes
 
-    def inputs(self, unknowns: Real, waves: SiteWaves) -> Complex:
+    def inputs(self, unknowns: Float, waves: SiteWaves) -> Complex:
         """Return the harmonics of site forces and voltage (of the force, with ``pure_sine``) [n_site + 1, H + 1]."""
         inputs, at = self._uncontrolled(unknowns, waves), self.control.orders
         transfer = self.linear.transfer(unknowns[-2], self.series.orders)[0]
@@ -125,14 +120,14 @@ class Balance:
         inputs[-1, at] = self.control.voltages(transfer, inputs)
         return inputs
 
-    def _uncontrolled(self, unknowns: Real, waves: SiteWaves) -> Complex:
+    def _uncontrolled(self, unknowns: Float, waves: SiteWaves) -> Complex:
         """Return the inputs [n_site + 1, H + 1] with the fundamental of the voltage alone."""
         inputs = np.zeros((self.n_site + 1, self.series.orders.size), np.complex128)
         inputs[:-1] = self.series.to_complex(waves.forces @ self.series.projection.T)
         inputs[-1, 1] = unknowns[-1]
         return inputs
 
-    def residual(self, unknowns: Real, conditions: Conditions) -> tuple[Real, Real, Real]:
+    def residual(self, unknowns: Float, conditions: Conditions) -> tuple[Float, Float, Float]:
         """Return the residual [len(y)], its Jacobian, and the magnitude of each equation's terms."""
         series, n = self.series, self.n_site
         response, slopes, sizes = self.responses(unknowns)
@@ -144,12 +139,12 @@ class Balance:
         scale = np.append(np.repeat(np.where(sizes[:n] > 0.0, sizes[:n], 1.0), series.size), [1.0, 1.0])
         return value, jacobian, scale
 
-    def solve(self, start: Real, conditions: Conditions) -> Solution:
+    def solve(self, start: Float, conditions: Conditions) -> Solution:
         """Solve by Newton's method, halving steps until the residual falls; raise `NotConvergedError` without convergence."""
         with np.errstate(all="ignore"):  # a trial step may overflow; results that are not finite are refused
             return self._solve(start, conditions)
 
-    def _solve(self, start: Real, conditions: Conditions) -> Solution:
+    def _solve(self, start: Float, conditions: Conditions) -> Solution:
         y = start
         value, jacobian, scale = self.residual(y, conditions)
         for _ in range(_ITERATIONS):
@@ -183,7 +178,7 @@ class Balance:
             return solution
         raise NotConvergedError(f"no periodic vibration with a positive voltage found at {solution.conditions}")
 
-    def linear_start(self, conditions: Conditions, omega_rad_s: float) -> Real:
+    def linear_start(self, conditions: Conditions, omega_rad_s: float) -> Float:
         """Return the vibration of the linear part alone at W, at the level of the conditions."""
         transfer = self.linear.transfer(omega_rad_s, self.series.orders)[0][1, :, -1]
         voltage = conditions.voltage_v(*np.abs(transfer[self.n_site :]))
@@ -192,5 +187,5 @@ class Balance:
         return np.append(self.series.to_real(harmonics).ravel(), [omega_rad_s, voltage])
 
 
-def _size(scaled: Real) -> float:
+def _size(scaled: Float) -> float:
     return float(np.max(np.abs(scaled)))

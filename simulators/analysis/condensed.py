@@ -5,11 +5,7 @@ from numpy.typing import NDArray
 
 from simulators.plant.assembly import LinearPlant
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["CondensedRig", "CondensedStructure"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex
 
 _NOT_HELD = "structure: has a motion that no stiffness holds, allowed is a rig that returns to rest"
 _FREE = 1e-12

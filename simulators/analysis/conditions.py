@@ -8,24 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from simulators.virtual_rig import VirtualRig
+from vibrolock.arrays import Complex, Float
 
-__all__ = [
-    "Conditions",
-    "Held",
-    "Quantity",
-    "checked_harmonics",
-    "followed_mode",
-    "held_force",
-    "lags_rad",
-    "levels",
-    "positive",
-]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Held = Literal["force", "force-rms", "response", "voltage"]
 Quantity = Literal["fundamental", "rms"]
 
@@ -73,7 +60,7 @@ class Conditions:
         at = f"{np.degrees(self.value):g} deg" if self.at == "lag" else f"{self.value / (2.0 * np.pi):g} Hz"
         return f"{name} {self.level:g} {unit}, {self.at} {at}"
 
-    def equations(self, unknowns: Real, responses: Complex, slopes: Complex) -> tuple[Real, Real]:
+    def equations(self, unknowns: Float, responses: Complex, slopes: Complex) -> tuple[Float, Float]:
         """Return the residuals [2] of lag or frequency and of the level, and their derivatives [2, len(y)].
 
         ``responses`` [2, H + 1] are the harmonics of force and drive displacement; ``slopes`` [2, H + 1, len(y)] are their
@@ -91,7 +78,7 @@ class Conditions:
         value[1], jacobian[1] = self._level(unknowns, responses, slopes)
         return value, jacobian
 
-    def _level(self, unknowns: Real, responses: Complex, slopes: Complex) -> tuple[float, Real]:
+    def _level(self, unknowns: Float, responses: Complex, slopes: Complex) -> tuple[float, Float]:
         if self.held == "voltage":
             slope = np.zeros(unknowns.size)
             slope[-1] = 1.0 / self.level
@@ -109,7 +96,7 @@ class Conditions:
         return float(self.level / gains[self.held])
 
 
-def positive(name: str, values: ArrayLike) -> Real:
+def positive(name: str, values: ArrayLike) -> Float:
     """Return ``values`` as a row; raise `ValueError` unless all are finite and above zero."""
     array = _row(name, values)
     for value in array[~((array > 0.0) & np.isfinite(array))]:
@@ -119,7 +106,7 @@ def positive(name: str, values: ArrayLike) -> Real:
 
 def levels(
     forces_n: ArrayLike | None, voltages_v: ArrayLike | None, amplitudes_m: ArrayLike | None
-) -> tuple[Literal["force", "voltage", "response"], Real]:
+) -> tuple[Literal["force", "voltage", "response"], Float]:
     """Return the name and the values of the one quantity that is given; raise `ValueError` unless it is exactly one."""
     if forces_n is not None and voltages_v is None and amplitudes_m is None:
         return "force", positive("forces_n", forces_n)
@@ -130,7 +117,7 @@ def levels(
     raise ValueError("forces_n, voltages_v, amplitudes_m: several or none given, allowed is one of them")
 
 
-def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Real:
+def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Float:
     """Return phase lags in radians from degrees; raise `ValueError` if one is out of range or, on request, not rising."""
     array = _row(name, values)
     lowest, highest = _LAG_LIMITS_DEG
@@ -169,7 +156,7 @@ def followed_mode(rig: VirtualRig, near_hz: float | None) -> int:
     return int(np.argmax(modes.frequency_hz > 0.0))
 
 
-def _row(name: str, values: ArrayLike) -> Real:
+def _row(name: str, values: ArrayLike) -> Float:
     try:
         array = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):

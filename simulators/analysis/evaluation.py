@@ -11,11 +11,7 @@ from simulators.analysis.responses import PeriodicResponses
 from simulators.analysis.site_forces import Series
 from simulators.layout import Flag
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["Evaluation"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 
 class Evaluation:
@@ -77,7 +73,7 @@ class Evaluation:
         neglected = self._neglected(omega, waves.forces) / abs(outputs[0, 1])
         return series.to_complex(coefficients), inputs, outputs, neglected, waves.beyond
 
-    def _neglected(self, omega: float, forces: Real) -> float:
+    def _neglected(self, omega: float, forces: Float) -> float:
         """Return the RMS over harmonics H + 1 to 2 H + 1 of the stinger force (N) that the sites' forces cause."""
         series = self.balance.series
         above = np.arange(series.harmonics + 1, 2 * series.harmonics + 2)
@@ -85,7 +81,7 @@ class Evaluation:
         transfer = self.balance.linear.transfer(omega, above)[0][:, self.balance.n_site, :-1]
         return float(np.linalg.norm(np.einsum("hi,ih->h", transfer, spectrum)))
 
-    def _modal(self, omega: Real, force: Complex, drive: Complex) -> dict[str, Real]:
+    def _modal(self, omega: Float, force: Complex, drive: Complex) -> dict[str, Float]:
         """Return fundamentals, modal frequency and damping of every point; conventions of `PeriodicResponses`."""
         shape = float(self.rig.linear_modes.drive_shape[self.mode])
         amplitude = np.abs(drive[:, 1])

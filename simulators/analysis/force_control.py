@@ -13,9 +13,7 @@ from numbers import Complex as Number
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ForceControl", "ForceHarmonics"]
-
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex
 
 ForceHarmonics = int | Mapping[int, complex]
 """Controlled harmonics of the force: the highest one, all from the second on being zero, or each with its value ``c_h``."""

@@ -3,24 +3,20 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from simulators.analysis.conditions import positive
 from simulators.plant.assembly import LinearPlant
 from simulators.plant.compilation import phi_matrices
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["FrequencyResponses", "frequency_response"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrequencyResponses:
     """Frequency responses of a rig, ``Y = H U`` for ``exp(i w t)``, to the true quantities, not to the sensors' signals."""
 
-    frequency_hz: Real
+    frequency_hz: Float
     """Frequencies [n]."""
     held: bool
     """False: the plant itself, in continuous time. True: the voltage held between samples, outputs read at the samples."""
@@ -66,7 +62,7 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
     n = plant.dynamics.shape[0]
     shapes = {at: rig.shape(at) for at in points}
 
-    def output(row: Real) -> Complex:
+    def output(row: Float) -> Complex:
         return np.asarray(states @ row[:n] + row[n])
 
     return FrequencyResponses(
@@ -79,7 +75,7 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
     )
 
 
-def _states(transition: Real, column: Real, z: Complex) -> Complex:
+def _states(transition: Float, column: Float, z: Complex) -> Complex:
     """Return ``(z - A)^-1 b`` for every z [n_frequency, n]."""
     left = z[:, None, None] * np.eye(column.size) - transition
     return np.asarray(np.linalg.solve(left, np.broadcast_to(column[:, None], (z.size, column.size, 1)))[..., 0])
@@ -91,7 +87,7 @@ def _held_states(plant: LinearPlant, s: Complex, step_s: float) -> Complex:
     return _states(phi.transition, phi.held[:, 0], np.exp(s * step_s))
 
 
-def _receptances(plant: LinearPlant, shapes: dict[str, Real], s: Complex) -> dict[str, Complex]:
+def _receptances(plant: LinearPlant, shapes: dict[str, Float], s: Complex) -> dict[str, Complex]:
     """Return ``phi_p (s^2 + s C + K)^-1 phi_d`` for every point p."""
     m = plant.n_mode
     left = s[:, None, None] * np.diag(plant.modal_damping) + plant.modal_stiffness + (s**2)[:, None, None] * np.eye(m)

@@ -21,13 +21,6 @@ from simulators.analysis.paths import HARMONICS, SAMPLES, ModePaths
 from simulators.analysis.responses import PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 
-__all__ = [
-    "constant_displacement_response",
-    "constant_force_response",
-    "forced_response",
-    "phase_resonance_backbone",
-]
-
 RESONANCE_DEG = -90.0
 _FROM_BELOW_TO_ABOVE = (-175.0, -5.0)
 _LAGS = 86

@@ -13,8 +13,6 @@ from simulators.analysis.force_control import ForceControl, ForceHarmonics
 from simulators.analysis.responses import NotConvergedError, PeriodicResponses
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["HARMONICS", "SAMPLES", "ModePaths", "follow", "from_rest"]
-
 HARMONICS = 15
 SAMPLES = 512
 _RESONANCE_RAD = -0.5 * math.pi

@@ -7,17 +7,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.analysis.kernels import friction_over_a_period, memoryless_over_a_period
 from simulators.analysis.responses import HysteresisLoop, PeriodicResponses
 from simulators.plant.sites import local_sites
 from simulators.virtual_rig import VirtualRig
-
-__all__ = ["Series", "SiteForces", "SiteWaves", "hysteresis_loops"]
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 _RELATIVE_STEP = 6e-6
 """Half step of the central differences relative to the motion's amplitude, near the cube root of the rounding error."""
@@ -37,29 +32,29 @@ class Series:
         self.orders = np.arange(harmonics + 1)
 
     @cached_property
-    def basis(self) -> Real:
+    def basis(self) -> Float:
         """Matrix [N, P] from coefficients to samples."""
         angles = np.outer(2.0 * np.pi * np.arange(self.samples) / self.samples, self.orders[1:])
         return np.ascontiguousarray(np.hstack([np.ones((self.samples, 1)), np.cos(angles), -np.sin(angles)]))
 
     @cached_property
-    def projection(self) -> Real:
+    def projection(self) -> Float:
         """Matrix [P, N] from samples to coefficients."""
         projection = self.basis.T * (2.0 / self.samples)
         projection[0] *= 0.5
         return np.ascontiguousarray(projection)
 
-    def to_complex(self, coefficients: Real) -> Complex:
+    def to_complex(self, coefficients: Float) -> Complex:
         """Return harmonics [n, H + 1, ...] from coefficients [n, P, ...]."""
         packed = coefficients[:, : self.harmonics + 1].astype(np.complex128)
         packed[:, 1:] += 1j * coefficients[:, self.harmonics + 1 :]
         return packed
 
-    def to_real(self, harmonics: Complex) -> Real:
+    def to_real(self, harmonics: Complex) -> Float:
         """Return coefficients [n, P, ...] from harmonics [n, H + 1, ...]."""
         return np.concatenate([harmonics.real, harmonics[:, 1:].imag], axis=1)
 
-    def waveforms(self, harmonics: Complex) -> Real:
+    def waveforms(self, harmonics: Complex) -> Float:
         """Return samples [n, N] from harmonics [n, H + 1]."""
         return np.asarray(self.to_real(harmonics) @ self.basis.T)
 
@@ -67,9 +62,9 @@ class Series:
 class SiteWaves(NamedTuple):
     """Forces of the sites over one period, and their derivatives by the coefficients of the motion."""
 
-    forces: Real
+    forces: Float
     """Forces on the structure [n_site, N], without the linear parts that belong to the linear plant."""
-    jacobian: Real
+    jacobian: Float
     """Derivative of the force coefficients by the coefficients of the coordinates [n_site, P, n_site, P]."""
     beyond: bool
     """True where a site leaves the range in which its law holds."""
@@ -87,7 +82,7 @@ class SiteForces:
             for joint in rig.friction
         ]
 
-    def __call__(self, series: Series, coefficients: Real) -> SiteWaves:
+    def __call__(self, series: Series, coefficients: Float) -> SiteWaves:
         """Return the forces for site coordinates with the given coefficients [n_site, P]."""
         motion = np.ascontiguousarray(coefficients @ series.basis.T)
         forces = np.zeros((self.n_site, series.samples))
@@ -101,7 +96,7 @@ class SiteForces:
             jacobian[s, :, s] = series.projection @ tangent
         return SiteWaves(forces, jacobian, beyond)
 
-    def _local(self, series: Series, motion: Real, forces: Real, jacobian: Real) -> bool:
+    def _local(self, series: Series, motion: Float, forces: Float, jacobian: Float) -> bool:
         """Fill forces and Jacobian of the sites without memory, which may act on each other; return whether one is beyond."""
         n = self.n_local
         if n == 0:

@@ -17,37 +17,22 @@ from simulators.sensing.filters import channel_sections, output_sections, ring_s
 from simulators.sensing.parts import Converter, Sensor
 from simulators.sites.elements import Element
 from simulators.sites.friction import FrictionSite
+from vibrolock.arrays import Float
 from vibrolock.width import WIDTH
-
-__all__ = [
-    "PhiMatrices",
-    "StepColumns",
-    "aligned",
-    "at_rest",
-    "jenkins_elements",
-    "pad",
-    "phi_matrices",
-    "rediscretised",
-    "rig_arrays",
-    "round_up",
-    "step_columns",
-]
-
-Matrix = NDArray[np.float64]
 
 
 class PhiMatrices(NamedTuple):
     """Matrices of the exact linear sub-step."""
 
-    transition: Matrix
+    transition: Float
     """``e^{hA}`` [n, n]."""
-    held: Matrix
+    held: Float
     """``h phi_1(hA) B`` [n, n_input]: effect of an input held over the step."""
-    ramp: Matrix
+    ramp: Float
     """``h phi_2(hA) B`` [n, n_input]: effect of an input that grows linearly from 0 to 1 over the step."""
 
 
-def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrices:
+def phi_matrices(dynamics: Float, columns: Float, step_s: float) -> PhiMatrices:
     """Return matrix exponential, phi_1 and phi_2 from one exponential of an augmented matrix (Van Loan 1978).
 
     ``phi_1(z) = (e^z - 1)/z`` and ``phi_2(z) = (e^z - 1 - z)/z^2`` are formed without a division.
@@ -62,11 +47,11 @@ def phi_matrices(dynamics: Matrix, columns: Matrix, step_s: float) -> PhiMatrice
 
 
 @lru_cache(maxsize=64)
-def _exponential(matrix: bytes) -> Matrix:
+def _exponential(matrix: bytes) -> Float:
     """Exponential of a square matrix of doubles, flat; a rig is discretised several times for one run."""
     values = np.frombuffer(matrix)
     size = math.isqrt(values.size)
-    found: Matrix = scipy.linalg.expm(values.reshape(size, size)).ravel()
+    found: Float = scipy.linalg.expm(values.reshape(size, size)).ravel()
     found.setflags(write=False)
     return found
 
@@ -74,9 +59,9 @@ def _exponential(matrix: bytes) -> Matrix:
 class StepColumns(NamedTuple):
     """Padded matrices of the sub-step for the kernels; rows are ``[joint coordinates, element coordinates, x]``."""
 
-    predictor: Matrix
+    predictor: Float
     """[n_input, n_row]."""
-    corrector: Matrix
+    corrector: Float
     """[n_site, n_row]."""
 
 
@@ -93,7 +78,7 @@ def step_columns(plant: LinearPlant, n_joint: int, step_s: float) -> StepColumns
     return StepColumns(pad((fold @ predictor).T), pad((fold @ corrector).T, rows=False))
 
 
-def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
+def pad(matrix: Float, *, rows: bool = True) -> Float:
     """Return the matrix padded with zeros until both sizes (or only the last) are multiples of the vector length."""
     n_row, n_column = matrix.shape
     padded = aligned((round_up(n_row) if rows else n_row, round_up(n_column)))
@@ -101,7 +86,7 @@ def pad(matrix: Matrix, *, rows: bool = True) -> Matrix:
     return padded
 
 
-def aligned(shape: int | tuple[int, ...]) -> Matrix:
+def aligned(shape: int | tuple[int, ...]) -> Float:
     """Return zeros aligned to a cache line, so that no vector of a compiled loop straddles two lines."""
     size = int(np.prod(shape))
     line = WIDTH
@@ -120,7 +105,7 @@ def rig_arrays(
     elements: Sequence[Element],
     joints: Sequence[FrictionSite],
     exciter: Exciter,
-    outputs: Sequence[Matrix],
+    outputs: Sequence[Float],
     sensors: Sequence[Sensor],
     converter: Converter,
     *,
@@ -154,7 +139,7 @@ def rig_arrays(
 
 
 def rediscretised(
-    rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Matrix], converter: Converter
+    rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Float], converter: Converter
 ) -> RigArrays:
     """Return a rig's arrays for another plant with the same coordinates and sites; ``outputs``: one row per sensor."""
     step = step_columns(plant, n_joint, _step_s(converter))
@@ -166,7 +151,7 @@ def _step_s(converter: Converter) -> float:
     return 1.0 / (converter.sample_rate_hz * converter.substeps)
 
 
-def jenkins_elements(joints: Sequence[FrictionSite]) -> Matrix:
+def jenkins_elements(joints: Sequence[FrictionSite]) -> Float:
     """Return stiffness and slip force of every element [2, n_element, n_joint], padded with elements of zero stiffness."""
     n_element = max((len(joint.stiffness) for joint in joints), default=0)
     table = aligned((2, n_element, round_up(len(joints))))
@@ -203,7 +188,7 @@ def _channel(sensor: Sensor, delay: int, converter: Converter, noise_scale: floa
     return noise_v, sensor.range_v, delay
 
 
-def _padded_sections(sections: Matrix) -> Matrix:
+def _padded_sections(sections: Float) -> Float:
     """Return sections [n_section, 5, n_channel] with their channels padded with zeros."""
     n_section, n_coefficient, n_channel = sections.shape
     return pad(sections.reshape(-1, n_channel), rows=False).reshape(n_section, n_coefficient, round_up(n_channel))

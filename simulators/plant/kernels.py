@@ -32,7 +32,8 @@ from simulators.layout import (
 )
 from simulators.products import add_columns, combine
 from vibrolock.compiled import Record, inner_kernel, kernel
-from vibrolock.lanes import WIDTH, greatest, least, load, spread, store
+from vibrolock.lanes import greatest, least, load, spread, store
+from vibrolock.width import WIDTH
 
 
 def _call_at(typing: Any, address: Any, z: Any, parameters: Any) -> Any:

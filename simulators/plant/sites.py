@@ -11,24 +11,21 @@ from simulators.layout import SITE, SiteKind
 from simulators.sites.elements import Clearance, Cubic, DampingTable, Element, ForceTable, Magnet
 from simulators.sites.functions import loaded
 from simulators.structures.structure import Structure
-
-__all__ = ["Place", "element_places", "exciter_places", "local_sites"]
-
-Matrix = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 class Place(NamedTuple):
     """A site in the plant ``x' = A x + B f`` with ``x = [q, q', x_a, v_a, i]``."""
 
-    row: Matrix
+    row: Float
     """The site's coordinate as a row over the state [n]."""
-    column: Matrix
+    column: Float
     """Effect of the site's force on the rates of the state [n]."""
     stiffness_n_m: float = 0.0
     """Linear stiffness on the site's coordinate that is part of the linear plant."""
 
 
-def element_places(structure: Structure, elements: Sequence[Element], signs: Matrix) -> list[Place]:
+def element_places(structure: Structure, elements: Sequence[Element], signs: Float) -> list[Place]:
     """Return one place per element, then one per damping table for the deflection that its damping depends on.
 
     ``signs`` [n_mode] multiply the mode shapes.
@@ -40,7 +37,7 @@ def element_places(structure: Structure, elements: Sequence[Element], signs: Mat
     ]
 
 
-def _element_place(structure: Structure, element: Element, signs: Matrix, moves_with: str) -> Place:
+def _element_place(structure: Structure, element: Element, signs: Float, moves_with: str) -> Place:
     shape = signs * structure.shape(element.at)
     if element.to is not None:
         shape = shape - signs * structure.shape(element.to)

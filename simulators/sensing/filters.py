@@ -7,24 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.sensing.parts import TAPS, Converter, Sensor
-
-__all__ = [
-    "channel_delays",
-    "channel_sections",
-    "dc_delay",
-    "filter_delay",
-    "lagrange_taps",
-    "output_sections",
-    "ring_size",
-    "skew_taps",
-]
-
-Matrix = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _IDENTITY = np.array([[1.0, 0.0, 0.0, 0.0, 0.0]])
 
 
-def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
+def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Float:
     """Return a Butterworth low-pass as sections [n_section, 5] (b_0 b_1 b_2 a_1 a_2); none if the corner is 0.
 
     With the corner at 1 rad/s, the poles of order n lie on the unit circle at ``pi/(2n)``, ``3 pi/(2n)`` ... from the imaginary
@@ -46,7 +34,7 @@ def low_pass_sections(order: int, corner_hz: float, rate_hz: float) -> Matrix:
     return np.array(sections)
 
 
-def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Matrix:
+def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Float:
     """Return sections [n_section, 5, n_channel]: the anti-alias filter, then the low-passes of the sensors that have one."""
     rate_hz = converter.internal_rate_hz
     shared = low_pass_sections(converter.anti_alias_order, converter.anti_alias_hz, rate_hz)
@@ -57,7 +45,7 @@ def channel_sections(sensors: Sequence[Sensor], converter: Converter) -> Matrix:
     return np.ascontiguousarray(np.stack(columns, axis=-1))
 
 
-def output_sections(converter: Converter) -> Matrix:
+def output_sections(converter: Converter) -> Float:
     """Return the sections [n_section, 5] of the reconstruction filter."""
     sections = low_pass_sections(
         converter.reconstruction_order, converter.reconstruction_hz, converter.internal_rate_hz
@@ -65,7 +53,7 @@ def output_sections(converter: Converter) -> Matrix:
     return np.ascontiguousarray(sections)
 
 
-def dc_delay(sections: Matrix) -> NDArray[np.float64]:
+def dc_delay(sections: Float) -> NDArray[np.float64]:
     """Return the low-frequency group delay [n_channel] of sections [n_section, 5, n_channel], in samples at the filters' rate.
 
     For ``H = B/A`` it is ``sum k b_k / sum b_k - sum k a_k / sum a_k``, summed over the sections.
@@ -95,7 +83,7 @@ def _anti_alias_delay(converter: Converter) -> float:
     return float(dc_delay(sections[..., np.newaxis])[0])
 
 
-def lagrange_taps(delay: float) -> tuple[int, Matrix]:
+def lagrange_taps(delay: float) -> tuple[int, Float]:
     """Return the whole delay of the first tap, and the weights [TAPS] that interpolate ``delay`` (at least 0) samples back.
 
     Lagrange's polynomial passes through six values, three on either side of the wanted instant where there are so many. The
@@ -110,13 +98,13 @@ def lagrange_taps(delay: float) -> tuple[int, Matrix]:
     return first, weights
 
 
-def skew_taps(sensors: Sequence[Sensor], converter: Converter) -> tuple[list[int], Matrix]:
+def skew_taps(sensors: Sequence[Sensor], converter: Converter) -> tuple[list[int], Float]:
     """Return the whole delays and the weights [n_channel, TAPS] of all channels, at the internal rate."""
     taps = [lagrange_taps(sensor.skew_samples * converter.oversampling) for sensor in sensors]
     return [first for first, _ in taps], np.array([weights for _, weights in taps])
 
 
-def ring_size(delays: NDArray[np.int64], taps: Matrix) -> int:
+def ring_size(delays: NDArray[np.int64], taps: Float) -> int:
     """Return the length of the ring of past values: a power of two that holds every tap, or 0 if no channel is skewed."""
     if np.all(delays == 0) and np.all(taps[:, 1:] == 0.0):
         return 0

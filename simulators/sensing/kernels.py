@@ -14,7 +14,8 @@ from simulators.layout import DAC_CLIPPED, SENSOR_CLIPPED
 from simulators.products import combine
 from simulators.sensing.noise.kernels import normal
 from vibrolock.compiled import Record, inner_kernel, kernel
-from vibrolock.lanes import WIDTH, differ, greatest, least, load, spread, store
+from vibrolock.lanes import differ, greatest, least, load, spread, store
+from vibrolock.width import WIDTH
 
 
 @kernel

@@ -7,8 +7,6 @@ from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive
 
-__all__ = ["LOWEST_INTERNAL_RATE_HZ", "TAPS", "Converter", "Sensor"]
-
 TAPS = 6
 """Number of values from which a skewed channel is interpolated."""
 LOWEST_INTERNAL_RATE_HZ = 4000.0

@@ -15,8 +15,6 @@ from simulators.layout import N_NODE, N_PARAMETER
 from simulators.part import Part, Positive, Several
 from simulators.sites.functions import loaded, named, portable
 
-__all__ = ["Clearance", "Cubic", "DampingTable", "Element", "ForceTable", "LocalElement", "Magnet", "User"]
-
 VALID_SHARE_OF_GAP = 0.7
 LARGEST_FORCE_AT_REST_N = 1e-9
 

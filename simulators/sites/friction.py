@@ -9,8 +9,6 @@ from pydantic import Field, model_validator
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import Quantity
 
-__all__ = ["FrictionSite", "IwanSite", "JenkinsSite"]
-
 
 class _Site(Part):
     """A friction joint on one coordinate, minus its stuck linear part.

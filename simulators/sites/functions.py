@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Loaded", "loaded", "named", "portable"]
-
 _ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, *_ARGUMENTS)
 _FUNCTION_POINTER: Any = _PROTOTYPE.__base__ or object  # base class of every C function object

@@ -11,21 +11,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-__all__ = [
-    "BeamModes",
-    "Boundary",
-    "Lump",
-    "Quantity",
-    "Spring",
-    "beam_modes",
-    "bending_element",
-    "hermite",
-    "solve_modes",
-]
+from vibrolock.arrays import Float
 
-Matrix = NDArray[np.float64]
 Boundary = Literal[
     "clamped-free", "clamped-pinned", "clamped-guided", "clamped-clamped",
     "pinned-free", "pinned-pinned", "pinned-guided", "pinned-clamped",
@@ -59,19 +47,19 @@ class Spring(NamedTuple):
 class BeamModes:
     """Modes of a beam, lowest first, normalised to unit modal mass."""
 
-    omega_rad_s: Matrix
+    omega_rad_s: Float
     """Angular natural frequencies [n_mode]; exactly zero for rigid-body modes."""
     length_m: float
     """Length; the nodes are spaced evenly along it."""
-    dofs: Matrix
+    dofs: Float
     """Deflection and slope of every node [2 (n_element + 1), n_mode]: kg^-1/2 and kg^-1/2 / m."""
 
-    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
+    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Float:
         """Return mode shapes [n_mode] at a position: deflection (kg^-1/2), slope (per m) or curvature (per m^2)."""
         return _row(position_m, self.length_m, self.dofs.shape[0], quantity) @ self.dofs
 
 
-def hermite(s: float, size_m: float, quantity: Quantity = "deflection") -> Matrix:
+def hermite(s: float, size_m: float, quantity: Quantity = "deflection") -> Float:
     """Return the cubic Hermite shapes [4] of an element at ``s`` in [0, 1]: left deflection and slope, then right."""
     shapes = {
         "deflection": [1 - 3 * s**2 + 2 * s**3, size_m * s * (1 - s) ** 2, s**2 * (3 - 2 * s), size_m * s**2 * (s - 1)],
@@ -111,7 +99,7 @@ def beam_modes(
     return BeamModes(np.sqrt(squared), length_m, dofs)
 
 
-def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> tuple[Matrix, Matrix]:
+def solve_modes(stiffness: Float, mass: Float, n_mode: int, shift: float) -> tuple[Float, Float]:
     """Return the lowest ``omega^2`` [n_mode] (not negative) and mass-normalised vectors [n, n_mode] of ``K v = omega^2 M v``.
 
     The problem is solved as ``M v = mu (K + shift M) v``. The wanted modes are then the largest eigenvalues and lose no digits
@@ -122,7 +110,7 @@ def solve_modes(stiffness: Matrix, mass: Matrix, n_mode: int, shift: float) -> t
     return np.maximum(1.0 / mu[::-1] - shift, 0.0), vectors[:, ::-1] / np.sqrt(mu[::-1])
 
 
-def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[Matrix, Matrix]:
+def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[Float, Float]:
     """Return stiffness and consistent mass matrix [4, 4] of one element over deflection and slope of its two nodes."""
     h = size_m
     stiffness = (ei_n_m2 / h**3) * np.array(
@@ -144,7 +132,7 @@ def bending_element(size_m: float, ei_n_m2: float, rho_a_kg_m: float) -> tuple[M
     return stiffness, mass
 
 
-def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[Matrix, Matrix]:
+def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[Float, Float]:
     """Return stiffness and mass of ``n`` equal elements, both [2 (n + 1), 2 (n + 1)]."""
     element_stiffness, element_mass = bending_element(size, ei, rho_a)
     stiffness, mass = np.zeros((2, 2 * n + 2, 2 * n + 2))
@@ -155,7 +143,7 @@ def _assemble(n: int, size: float, ei: float, rho_a: float) -> tuple[Matrix, Mat
     return stiffness, mass
 
 
-def _row(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Matrix:
+def _row(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Float:
     """Return the row [n_dof] that gives a quantity at a position from the nodal coordinates."""
     n_element = n_dof // 2 - 1
     size = length_m / n_element
@@ -165,7 +153,7 @@ def _row(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> 
     return row
 
 
-def _square(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Matrix:
+def _square(position_m: float, length_m: float, n_dof: int, quantity: Quantity) -> Float:
     row = _row(position_m, length_m, n_dof, quantity)
     return np.outer(row, row)
 

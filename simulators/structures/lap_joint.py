@@ -18,13 +18,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simulators.structures.beam import Lump, Quantity, Spring, bending_element, hermite, solve_modes
-
-__all__ = ["Interface", "LapJointModes", "LapMesh", "Section", "bending_dofs", "lap_joint_modes"]
-
-Matrix = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 @dataclass(frozen=True)
@@ -40,7 +36,7 @@ class LapMesh:
     """Elements in each leg."""
 
     @cached_property
-    def positions_m(self) -> Matrix:
+    def positions_m(self) -> Float:
         """Positions of all element ends [2 n_arm + n_lap + 1], along the beam."""
         first, last = (self.length_m - self.lap_length_m) / 2.0, (self.length_m + self.lap_length_m) / 2.0
         arms = np.linspace(0.0, first, self.n_arm + 1), np.linspace(last, self.length_m, self.n_arm + 1)
@@ -58,7 +54,7 @@ class LapMesh:
         return list(range(a, a + n + 1)), list(range(a + n + 1, a + 2 * n + 2))
 
     @property
-    def lap_positions_m(self) -> Matrix:
+    def lap_positions_m(self) -> Float:
         """Positions of the legs' nodes [n_lap + 1]."""
         return self.positions_m[self.n_arm : self.n_arm + self.n_lap + 1]
 
@@ -70,7 +66,7 @@ class LapMesh:
         left = element if element < self.n_arm else element + 1 + self.n_lap
         return [(left, left + 1, 0.0)]
 
-    def row(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
+    def row(self, position_m: float, quantity: Quantity = "deflection") -> Float:
         """Return the row [n_dof] for deflection, slope or curvature: in the lap the legs' mean, at its edge the arm."""
         element, s, size = self._locate(position_m)
         members = self.members(element)
@@ -79,7 +75,7 @@ class LapMesh:
             row[bending_dofs(left, right)] += hermite(s, size, quantity) / len(members)
         return row
 
-    def axial_row(self, position_m: float) -> Matrix:
+    def axial_row(self, position_m: float) -> Float:
         """Return the row [n_dof] for the axial displacement of the mid-plane; in the lap the mean of both legs."""
         element, s, _ = self._locate(position_m)
         members = self.members(element)
@@ -88,7 +84,7 @@ class LapMesh:
             row[[3 * left, 3 * right]] += np.array([1.0 - s, s]) / len(members)
         return row
 
-    def slip_row(self, position_m: float) -> Matrix:
+    def slip_row(self, position_m: float) -> Float:
         """Return the row [n_dof] for the tangential displacement of the upper leg's interface relative to the lower leg's.
 
         Each interface moves by ``u_axis + e w'``. In an element, the axial displacement of the leg's axis is linear and the
@@ -147,18 +143,18 @@ class Interface(NamedTuple):
 class LapJointModes:
     """Modes of the jointed beam, lowest first, normalised to unit modal mass."""
 
-    omega_rad_s: Matrix
+    omega_rad_s: Float
     """Angular natural frequencies [n_mode]; exactly zero for rigid-body modes."""
     mesh: LapMesh
     """The mesh."""
-    dofs: Matrix
+    dofs: Float
     """Coordinates of every node [n_dof, n_mode]."""
 
-    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
+    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Float:
         """Mode shapes [n_mode] at a position: deflection (kg^-1/2), slope (per m) or curvature (per m^2)."""
         return self.mesh.row(position_m, quantity) @ self.dofs
 
-    def slip(self, position_m: float) -> Matrix:
+    def slip(self, position_m: float) -> Float:
         """Return the tangential displacement [n_mode] (kg^-1/2) of the upper leg's interface relative to the lower leg's."""
         return self.mesh.slip_row(position_m) @ self.dofs
 
@@ -195,7 +191,7 @@ def lap_joint_modes(
     return LapJointModes(np.sqrt(squared), mesh, vectors)
 
 
-def _members(mesh: LapMesh, section: Section) -> tuple[Matrix, Matrix]:
+def _members(mesh: LapMesh, section: Section) -> tuple[Float, Float]:
     """Return stiffness and mass [n_dof, n_dof] of arms and legs, not yet coupled."""
     stiffness, mass = np.zeros((2, mesh.n_dof, mesh.n_dof))
     for element, size in enumerate(np.diff(mesh.positions_m)):
@@ -210,7 +206,7 @@ def _members(mesh: LapMesh, section: Section) -> tuple[Matrix, Matrix]:
     return stiffness, mass
 
 
-def _element(size: float, section: Section) -> tuple[Matrix, Matrix]:
+def _element(size: float, section: Section) -> tuple[Float, Float]:
     """Return stiffness and mass [6, 6] over the two axial displacements, then deflection and slope of both nodes."""
     area = section.width_m * section.thickness_m
     inertia = area * section.thickness_m**2 / 12.0
@@ -233,7 +229,7 @@ def _element(size: float, section: Section) -> tuple[Matrix, Matrix]:
     return stiffness, mass
 
 
-def _add_interface(stiffness: Matrix, mesh: LapMesh, interface: Interface) -> None:
+def _add_interface(stiffness: Float, mesh: LapMesh, interface: Interface) -> None:
     """Add the springs between the legs' nodes to ``stiffness``; end nodes represent half an element."""
     offsets = mesh.lap_positions_m[:, None] - np.array(interface.bolts_m)[None, :]
     weight = interface.floor + np.sum(np.exp(-(offsets**2) / (2.0 * interface.bolt_width_m**2)), axis=1)

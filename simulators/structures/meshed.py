@@ -6,16 +6,13 @@ from itertools import pairwise
 from typing import Annotated, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import Lump, Quantity, Spring
-
-__all__ = ["LumpedMass", "MeshedBeam", "Support", "check_rising"]
+from vibrolock.arrays import Float
 
 NotNegative = Annotated[float, Field(ge=0.0)]
-Matrix = NDArray[np.float64]
 
 
 class LumpedMass(Part):
@@ -50,10 +47,10 @@ class Modes(Protocol):
     """Mass-normalised modes that can be read anywhere along a beam."""
 
     @property
-    def omega_rad_s(self) -> Matrix:
+    def omega_rad_s(self) -> Float:
         """Angular natural frequencies [n_mode]."""
 
-    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Matrix:
+    def shape(self, position_m: float, quantity: Quantity = "deflection") -> Float:
         """Mode shapes [n_mode] at a position."""
 
 
@@ -125,11 +122,11 @@ class MeshedBeam(Part):
         ]
 
     @property
-    def omega_rad_s(self) -> Matrix:
+    def omega_rad_s(self) -> Float:
         """Angular natural frequencies [n_mode]; the measured ones if given."""
         return self.modes.omega_rad_s if self.frequency_hz is None else 2.0 * np.pi * np.array(self.frequency_hz)
 
-    def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
+    def shape(self, at: str, quantity: Quantity = "deflection") -> Float:
         """Mode shapes [n_mode] at a named point."""
         return self.modes.shape(self.points_m[at], quantity)
 

@@ -4,17 +4,14 @@ from functools import cached_property, lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import BeamModes, Boundary, Quantity, beam_modes
 from simulators.structures.lap_joint import Interface, LapJointModes, LapMesh, Section, lap_joint_modes
 from simulators.structures.meshed import MeshedBeam, check_rising
+from vibrolock.arrays import Float
 
-__all__ = ["BeamStructure", "LapJointedBeam", "ModalStructure", "Structure"]
-
-Matrix = NDArray[np.float64]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 # A bench, its twins and its variants have the same beam: finite elements are solved once for all of them.
@@ -118,7 +115,7 @@ class LapJointedBeam(MeshedBeam):
         """Names with a mode shape: points and friction sites."""
         return (*self.points_m, *self.sites_m)
 
-    def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
+    def shape(self, at: str, quantity: Quantity = "deflection") -> Float:
         """Mode shapes [n_mode] at a named point, or the relative tangential displacement at a named friction site."""
         if at in self.points_m:
             return self.modes.shape(self.points_m[at], quantity)
@@ -158,11 +155,11 @@ class ModalStructure(Part):
         return tuple(self.shapes)
 
     @property
-    def omega_rad_s(self) -> Matrix:
+    def omega_rad_s(self) -> Float:
         """Angular natural frequencies [n_mode]."""
         return 2.0 * np.pi * np.array(self.frequency_hz)
 
-    def shape(self, at: str, quantity: Quantity = "deflection") -> Matrix:
+    def shape(self, at: str, quantity: Quantity = "deflection") -> Float:
         """Return the shape [n_mode] given under a name; slopes and curvatures are given as separate shapes."""
         if quantity != "deflection":
             raise ValueError(f"quantity = {quantity!r}: allowed is 'deflection' where the modes are given")

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["Base", "changed_files", "find_base"]
-
 
 @dataclass(frozen=True)
 class Base:

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import grimp
 
-__all__ = ["PACKAGES", "complete", "drivers", "import_graph", "packages_around", "sources", "used_names"]
-
 PRODUCT = ("vibrolock", "rig", "controller", "simulators", "identification")
 PACKAGES = (*PRODUCT, "benchmarks", "tests")
 

@@ -10,8 +10,6 @@ from grimp.exceptions import GrimpException
 
 from tests.changed.graph import PACKAGES, complete, drivers, import_graph, packages_around, sources
 
-__all__ = ["Selection", "select", "selected"]
-
 _TEST = re.compile(r"tests\.(?:.*\.)?test_\w+")
 _BY_EVERY_RUN = "rig/pytest_plugin.py"
 _READS_ALL = re.compile(r"\bimport_module\(|[\"']import \{|\bimport_graph\(")

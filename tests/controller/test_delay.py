@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from controller import AmplitudeLaw, preset
 from controller.delay import LARGEST_TURN_DEG, highest_crossover_rad_s, longest_delay_s

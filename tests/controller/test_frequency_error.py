@@ -4,8 +4,7 @@ import cmath
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from controller.frequency import LARGEST_FREQUENCY_ERROR, frequency_error
 

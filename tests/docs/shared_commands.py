@@ -7,8 +7,6 @@ from pathlib import Path
 from tests.command import Ended, run_command
 from tests.sharing import made_once, shared_folder
 
-__all__ = ["run_shared"]
-
 
 def run_shared(words: list[str]) -> Ended:
     """Run a command in the present folder; what ``rig run PLAN -o FILE`` makes of a plan on a shipped bench is made once."""

@@ -10,8 +10,6 @@ import pytest
 
 from tests.sharing import made_once, shared_folder
 
-__all__ = ["FOLDER", "built", "need"]
-
 FOLDER = Path(__file__).parents[2] / "firmware"
 NEEDS = {"mps2-an386": ("make", "arm-none-eabi-gcc", "newlib")}
 """Programs that a target needs; others need those of this computer."""

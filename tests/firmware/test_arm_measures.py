@@ -10,9 +10,6 @@ from types import SimpleNamespace
 import pytest
 
 from tests.firmware.building import FOLDER
-from tests.firmware.test_arm import image
-
-__all__ = ["image"]  # fixture: skips or fails where programs are missing
 
 MODULES = ("tools", "sizes", "stack", "execution", "instructions")
 

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.closed_loop.test_wires import require_points_of_the_virtual_rig, without_wire
+from tests.closed_loop.test_wires import require_points_of_the_virtual_rig
 from tests.firmware.building import built
-from tests.rig.emulator.test_campaign import require_rows_of_the_virtual_driver, virtual
-
-__all__ = ["virtual", "without_wire"]  # fixtures
+from tests.rig.emulator.test_campaign import require_rows_of_the_virtual_driver
 
 
 @pytest.mark.slow

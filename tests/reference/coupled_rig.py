@@ -15,10 +15,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Float
 
 MAGNET_GAP_M = 0.011
 
@@ -27,17 +25,17 @@ MAGNET_GAP_M = 0.011
 class CoupledRig:
     """Numbers of one rig, SI units; modal vectors have shape (n,), Jenkins vectors (m,)."""
 
-    w_rad_s: Vector
-    zeta: Vector
-    phi_drive: Vector
-    phi_magnet: Vector
-    phi_sensors: Mapping[str, Vector]
+    w_rad_s: Float
+    zeta: Float
+    phi_drive: Float
+    phi_magnet: Float
+    phi_sensors: Mapping[str, Float]
     magnet_k0: float
     magnet_d0_m: float
     symmetric: bool
-    jenkins_c: Vector
-    jenkins_k: Vector
-    jenkins_slip: Vector
+    jenkins_c: Float
+    jenkins_k: Float
+    jenkins_slip: Float
     stinger_k: float
     stinger_c: float
     armature_m: float
@@ -55,13 +53,13 @@ class CoupledRig:
         """The same rig with the magnets taken off (their mass stays)."""
         return replace(self, magnet_k0=0.0)
 
-    def magnet_force_n(self, z_m: Vector) -> Vector:
+    def magnet_force_n(self, z_m: Float) -> Float:
         """Whole magnet force, linear part included."""
         near = -self.magnet_k0 / (self.magnet_d0_m - z_m) ** 4
         far = self.magnet_d0_m + z_m if self.symmetric else self.magnet_d0_m
         return near + self.magnet_k0 / far**4
 
-    def magnet_slope(self, z_m: Vector) -> Vector:
+    def magnet_slope(self, z_m: Float) -> Float:
         """d f_magnet / dz, N/m."""
         slope = -4.0 * self.magnet_k0 / (self.magnet_d0_m - z_m) ** 5
         return slope - 4.0 * self.magnet_k0 / (self.magnet_d0_m + z_m) ** 5 if self.symmetric else slope
@@ -76,7 +74,7 @@ class CoupledRig:
         return float(np.sqrt(squares[0])), float(abs(self.phi_drive @ shapes[:, 0]))
 
     @cached_property
-    def second_order(self) -> tuple[Vector, Vector, Vector]:
+    def second_order(self) -> tuple[Float, Float, Float]:
         """Matrices M, C, K over [q, x_a, charge] (charge' = current), stinger and coil included, magnets not."""
         n = self.w_rad_s.size
         stretch = np.concatenate([-self.phi_drive, [1.0, 0.0]])
@@ -92,7 +90,7 @@ class CoupledRig:
         return mass, damping, stiffness
 
     @cached_property
-    def inputs(self) -> Vector:
+    def inputs(self) -> Float:
         """Columns over [q, x_a, charge] of magnet force, friction force and voltage, shape (n + 2, 3)."""
         pad = [0.0, 0.0]
         voltage = np.zeros(self.w_rad_s.size + 2)

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import vibrolock
 
-__all__ = ["between", "measured"]
-
 
 def between(text: str, begin: str, end: str, content: str) -> str:
     """A page whose text between two marks is another; its prose stays."""

@@ -20,8 +20,6 @@ from rig.recording.reader import Recording
 from rig.tick.tick import Tick
 from tests.rig.campaigns.running.test_runs import plan_with
 
-__all__ = ["Soaked", "soak", "table"]
-
 
 class Soaked(NamedTuple):
     """What a long run came to."""

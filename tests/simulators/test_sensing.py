@@ -2,8 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from simulators.kernels import run_open_loop, sample
 from simulators.layout import CHANNEL, CONVERTER, Flag

@@ -1,7 +1,8 @@
 import numpy as np
 
 from vibrolock.compiled import kernel
-from vibrolock.lanes import WIDTH, greatest, least, load, spread, store
+from vibrolock.lanes import greatest, least, load, spread, store
+from vibrolock.width import WIDTH
 
 
 @kernel

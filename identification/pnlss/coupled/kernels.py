@@ -7,8 +7,6 @@ import numpy as np
 from identification.pnlss.kernels import Matrices, Table, Workspace, feature_values, outputs_at, state_after
 from vibrolock.compiled import kernel
 
-__all__ = ["Loop", "simulate_coupled"]
-
 _ITERATIONS = 20
 _EXACT = 1e-12
 

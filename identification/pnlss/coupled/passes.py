@@ -4,15 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification.linear.subspace import StateSpace
 from identification.pnlss.coupled.reaction import Reaction, chosen_filter
-
-__all__ = ["Passes"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _FADED = 0.5
 """Share of the lowest frequency below which only the filter contributes to the reaction."""

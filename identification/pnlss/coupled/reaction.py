@@ -16,17 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.linear.subspace import StateSpace
 from identification.pnlss.coupled.kernels import Loop
 from identification.prediction.exciter import Exciter
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["Reaction", "chosen_filter"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 Response = Callable[[Float], Complex]
 
 _LEAKS = (0.07, 0.15, 0.3, 0.6, 1.0, 2.0)

@@ -10,7 +10,7 @@ al., IEEE Trans. CAD 1, 1982).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
@@ -24,10 +24,7 @@ from identification.pnlss.steady.driven import Driven
 from identification.pnlss.steady.setting_up import linear_resonance_hz
 from identification.prediction.exciter import Exciter
 from identification.validation import finite_array, positive
-
-__all__ = ["CoupledRun", "driven_rows", "pnlss_coupled_run"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _LOWEST, _GUESSED = 0.8, 0.5
 """Default lowest frequency: share of the lowest trained frequency, or of the linear resonance if that is unknown."""

@@ -5,15 +5,12 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.fitting.kernels import linearise, run, sensitivities
 from identification.pnlss.fitting.layout import System, slopes_of
 from identification.pnlss.fitting.records import BOUND, Record
+from vibrolock.arrays import Float
 
-__all__ = ["Blocks", "Derivatives", "block_samples", "even"]
-
-Float = NDArray[np.float64]
 Derivatives = Literal["parameters", "state", "all"]
 
 _BYTES = 2_000_000

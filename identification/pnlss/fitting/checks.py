@@ -16,18 +16,6 @@ from identification.pnlss.fitting.threads import available_threads
 from identification.pnlss.model import PnlssModel
 from identification.pnlss.simulators import Simulator
 
-__all__ = [
-    "available_bytes",
-    "belongs",
-    "check_data",
-    "check_enough",
-    "check_memory",
-    "check_not_zero",
-    "check_resumed",
-    "check_signals",
-    "needed_bytes",
-]
-
 _SQUARES = 6
 """Parameter-sized square matrices held at once: normal equations, those of one experiment, eigenvectors, work space."""
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment, excited_band
@@ -20,10 +19,7 @@ from identification.pnlss.fitting.problem import Problem, Scales, scales_of
 from identification.pnlss.fitting.result import PnlssFit
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.model import PnlssModel
-
-__all__ = ["fit_pnlss"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _HOPELESS = 1e3
 """A start is refused if its outputs exceed this multiple of the measured ones."""

@@ -10,10 +10,7 @@ from identification.errors import IdentificationError
 from identification.pnlss.fitting.blocks import Blocks
 from identification.pnlss.fitting.records import Record
 from identification.pnlss.fitting.settings import FitSettings
-
-__all__ = ["transformed", "with_lines"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _COLUMNS = 64
 """Number of columns transformed at a time, so that a transform needs little memory besides the Jacobian."""

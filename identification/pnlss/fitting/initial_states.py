@@ -3,15 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.fitting.blocks import Blocks
 from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.records import Record, simulated
-
-__all__ = ["PRIOR", "SAMPLES", "fitted_initial_state"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 SAMPLES = 600
 """Number of samples from which an initial state is estimated: a few decay times of lightly damped structures at usual rates."""

@@ -9,8 +9,6 @@ from identification.pnlss.fitting.layout import Slopes, System
 from identification.pnlss.kernels import Table, feature_values, function_slope, weighted_sum
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["adjoint", "linearise", "run", "sensitivities"]
-
 
 @inner_kernel
 def _combine(factors: np.ndarray, rows: np.ndarray, out: np.ndarray) -> None:

@@ -3,13 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.kernels import Table
-
-__all__ = ["Slopes", "System", "slopes_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 class System(NamedTuple):

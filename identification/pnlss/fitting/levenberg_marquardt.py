@@ -9,17 +9,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.fitting.normal_equations import NormalEquations
 from identification.pnlss.fitting.problem import Problem
 from identification.pnlss.fitting.result import FitHistory
 from identification.pnlss.fitting.settings import FitProgress, FitSettings
 from identification.pnlss.fitting.threads import threads
-
-__all__ = ["Ending", "Iterates", "Steps", "iterate"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FACTOR = 10.0
 _SMALLEST, _LARGEST = 1e-16, 1e8

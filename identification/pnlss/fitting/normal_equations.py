@@ -10,16 +10,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.fitting.blocks import Blocks, Derivatives
 from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record
 from identification.pnlss.fitting.sums import Sums, summed
+from vibrolock.arrays import Float
 
-__all__ = ["NormalEquations", "jacobian", "normal_equations"]
-
-Float = NDArray[np.float64]
 Piece = tuple[Record, tuple[int, int]]
 
 _SHORTEST = 1000

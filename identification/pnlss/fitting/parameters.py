@@ -4,16 +4,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.features import with_weights
 from identification.pnlss.fitting.layout import System
 from identification.pnlss.kernels import Matrices, Table
 from identification.pnlss.model import PnlssModel
-
-__all__ = ["Parameters", "matrices_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 @dataclass(frozen=True, eq=False)

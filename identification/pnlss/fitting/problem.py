@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.pnlss.experiment import Experiment
@@ -16,10 +15,7 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record, records_of, simulated
 from identification.pnlss.fitting.settings import FitSettings
 from identification.pnlss.model import PnlssModel
-
-__all__ = ["Problem", "Scales", "scales_of"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 @dataclass(frozen=True, eq=False)

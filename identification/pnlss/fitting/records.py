@@ -4,15 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.experiment import Experiment
 from identification.pnlss.fitting.kernels import run
 from identification.pnlss.fitting.layout import System
-
-__all__ = ["BOUND", "Record", "records_of", "simulated", "state_after"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 BOUND = 1e6
 """A state is unbounded beyond this multiple of its RMS in the start."""

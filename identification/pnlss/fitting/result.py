@@ -11,11 +11,9 @@ from identification.errors import IdentificationError
 from identification.pnlss.fitting.settings import FitSettings
 from identification.pnlss.model import PnlssModel
 from identification.validation import read_only
+from vibrolock.arrays import Float
 from vibrolock.results import Result
 
-__all__ = ["FitHistory", "PnlssFit"]
-
-Float = NDArray[np.float64]
 Arrays = Mapping[str, NDArray[Any]]
 
 

@@ -6,8 +6,6 @@ from typing import Literal, get_args
 
 from identification.errors import IdentificationError
 
-__all__ = ["FitProgress", "FitSettings", "OutputWeighting"]
-
 OutputWeighting = Literal["rms", "none"]
 
 

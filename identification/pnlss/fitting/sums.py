@@ -15,17 +15,13 @@ outputs: with four states and four outputs it is a third of that of J' J. With o
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.fitting.blocks import Blocks, Derivatives, even
 from identification.pnlss.fitting.frequency_lines import transformed
 from identification.pnlss.fitting.kernels import adjoint
 from identification.pnlss.fitting.layout import System
 from identification.pnlss.fitting.records import Record, state_after
-
-__all__ = ["Sums", "summed"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _WAITING = 32
 """Number of blocks after which the products ``S(b)' m(b)`` are added."""

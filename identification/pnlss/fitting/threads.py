@@ -7,8 +7,6 @@ from typing import Any
 
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["available_threads", "threads"]
-
 
 @lru_cache(maxsize=1)
 def _pools() -> Any:

@@ -12,8 +12,6 @@ from identification.pnlss.steady.setting_up import Held, unknowns_near
 from identification.pnlss.steady.states import PnlssResponse, SteadyStates, steady_states
 from identification.validation import positive
 
-__all__ = ["response_of", "steady_state_of"]
-
 _STEP = 0.05
 
 

@@ -7,7 +7,6 @@ over the phase, T^+ transforms them back. The Jacobian is ``R (x) I - T^+ diag(d
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.features import Features
 from identification.pnlss.model import PnlssModel
@@ -17,11 +16,7 @@ from identification.pnlss.steady.driven import DrivenBalance, Period
 from identification.pnlss.steady.drives import Drive
 from identification.pnlss.steady.kernels import along_period
 from identification.pnlss.steady.stability import multipliers
-
-__all__ = ["Balance", "samples_for"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _ENOUGH_FOR_BENDS = 16
 """Samples per harmonic for features that are not polynomials; aliasing is then of the order of the neglected harmonics."""

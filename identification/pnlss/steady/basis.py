@@ -10,10 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Basis", "complex_product", "harmonics_of", "real_coefficients"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,12 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.continuation.path import System
 from identification.pnlss.steady.basis import Basis
 from identification.pnlss.steady.drives import Drive
-
-__all__ = ["Driven", "DrivenBalance", "Period"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 class Driven(Protocol):

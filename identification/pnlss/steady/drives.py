@@ -9,15 +9,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.steady.basis import complex_product
 from identification.prediction.exciter import Exciter
-
-__all__ = ["Coupled", "Drive", "Equations", "HeldOutput", "Sine", "level_reached", "peak_of_level"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _NUDGE = 1e-5
 """Relative step of the exciter's numerical derivatives with respect to frequency, which are accurate to ten digits."""

@@ -12,8 +12,6 @@ from identification.pnlss.kernels import (
 )
 from vibrolock.compiled import kernel
 
-__all__ = ["along_period"]
-
 
 @kernel
 def along_period(

@@ -9,8 +9,6 @@ from identification.pnlss.steady.driven import Driven
 from identification.pnlss.steady.states import SteadyStates, motion_rows
 from identification.prediction.exciter import Exciter
 
-__all__ = ["edge_notes", "harmonics_notes", "held_notes", "loss_notes"]
-
 
 def held_notes(
     model: Driven, force: str, exciter: Exciter | None, held_inputs: Mapping[str, float] | None = None

@@ -4,17 +4,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.continuation.follow import continued
 from identification.continuation.newton import solved
 from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
 from identification.pnlss.steady.driven import DrivenBalance
-
-__all__ = ["Followed", "beyond", "followed", "from_rest", "polished", "sizes", "statically_stable"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FIRST_LEVEL = 0.02
 """Share of the level at which Newton's method starts from the linear solution."""

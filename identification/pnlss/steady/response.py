@@ -13,8 +13,6 @@ from identification.prediction.exciter import Exciter
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.validation import positive
 
-__all__ = ["notes_of", "pnlss_frequency_response", "pnlss_response", "pnlss_steady_state"]
-
 
 def pnlss_frequency_response(
     model: PnlssModel,

@@ -16,20 +16,8 @@ from identification.pnlss.steady.drives import Coupled, Drive, HeldOutput, Sine
 from identification.pnlss.steady.states import SteadyStates, motion_rows
 from identification.prediction.exciter import Exciter
 from identification.validation import positive
+from vibrolock.arrays import Float
 
-__all__ = [
-    "Held",
-    "balance_of",
-    "band_around",
-    "band_of",
-    "drive_of",
-    "harmonics_that_fit",
-    "held_values",
-    "linear_resonance_hz",
-    "unknowns_near",
-]
-
-Float = NDArray[np.float64]
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 
 _LIGHT = 0.3

@@ -17,11 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.pnlss.steady.basis import Basis
+from vibrolock.arrays import Complex, Float
 
-__all__ = ["Loss", "by_centroid", "distinct", "loss_of_stability", "multipliers"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
 Loss = Literal["", "fold", "period doubling", "Neimark-Sacker"]
 
 _SAME = 1e-6

@@ -12,11 +12,7 @@ from identification.pnlss.steady.basis import harmonics_of
 from identification.pnlss.steady.driven import DrivenBalance
 from identification.pnlss.steady.stability import Loss, loss_of_stability
 from identification.prediction.steady_prediction import SteadyPrediction
-
-__all__ = ["PnlssResponse", "SteadyStates", "motion_rows", "steady_states"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 _ARRAYS = (
     "frequency_hz",

@@ -6,8 +6,6 @@ from identification.pnlss.coupled.kernels import Loop
 from identification.structured.steps import Room, System, accelerate, along, end_step, take_input, take_step
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["run_coupled"]
-
 ITERATIONS = 20
 EXACT = 1e-12
 

@@ -7,7 +7,7 @@ there, so that the energy balance of the steps holds with the force that acts.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
@@ -20,10 +20,7 @@ from identification.structured.coupled.kernels import run_coupled
 from identification.structured.model import Motion, StructuredModel, ends_of_steps, motion_of, room_for
 from identification.structured.steady.response import resonance_hz
 from identification.validation import finite_array, positive
-
-__all__ = ["CoupledMotion", "structured_coupled_run"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _COARSER = (6, 4, 3, 2)
 """Numbers of steps in a sample that are tried where the model's own allows no filter for the reaction."""

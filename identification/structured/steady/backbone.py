@@ -21,10 +21,7 @@ from identification.structured.model import StructuredModel
 from identification.structured.steady.balance import StructuredBalance
 from identification.structured.steady.response import balance_of, resonance_hz
 from identification.validation import positive
-
-__all__ = ["Resonances", "resonances", "structured_backbone"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _FIRST_LEVEL = 0.02
 _UNIT = 0.02

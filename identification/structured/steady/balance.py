@@ -11,7 +11,6 @@ the Jacobian J and the damping C. Its multipliers over a period are ``exp(2 pi s
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.pnlss.steady.basis import Basis, complex_product
 from identification.pnlss.steady.driven import DrivenBalance, Period
@@ -19,11 +18,7 @@ from identification.pnlss.steady.drives import Drive
 from identification.pnlss.steady.stability import by_centroid, distinct
 from identification.structured.model import StructuredModel
 from identification.structured.steady.kernels import along_period
-
-__all__ = ["StructuredBalance"]
-
-Complex = NDArray[np.complex128]
-Float = NDArray[np.float64]
+from vibrolock.arrays import Complex, Float
 
 
 class StructuredBalance(DrivenBalance):

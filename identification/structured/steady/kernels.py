@@ -6,8 +6,6 @@ from identification.structured.kernels import damping_at, slide, spring_at
 from identification.structured.steps import System
 from vibrolock.compiled import inner_kernel, unlocked_kernel
 
-__all__ = ["along_period"]
-
 
 @inner_kernel
 def add_slider(

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.errors import IdentificationError
@@ -18,10 +17,7 @@ from identification.structured.model import StructuredModel
 from identification.structured.steady.backbone import Resonances, resonances
 from identification.structured.steady.response import balance_of, resonance_hz
 from identification.structured.uncertainty import std_of
-
-__all__ = ["structured_mode"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _POINTS = 25
 """Largest number of points; they are spread over the backbone."""

@@ -14,14 +14,6 @@ from identification.structured.model import StructuredModel
 from identification.structured.steady.balance import StructuredBalance
 from identification.validation import positive
 
-__all__ = [
-    "balance_of",
-    "resonance_hz",
-    "structured_frequency_response",
-    "structured_response",
-    "structured_steady_state",
-]
-
 _SAMPLES = 32
 """Samples of a period per harmonic: dampers and springs have bends."""
 _LEAST_SAMPLES = 256

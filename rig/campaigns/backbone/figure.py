@@ -13,8 +13,6 @@ from rig.recording.reader import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw"]
-
 LEAST_SPAN = 1e-3
 """Smallest part of the frequency that its axis spans: less would show its scatter as if it were a change."""
 

@@ -13,8 +13,6 @@ from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 
-__all__ = ["BackbonePlan"]
-
 
 class BackbonePlan(SettledPlan):
     """Phase-resonant vibrations at a series of levels.

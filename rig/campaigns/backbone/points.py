@@ -47,15 +47,6 @@ from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.recording.reader import Recording
 
-__all__ = [
-    "BACKBONE",
-    "BACKBONE_COLUMNS",
-    "ShortPointResult",
-    "backbone_of",
-    "measure_backbone_point",
-    "recorded_backbone",
-]
-
 NEAR = 0.1  # a point counts as reached within this distance of its final amplitude, as a logarithm
 
 BACKBONE_COLUMNS = (

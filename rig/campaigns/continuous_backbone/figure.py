@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_detuning", "draw_differences", "draw_ways"]
-
 LEAST_DETUNING = 0.002
 """Smallest detuning, relative, at which its axis ends."""
 

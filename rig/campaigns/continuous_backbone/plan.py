@@ -13,8 +13,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 
-__all__ = ["ContinuousBackbonePlan"]
-
 
 class ContinuousBackbonePlan(LockedPlan):
     """Phase-resonant vibrations whose level is ramped up and down without settling.

@@ -42,17 +42,6 @@ from rig.campaigns.planning.plan import Column, Target
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = [
-    "CONTINUOUS_BACKBONE",
-    "CONTINUOUS_BACKBONE_COLUMNS",
-    "ContinuousBackboneResult",
-    "OneWay",
-    "continuous_backbones_of",
-    "measure_continuous_backbone",
-    "recorded_continuous_backbones",
-    "recorded_mean_backbone",
-]
-
 CONTINUOUS_BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),

@@ -14,8 +14,6 @@ from rig.campaigns.evaluation.recorded_flow import AT_VOLTAGE_LIMIT, flagged
 from rig.campaigns.evaluation.vibrations import WHY
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 
-__all__ = ["WAYS", "Way", "both_ways", "rows_near", "turning_point"]
-
 WAYS = ("up", "down")
 FEWEST_INSTANTS = 16
 PIECE_PERIODS = FEWEST_PERIODS + 6.0

@@ -14,8 +14,6 @@ from rig.recording.reader import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw"]
-
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw modal frequency and damping of settled points and decays, and the history of the control loop."""

@@ -12,8 +12,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 
-__all__ = ["DecayPlan"]
-
 
 class DecayPlan(SettledPlan):
     """Decays from a series of levels, each beside the settled point that it begins at.

@@ -37,8 +37,6 @@ from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.recording.reader import Recording
 
-__all__ = ["DECAY", "DECAY_COLUMNS", "DecayResult", "measure_decay", "recorded_decays", "recorded_settled"]
-
 _RESIDUAL_ERROR = 0.01  # of the other modes' receptance, by rig tune; twice what it is on the shipped rigs
 _EARLY = 8  # instants of a decay from which its frequency is taken
 _BEFORE_PERIODS = 15.0  # of the settled record that the slow flow takes in, so that its ends are away from the decay

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw"]
-
 LEAST_SPAN = 1e-3
 """Smallest part of a value that its axis spans: less would show the scatter of the means as if it were a change."""
 NEAR = 0.2  # part of a limit from which on the limit is drawn: a distant limit would flatten the curve

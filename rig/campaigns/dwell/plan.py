@@ -14,8 +14,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 
-__all__ = ["DriftLimits", "DwellPlan"]
-
 FEWEST_PERIODS = 10
 """Fewest periods of a mean from which frequency and damping can be identified."""
 

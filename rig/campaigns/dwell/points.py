@@ -23,19 +23,6 @@ from rig.campaigns.planning.plan import Column, Target
 from rig.recording.reader import Recording
 from rig.text.contents import Contents
 
-__all__ = [
-    "DWELL",
-    "DWELL_COLUMNS",
-    "Changes",
-    "DwellCourse",
-    "DwellResult",
-    "HeldLevel",
-    "Length",
-    "measure_mean",
-    "recorded_course",
-    "watch_drift",
-]
-
 DWELL_COLUMNS = (
     Column("cycles", "cycles", "", ".0f"),
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),

@@ -21,19 +21,6 @@ from rig.campaigns.evaluation.vibrations import frequency_scatter
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target
 
-__all__ = [
-    "drift_objection",
-    "first_of",
-    "hunting_objection",
-    "level_error",
-    "level_objection",
-    "nonharmonic_objection",
-    "phase_objection",
-    "settled_point",
-    "std_objection",
-    "with_settling",
-]
-
 MOTIONS = ("drive", "response")
 FEW_OUTPUT_BITS = 250.0  # amplitude: above, rounding amplified by 40 off resonance stays below 7 % of the force's RMS
 FAILING = 0.25  # of the largest motion: sensor noise drifts far less, a sensor that dies within a record more

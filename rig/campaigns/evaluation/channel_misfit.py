@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-__all__ = ["CHANGED", "REFUSED", "REFUSED_DEG", "WARNED", "WARNED_DEG", "Misfit", "Seen", "misfit_sentence"]
-
 WARNED = 2.0  # a nonlinear mode's shape changes by some per cent
 CHANGED = 1.5  # the same against what was measured before in the same run
 REFUSED = 4.0

@@ -11,8 +11,6 @@ from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.planning.plant import KnownPlant
 
-__all__ = ["motions_of", "ratios_of", "resistance_of", "rms_ratios_of", "shapes_of", "softened", "spread_of"]
-
 DETUNED = 20.0  # growth of the allowance per relative deviation of the squared frequency
 
 

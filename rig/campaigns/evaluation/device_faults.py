@@ -6,8 +6,6 @@ import numpy as np
 
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_LOST
 
-__all__ = ["DISTURBED", "LOST", "DeviceFaults", "pages_on", "why_disturbed"]
-
 DISTURBED = "the settle rule was broken while recording"
 TOO_LATE, LOST = "outputs came too late", "samples were lost on their way"
 REMEDY = "`rig doctor --daq` recommends a queue and block that are long enough"

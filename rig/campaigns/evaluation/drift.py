@@ -5,8 +5,6 @@ from typing import Any, TypeVar
 
 from rig.campaigns.evaluation.point import Point
 
-__all__ = ["drift_of", "of_the_result"]
-
 Result = TypeVar("Result")
 
 

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["describe", "draw_failure", "draw_history", "heading", "refused", "why_none"]
-
 AT_ONCE = 2**20  # rows that are read at a time
 _THIN = 0.7  # of the usual width: lines over time
 

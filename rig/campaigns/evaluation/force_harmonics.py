@@ -9,8 +9,6 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.planning.plan import Plan, Target
 
-__all__ = ["with_force_harmonics"]
-
 NEGLIGIBLE_BITS = 0.1  # of the converter: an error that always counts as none
 SIGMAS = 3.0
 

@@ -12,8 +12,6 @@ from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
 
-__all__ = ["frequency_responses_of", "passes_of", "recorded_frequency_responses"]
-
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
 """The controlled quantity, by the unit of the levels."""
 

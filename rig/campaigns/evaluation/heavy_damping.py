@@ -12,8 +12,6 @@ from typing import Any
 
 from rig.campaigns.evaluation.point import Point
 
-__all__ = ["TRUSTED", "with_heavy_damping"]
-
 TRUSTED = 0.1
 """Damping ratio up to which the shift is below 2 % of the share of the other modes: 0.1 % where that is a twentieth."""
 

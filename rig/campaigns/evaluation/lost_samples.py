@@ -8,8 +8,6 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.rows import Rows, std_of, stretches
 from rig.tick.layout import SAMPLE_LOST
 
-__all__ = ["bridged", "lost_objection", "lost_rows", "lost_warnings", "rms_of", "rms_of_force", "too_many_lost"]
-
 LARGEST_LOST = 0.05  # of a record's samples
 LARGEST_LOST_WITHIN = (
     0.02  # of the window of an instant: a gap is filled from the periods beside it, which are in the window

@@ -7,8 +7,6 @@ from rig.tick.safety.layout import GuardMode
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 from rig.tick.tick import Tick
 
-__all__ = ["Passage", "Round", "round_at"]
-
 
 class Passage(NamedTuple):
     """One segment of a round, located in the rows of the points that are measured together."""

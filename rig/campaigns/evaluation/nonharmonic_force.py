@@ -12,8 +12,6 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.rows import Rows
 
-__all__ = ["FEWEST_PERIODS", "nonharmonic_force"]
-
 FEWEST_PERIODS = 14  # with fewer periods, lines between two harmonics cannot be separated from the harmonics
 LONGEST = 2**18  # samples whose spectrum is computed at once: with more, memory would grow with the record
 MAIN_LOBE = 4.4  # half width of a line, in bins, with some room

@@ -10,8 +10,6 @@ from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.rows import Rows, stretches
 
-__all__ = ["came_and_went", "was_refused_in_passing"]
-
 STANDS_OUT = (
     4.0  # times the usual change from period to period; noise in a whole period, or a lasting beat, stays below 2
 )

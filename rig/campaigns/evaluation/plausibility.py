@@ -49,8 +49,6 @@ from rig.campaigns.evaluation.point import Point, Quality, vibration_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 
-__all__ = ["REFUSED", "WARNED", "start_refusal", "with_plausibility", "with_plausible_ways"]
-
 REVERSED_DEG = 135.0
 SWAPPED = 0.1  # deviation of sizes, as a logarithm, from which it is asked whether two channels are swapped
 SWAPPED_FITS = 0.3  # of that deviation; two channels are called swapped if exchanging them leaves less

@@ -15,26 +15,6 @@ from numpy.typing import NDArray
 from rig.campaigns.planning.plan import Plan, Target
 from rig.errors import RecordingError
 
-__all__ = [
-    "ARRAY",
-    "PAIRS",
-    "PART",
-    "Attempt",
-    "Lock",
-    "Modal",
-    "Point",
-    "Purity",
-    "Quality",
-    "RowRange",
-    "Spectrum",
-    "Vibration",
-    "planned_point",
-    "point_name",
-    "result_of",
-    "spectrum_of",
-    "vibration_of",
-]
-
 PART = {"stored": "part"}
 """Metadata of a field that is a dataclass whose fields are stored among the keys of the point."""
 PAIRS = {"stored": "pairs"}

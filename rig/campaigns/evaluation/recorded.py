@@ -15,8 +15,6 @@ from rig.campaigns.planning.plant import PlantFacts
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 
-__all__ = ["accepted_points", "bench_of_recording", "point_rows", "points_of", "recorded_drive_shape", "specimen_of"]
-
 Result = TypeVar("Result")
 
 

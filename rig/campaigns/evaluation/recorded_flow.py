@@ -10,8 +10,6 @@ from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plant import PlantFacts
 from rig.tick.layout import FREQUENCY_CLAMPED, SATURATED, SENSOR_AT_RANGE
 
-__all__ = ["AT_VOLTAGE_LIMIT", "SAMPLES_LOST", "flagged", "recorded_flow"]
-
 AT_VOLTAGE_LIMIT = "the output stood at its voltage limit"
 SAMPLES_LOST = "samples were lost on their way"
 

@@ -12,8 +12,6 @@ import numpy as np
 
 from identification.signals.chunks import spans, unwrapped
 
-__all__ = ["LongRows", "Rows", "Spool", "mean_of", "phases", "std_of", "stretches", "turned_rad"]
-
 _TURN = 2.0 * math.pi
 
 

@@ -19,8 +19,6 @@ from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 
-__all__ = ["REFUSED", "WARNED", "ScaleMisfit", "scale_misfit"]
-
 WARNED = 1.5
 REFUSED = 3.0
 MORE_DAMPING = 2.0  # growth of the damping from a check to a first level that is not refused

@@ -5,8 +5,6 @@ from typing import Any
 
 from rig.campaigns.evaluation.point import Point
 
-__all__ = ["what_was_measured_again", "what_was_skipped"]
-
 
 def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
     """Return the missing points by quality: ``3 of 13 points skipped: not-settled (0.1 N), unreachable (2 N)``.

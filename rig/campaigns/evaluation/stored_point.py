@@ -16,8 +16,6 @@ from rig.campaigns.evaluation.point import ARRAY, PAIRS, PART, Point, Quality
 from rig.errors import RecordingError
 from rig.text.printable import shown
 
-__all__ = ["as_complex", "as_pairs", "names_of", "point_from", "stored", "value_of"]
-
 Result = TypeVar("Result")
 
 

@@ -6,8 +6,6 @@ import numpy as np
 
 from rig.recording.parts import Part
 
-__all__ = ["StoredSamples"]
-
 
 class _Change(NamedTuple):
     """From ``row`` on, rows are the samples from ``sample`` on whose number is a multiple of ``stride``."""

@@ -11,15 +11,6 @@ from rig.campaigns.evaluation.rows import Rows, mean_of, std_of, stretches
 from rig.campaigns.evaluation.vibrations import quantisation_warnings
 from rig.campaigns.planning.plan import Column
 
-__all__ = [
-    "PURITY_COLUMNS",
-    "lag_scatter_deg",
-    "mean_voltage_v",
-    "purity",
-    "quality_warnings",
-    "vibration_part",
-]
-
 PURITY_COLUMNS = (
     Column("force_purity", "force purity", "%", ".2f", 100.0),
     Column("response_purity", "response purity", "%", ".2f", 100.0, in_line=False),

@@ -20,23 +20,6 @@ from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD, LARGEST_LOST
 
-__all__ = [
-    "VOLTAGE",
-    "channel_factors",
-    "channels_from",
-    "channels_of",
-    "failed_point",
-    "frequency_scatter",
-    "measured_with",
-    "modal_part",
-    "not_evaluated",
-    "quantisation_warnings",
-    "recorded_vibration",
-    "skew_turn",
-    "vibration_from",
-    "within_periods",
-]
-
 VOLTAGE = Channel("voltage", "monitor", "V")
 """The output measured at the converter, as a channel beside the inputs."""
 

@@ -10,15 +10,12 @@ from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.campaigns.multisine.points import recorded_spectra
 from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, rc, say_why_empty, unit_text
-from rig.drawing.style import title as heading
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, rc, say_why_empty, title as heading, unit_text
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["draw", "draw_multisine"]
 
 _DOT = 0.7
 """Size of the dots of a spectrum, over the usual size of markers."""

@@ -12,8 +12,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
 
-__all__ = ["MultisinePlan"]
-
 LARGEST_WAVEFORMS = 100_000_000  # samples of all realisations, which are held in memory
 
 

@@ -13,7 +13,7 @@ from identification import (
     best_linear_approximation,
     periodic_spectra,
 )
-from identification.multisine.best_linear_approximation import Estimator
+from identification.multisine.estimators import Estimator
 from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.campaign import Campaign
@@ -25,17 +25,6 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Column, Target
 from rig.daq import Channel
 from rig.recording.reader import Recording
-
-__all__ = [
-    "MULTISINE",
-    "MULTISINE_COLUMNS",
-    "MultisineResult",
-    "measure_multisine_point",
-    "recorded_response_matrices",
-    "recorded_spectra",
-    "spectra_of",
-    "turned_periods",
-]
 
 MULTISINE_COLUMNS = (
     Column("realisation", "realisation", "", ".0f", counts_from=1),

@@ -12,8 +12,6 @@ from identification import Backbone, PeriodicVibration
 from rig.bench import Bench
 from rig.campaigns.planning.plant import PlantFacts
 
-__all__ = ["DriveShape", "drive_shape"]
-
 WORTH_SAYING = 0.03  # relative difference between bench and plan; the damping's is twice as large
 
 

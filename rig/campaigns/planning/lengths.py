@@ -8,8 +8,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment
 
-__all__ = ["LONGEST_DAYS", "MOST_ROWS", "check_length"]
-
 LONGEST_DAYS = 100.0
 """Longest duration of a whole plan if every point takes the longest time allowed for settling."""
 MOST_ROWS = 100_000_000

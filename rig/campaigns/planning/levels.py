@@ -14,8 +14,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
 
-__all__ = ["LEVELS", "ONE_LEVEL_KEY", "Levels", "exactly_one"]
-
 START_RAMP_PERIODS = 10.0
 """Slow enough that an exciter of another gain than the known plant's is noticed at a small force."""
 

@@ -8,8 +8,6 @@ from rig.bench import Bench
 from rig.campaigns.planning.levels import Levels
 from rig.errors import ConfigurationError
 
-__all__ = ["MORE_DAMPING", "check_motion", "check_voltage", "lags_text", "motion_for", "voltage_for"]
-
 MORE_DAMPING = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0)  # times the known damping: that of a joint rises with the level
 
 

@@ -12,8 +12,6 @@ from rig.campaigns.planning.plant import KnownPlant
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import SettleRule
 
-__all__ = ["LockedPlan", "SettledPlan"]
-
 
 class LockedPlan(KnownPlant, Plan):
     """Base of the plans whose frequency is controlled to hold a phase lag."""

@@ -15,8 +15,6 @@ from rig.campaigns.planning.levels import Levels
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz
 
-__all__ = ["MOST_POINTS", "Column", "OpenLoopPlan", "Plan", "Target", "TonePlan", "with_first_repeated"]
-
 MOST_POINTS = 10_000
 """Most points of a plan, including repeats and both directions: at ten seconds a point, more than a day. See also
 `rig.campaigns.planning.lengths`."""

@@ -23,8 +23,6 @@ from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.levels_on_plant import MORE_DAMPING, check_motion, check_voltage, lags_text
 from rig.errors import ConfigurationError
 
-__all__ = ["KnownPlant", "PlantFacts"]
-
 DELAY_RESERVE = 1.5  # of the delay at which the gains must still be stable
 DELAY_STEP = 1.25  # between delays that are tried
 BISECTIONS = 5  # of the last step: to a percent

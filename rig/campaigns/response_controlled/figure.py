@@ -11,8 +11,6 @@ from rig.recording.reader import Recording
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw"]
-
 
 def draw(page: "Figure", recording: Recording) -> None:
     """Draw all levels, and the force surface through them if there are enough levels."""

@@ -14,8 +14,6 @@ from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 
-__all__ = ["ResponseControlledPlan"]
-
 LEAST_SINE_LAG_DEG = 5.0
 
 

@@ -16,13 +16,6 @@ from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibratio
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.response_controlled.plan import ResponseControlledPlan
 
-__all__ = [
-    "RESPONSE_CONTROLLED",
-    "RESPONSE_CONTROLLED_COLUMNS",
-    "ResponseControlledResult",
-    "measure_response_controlled_point",
-]
-
 RESPONSE_CONTROLLED_COLUMNS = (
     Column("asked_phase_lag_deg", "lag asked for", "deg", ".0f"),
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),

@@ -12,8 +12,6 @@ from rig.campaigns.running.stored_rows import StoredRows
 from rig.tick.sequencer.layout import RING, Drive, Outcome
 from rig.tick.tick import Tick
 
-__all__ = ["RefusedRecord", "RefusedRecords", "after_attempts", "attempt_at"]
-
 
 class RefusedRecord(NamedTuple):
     """A record that was refused by the sequencer and is measured again."""

@@ -21,8 +21,6 @@ from rig.campaigns.plans import bench_of, plan_from
 from rig.errors import ConfigurationError
 from rig.recording.reader import Recording
 
-__all__ = ["Continuation", "changed_keys", "identities", "numbered", "what_is_left"]
-
 Identity = tuple[object, ...]
 
 

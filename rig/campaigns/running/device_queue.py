@@ -9,8 +9,6 @@ from rig.campaigns.planning.plan import Plan
 from rig.loop.session import Session
 from rig.loop.worker.queue_choice import QueueChoice, usual_delay_s
 
-__all__ = ["armed_with_queue", "settled_queue", "with_queue"]
-
 
 def armed_with_queue(
     plan: Plan, bench: Bench, session: Session, options: RunOptions

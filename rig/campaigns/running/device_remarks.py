@@ -15,8 +15,6 @@ from rig.text.disorder import disorder_text, is_late
 from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD
 
-__all__ = ["with_device_remarks", "with_disorder"]
-
 
 def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) -> Point[Any]:
     """Add to a point its samples that were lost or continued, and a warning for each other flag raised while it was recorded.

@@ -7,8 +7,6 @@ from typing import Any
 
 from rig.campaigns.evaluation.point import Point
 
-__all__ = ["EvaluationThread"]
-
 Points = list[Point[Any]]
 
 

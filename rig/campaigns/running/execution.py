@@ -44,8 +44,6 @@ from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 from vibrolock.one_thread import one_thread
 
-__all__ = ["Execution", "Journal", "nothing_left"]
-
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
 UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED, Outcome.NOT_SETTLED}

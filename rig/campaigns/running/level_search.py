@@ -17,8 +17,6 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.runner import carry_out, take_up
 from rig.recording.reader import Recording
 
-__all__ = ["LARGEST_RISE", "LevelSearch", "Levels", "MultisineSeries", "Seen", "share_of_limits"]
-
 FIRST = 1e-3  # of the largest voltage, RMS
 LARGEST_RISE = 4.0
 

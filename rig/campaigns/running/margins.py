@@ -10,8 +10,6 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.tick.safety.layout import EndReason
 
-__all__ = ["Margin", "margin_before"]
-
 LIMITS = {
     EndReason.FORCE_LIMIT: "force_n",
     EndReason.RESPONSE_LIMIT: "acceleration_m_s2",

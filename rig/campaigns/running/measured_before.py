@@ -7,8 +7,6 @@ from typing import Any
 from rig.campaigns.evaluation.point import Attempt, Point
 from rig.campaigns.running.attempts import attempt_at
 
-__all__ = ["MeasuredBefore", "before_another"]
-
 
 @dataclass(frozen=True)
 class MeasuredBefore:

@@ -10,8 +10,6 @@ from rig.recording.journal import check_journal, journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.system.locking import exclusive
 
-__all__ = ["forget_before", "make_way", "put_back", "set_aside"]
-
 
 def make_way(output: Path, overwrite: bool) -> None:
     """Refuse an output that cannot or must not be written: a missing folder, a name of a folder, an existing file."""

@@ -8,8 +8,6 @@ import numpy as np
 from rig.campaigns.evaluation.rows import LongRows, Rows, Spool
 from rig.errors import RecordingError
 
-__all__ = ["IN_MEMORY_BYTES", "RowBuffer"]
-
 IN_MEMORY_BYTES = 32 * 2**20
 
 

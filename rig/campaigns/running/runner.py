@@ -44,8 +44,6 @@ from rig.tick.safety.limits import describe_end
 from rig.tick.sequencer.segments import Segment
 from rig.tick.tick import TickSettings
 
-__all__ = ["carry_out", "take_up", "tick_settings"]
-
 
 @ended_in_order()
 def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None = None) -> Recording:

@@ -12,8 +12,6 @@ from rig.campaigns.running.start_judgement import PERIODS, StartJudgement
 from rig.loop.loop import RunningLoop
 from rig.tick.sequencer.layout import SegmentKind
 
-__all__ = ["Start"]
-
 UNDECIDED = (
     "the vibration at the start voltage was not steady enough to compare its scale with the last check; the first point is "
     "compared instead"

@@ -16,8 +16,6 @@ from rig.campaigns.evaluation.vibrations import recorded_vibration
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan, Target
 
-__all__ = ["PERIODS", "StartJudgement"]
-
 PERIODS = 10
 """Periods at the start voltage that are judged."""
 HARMONICS = 3

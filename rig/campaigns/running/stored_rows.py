@@ -7,8 +7,6 @@ import numpy as np
 
 from rig.campaigns.planning.plan import Plan
 
-__all__ = ["StoredRows"]
-
 
 class StoredRows:
     """Selects rows on their way to the journal.

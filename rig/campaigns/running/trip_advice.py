@@ -11,8 +11,6 @@ from rig.campaigns.running.margins import LIMITS, margin_before
 from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
 
-__all__ = ["Advice", "Before", "Trip", "advice_on"]
-
 CLEAR = 0.7  # of a limit: a level expected to reach this share, in proportion to an earlier level, is too high
 ROOM = 0.9  # of a limit: share that the proposed level should reach, in proportion
 AT_AN_END = 0.01  # of a frequency window's width

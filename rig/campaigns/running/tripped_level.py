@@ -14,8 +14,6 @@ from rig.recording.reader import Recording
 from rig.tick.sequencer.layout import Outcome
 from rig.tick.tick import Tick
 
-__all__ = ["TrippedAt", "refuse_tripped", "tripped_at"]
-
 NEVER_BEGUN = {Outcome.PENDING, Outcome.SKIPPED}
 ALMOST = 1.0 - 1e-9  # levels that differ only by rounding count as equal
 

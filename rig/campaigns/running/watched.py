@@ -10,8 +10,6 @@ from rig.bench import Bench
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 
-__all__ = ["watched_facts"]
-
 
 def watched_facts(plan: Plan, bench: Bench, recording: Path, about: Mapping[str, Any], **more: Any) -> dict[str, Any]:
     """Return what does not change while a plan is carried out on a bench, as plain data.

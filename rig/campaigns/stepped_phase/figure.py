@@ -14,15 +14,12 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.axes import from_zero
 from rig.drawing.folding import folds_back
 from rig.drawing.page import NARROW_IN, grid, legend_below
-from rig.drawing.style import REJECTED, rc, shade
-from rig.drawing.style import title as heading
+from rig.drawing.style import REJECTED, rc, shade, title as heading
 from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["asked_lags", "draw", "draw_stepped_phase", "gaps"]
 
 _THIN = 0.7
 NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant

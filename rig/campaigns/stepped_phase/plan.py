@@ -13,8 +13,6 @@ from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 
-__all__ = ["SteppedPhasePlan"]
-
 LAGS_DEG = (-175.0, -5.0)  # between these lags the force feeds the vibration, and the lag determines the frequency
 
 

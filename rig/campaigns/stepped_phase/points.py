@@ -18,8 +18,6 @@ from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 
-__all__ = ["STEPPED_PHASE", "STEPPED_PHASE_COLUMNS", "SteppedPhaseResult", "measure_stepped_phase_point"]
-
 STEPPED_PHASE_COLUMNS = (
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
     Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),

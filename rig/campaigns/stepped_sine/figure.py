@@ -11,17 +11,14 @@ from rig.campaigns.evaluation.figure import describe
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import REJECTED, shade
-from rig.drawing.style import title as heading
+from rig.drawing.style import REJECTED, shade, title as heading
 from rig.recording.reader import Recording
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_stepped_sine", "jumps"]
-
-Float = NDArray[np.float64]
 
 _JUMP = 1.5  # times the amplitude of the previous point
 

@@ -13,8 +13,6 @@ from rig.campaigns.planning.plan import Target, TonePlan
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
 
-__all__ = ["SteppedSinePlan"]
-
 
 class SteppedSinePlan(TonePlan):
     """Vibrations at given frequencies and levels. With a single frequency this is a sine test.

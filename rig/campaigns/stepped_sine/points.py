@@ -24,8 +24,6 @@ from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibratio
 from rig.campaigns.planning.plan import Column, Target
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 
-__all__ = ["STEPPED_SINE", "STEPPED_SINE_COLUMNS", "SteppedSineResult", "measure_stepped_sine_point"]
-
 TRUSTED_NONHARMONIC_FORCE = (
     0.1  # in open loop a larger value causes a warning; plans under a phase lock reject the point
 )

@@ -13,17 +13,14 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.sweep.points import SweepResult, recorded_sweeps
 from rig.drawing.page import columns_for, grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, unit_text
-from rig.drawing.style import title as heading
+from rig.drawing.style import MAIN, REJECTED, SECOND, TRACE_BINS, title as heading, unit_text
 from rig.recording.reader import Recording
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw", "draw_sweep"]
-
-Float = NDArray[np.float64]
 
 _TELLS = 0.98
 """Share of the zero crossings that must lie on the frequency axis for them to be drawn."""

@@ -12,8 +12,6 @@ from rig.campaigns.planning.plan import Target, TonePlan
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
 
-__all__ = ["SweepPlan"]
-
 FEWEST_PERIODS = 10  # the fundamental is a mean over two periods; fewer than ten show no variation of it
 LONGEST_S = 86400.0
 

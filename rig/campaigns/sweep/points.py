@@ -17,8 +17,6 @@ from rig.campaigns.sweep.plan import SweepPlan
 from rig.recording.reader import Recording
 from rig.tick.layout import SATURATED
 
-__all__ = ["SWEEP", "SWEEP_COLUMNS", "HeldCourse", "SweepResult", "measure_sweep", "recorded_sweeps", "transient_of"]
-
 NOT_HELD = 0.05  # of its level: a larger deviation is reported
 USUAL = 0.75  # of a sweep: the part over which the level has to be held
 

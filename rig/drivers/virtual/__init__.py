@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
-    from rig.drivers.virtual.driver import VirtualDAQ
+    from rig.drivers.virtual.driver import VirtualDAQ as VirtualDAQ
 else:
-    __getattr__, __dir__ = on_use(__name__, {"VirtualDAQ": "driver"})  # `rig list` reads the parts alone
-
-__all__ = ["VirtualDAQ"]
+    __getattr__, __dir__, __all__ = on_use(__name__)  # `rig list` reads the parts alone

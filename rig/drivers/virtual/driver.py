@@ -21,8 +21,6 @@ from simulators.virtual_rig import VirtualRig
 from vibrolock.compiled import bound
 from vibrolock.one_thread import one_thread
 
-__all__ = ["VirtualDAQ"]
-
 FACT_TOLERANCE = 1e-3
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 COUNTED = (*(str(flag.name).lower() for flag in Flag), *FAULT_FLAGS, "lost_samples")

@@ -18,17 +18,6 @@ from simulators.sensing.noise.kernels import mix, unit
 from vibrolock.compiled import kernel
 from vibrolock.described import Described
 
-__all__ = [
-    "FAULT_FLAGS",
-    "LONGEST_PERIOD",
-    "FaultArrays",
-    "Outputs",
-    "PassingFaults",
-    "convert",
-    "held_outputs",
-    "is_hit",
-]
-
 OUTPUT_HELD = 1 << len(Flag)
 """Bit of the device's flags behind those of the rig, as wired devices have it."""
 OUTPUT_CONTINUED = OUTPUT_HELD << 1

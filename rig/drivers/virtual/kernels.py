@@ -15,8 +15,6 @@ from simulators.kernels import sample
 from simulators.layout import RigArrays, RigState
 from vibrolock.compiled import kernel
 
-__all__ = ["Converters", "Loopback", "exchange_block", "fused", "loopback_of"]
-
 
 class Loopback(NamedTuple):
     """Channels that read the output: the last columns of a row."""

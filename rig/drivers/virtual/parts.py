@@ -8,8 +8,6 @@ from rig.errors import ConfigurationError
 from rig.text.units import unit_of
 from simulators.virtual_rig import VirtualRig
 
-__all__ = ["part_keys", "parts", "specimens"]
-
 Schema = dict[str, Any]
 
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}

@@ -13,8 +13,6 @@ from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeou
 from rig.wire.link import Link
 from rig.wire.messages import LOWEST_VERSION, VERSION, Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
-__all__ = ["Connection", "RoundTrips"]
-
 KEPT = 4096
 
 

@@ -19,8 +19,6 @@ from rig.wire.messages import (
 )
 from rig.wire.parameter_words import NAME_WORDS, as_float, as_text
 
-__all__ = ["ANSWER_S", "STOPPED", "Dialogue", "latched_text", "stopped", "why_not"]
-
 STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
 
 

@@ -18,8 +18,6 @@ from rig.text.disorder import LATE_BLOCKS, REORDERED_BLOCKS, disorder_text
 from rig.wire.link import Link
 from rig.wire.messages import EmergencyStop, Stream
 
-__all__ = ["WireDAQ"]
-
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # of which the load of the wire is told
 LARGEST_UNKNOWN_BLOCK = 65536  # before the device has been asked

@@ -10,8 +10,6 @@ from rig.errors import DaqMismatch, DaqProtocol
 from rig.wire.messages import LOWEST_VERSION, VERSION, Command, Parameter
 from rig.wire.parameter_words import as_double
 
-__all__ = ["DeviceFacts", "compare", "negotiate", "read_facts", "remarks_on"]
-
 FLOAT_TOLERANCE = 1e-6  # float32 on the wire
 MOST_CHANNELS = 31  # items of a text parameter are numbered by one byte
 SAME_RESOLUTION = 0.01

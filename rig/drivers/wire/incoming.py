@@ -9,8 +9,6 @@ from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqEmergencyStop, DaqProtocol, DaqReset, DaqTimeout, DaqWatchdog
 from rig.wire.messages import LOWEST_VERSION, Answer, DeviceFlag, DeviceState, Heartbeat, Message, Readback, Samples
 
-__all__ = ["Incoming"]
-
 OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must have started to count anew
 UNARMED_BEATS = 2  # the first may have been sent before the device was armed
 UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}

@@ -9,8 +9,6 @@ from rig.bench.configuration import Configured
 from rig.drivers.wire.facts import DeviceFacts
 from rig.errors import DaqRefused
 
-__all__ = ["LARGEST_QUEUE", "WireOptions", "raised_remark", "watchdog_range_s", "watchdog_s"]
-
 LARGEST_QUEUE = 64
 MOST_S = 4000.0  # microseconds in an unsigned word of four bytes
 

@@ -15,8 +15,6 @@ from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions, watchdog_s
 from rig.wire.messages import ARM_KEY, LOWEST_VERSION, Answer, Command, DeviceFlag, Output, Parameter, Stream
 
-__all__ = ["FLAG_NAMES", "Scaling", "Streaming"]
-
 
 class Scaling:
     """Converts volts to a device's counts and back, for blocks of one size."""

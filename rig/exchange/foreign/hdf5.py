@@ -11,8 +11,6 @@ import numpy as np
 
 from rig.exchange.child_values import TooMuchData, most_bytes
 
-__all__ = ["DEEPEST", "Budget", "plain_dataset", "read_hdf5"]
-
 DEEPEST = 32
 _MOST_ITEMS = 100_000
 _TEXT_BYTES = 100

@@ -11,8 +11,6 @@ import numpy as np
 
 from rig.exchange.foreign.hdf5 import DEEPEST, Budget
 
-__all__ = ["read_matlab_hdf5"]
-
 
 def read_matlab_hdf5(path: Path) -> dict[str, Any]:
     """Return the variables of a file; raise OSError, ValueError or errors of h5py if it cannot be read."""

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["read_mdf4"]
-
 _FORMULA = 3
 _EVEN = 1e-3
 

@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["read_tdms"]
-
 
 def read_tdms(path: Path) -> dict[str, Any]:
     """Return the channels with numbers by ``group/channel``, and by the same names their rates, beginnings and units.

@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["read_wav"]
-
 
 def read_wav(path: Path) -> dict[str, Any]:
     """Return ``channel1``, ``channel2``, ... as float[n], 1 at full scale, and the sample rate.

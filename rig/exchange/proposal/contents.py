@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.mapping.units import si_of
 
-__all__ = ["FileContents", "Leaf", "contents_of"]
-
 _TOLD = ("sample_rate_hz", "__rates_hz__", "__starts_s__", "units", "__file_units__")
 """Keys by which readers tell of the data; they are no data."""
 _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]+)[\])]$")

@@ -10,8 +10,6 @@ from identification.mapping.csv_layout import CsvLayout
 from identification.mapping.units import UNITS
 from rig.exchange.csv import table_lines
 
-__all__ = ["guessed_layout"]
-
 _LOOKED_AT = 100
 _ALIKE = 3
 Separator = Literal[",", ";", "\t", " "]

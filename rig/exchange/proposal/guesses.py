@@ -13,10 +13,7 @@ from numpy.typing import NDArray
 
 from identification import IdentificationError
 from identification.mapping.units import si_of
-
-__all__ = ["band_of", "dimensions", "is_time", "period_of", "rate_in", "role_of", "transient_periods"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _RATES = re.compile(
     r"(f_?s|sr|sample_?rate(_?hz)?|sampling_?(rate|freq(uency)?)|rate(_hz)?|freq_?s(ample)?)$", re.IGNORECASE

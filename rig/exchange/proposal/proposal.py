@@ -15,8 +15,6 @@ from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_o
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
 
-__all__ = ["proposed", "proposed_mapping"]
-
 _FEWEST_SAMPLES = 16
 _MOST_CHANNELS = 16
 

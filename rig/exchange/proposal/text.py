@@ -11,8 +11,6 @@ from identification.mapping.csv_layout import CsvLayout
 from identification.mapping.units import UNITS, si_of
 from rig.exchange.proposal.contents import FileContents, Leaf
 
-__all__ = ["Proposal", "ProposedChannel", "text_of"]
-
 _MOST_LISTED = 60
 _UNITS = tuple(unit for unit in UNITS if "^" not in unit)
 _MEAN = 0.02

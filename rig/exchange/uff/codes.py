@@ -7,17 +7,6 @@ import numpy as np
 
 from identification import Channel
 
-__all__ = [
-    "DATA_TYPE",
-    "WIDTH",
-    "Degree",
-    "axis",
-    "channel_lines",
-    "channels_in",
-    "degrees_of_freedom",
-    "evenly",
-]
-
 DATA_TYPE = {"m": 8, "m/s": 11, "m/s2": 12, "m/s^2": 12, "N": 13, "s": 17, "Hz": 18}
 """Specific data type of a quantity, by its SI unit; 0 means unknown."""
 

@@ -11,8 +11,6 @@ from rig.exchange.uff.codes import channels_in
 from rig.exchange.uff.reading import Dataset
 from rig.exchange.uff.units import file_units
 
-__all__ = ["modes_in"]
-
 
 def modes_in(datasets: Sequence[Dataset], assumed: str = "", drive: str = "") -> LinearModes:
     """Return the normal modes (dataset 55, analysis type 2), mass-normalised by their modal mass.

@@ -12,8 +12,6 @@ from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.uff.units import file_units
 from rig.system.text_files import read_bytes
 
-__all__ = ["Dataset", "datasets_in", "degree_of", "read_uff", "time_data_in"]
-
 Dataset = Mapping[str, Any]
 LARGEST_BYTES = 2_000_000_000
 _KNOWN = (55, 58, 151, 164)

@@ -11,8 +11,6 @@ from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.reading import Dataset, degree_of
 from rig.exchange.uff.units import FileUnits, file_units
 
-__all__ = ["responses_in"]
-
 
 def _names(dataset: Dataset) -> tuple[str, str]:
     """Return the names of response and reference as written by this package, otherwise node and direction."""

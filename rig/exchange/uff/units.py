@@ -6,8 +6,6 @@ from typing import Any
 from identification.mapping.units import si_of
 from rig.exchange.child_reading import ImportFailed
 
-__all__ = ["FileUnits", "file_units"]
-
 _TOLERANCE = 1e-3
 _LENGTH = {8: "m", 11: "m/s", 12: "m/s2"}
 _FORCE = (9, 13)

@@ -18,8 +18,6 @@ from rig.errors import RecordingError
 from rig.exchange.uff.codes import WIDTH, axis, channel_lines, degrees_of_freedom, evenly
 from rig.text.contents import Contents
 
-__all__ = ["write_uff"]
-
 _TIME_RESPONSE, _GENERAL, _RESPONSE_FUNCTION = 1, 0, 4
 _PROGRAM = "vibrolock"
 _MATRIX = "frequency-response-matrix"

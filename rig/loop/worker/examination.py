@@ -13,8 +13,6 @@ from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, com
 from rig.loop.worker.probe import round_trips, timing_of
 from rig.loop.worker.queue_choice import covering_queue
 
-__all__ = ["bench_lines", "examine_device", "with_settings"]
-
 LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
 MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0
 TRIES = 3  # of settings, each with twice the queue or a longer block

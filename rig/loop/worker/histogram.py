@@ -2,8 +2,6 @@
 
 import math
 
-__all__ = ["WORDS", "Histogram"]
-
 PER_OCTAVE = 16
 OCTAVES = 24  # 1 us to 16.8 s
 BINS = PER_OCTAVE * OCTAVES + 2  # one bin below the range, one above

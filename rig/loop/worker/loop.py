@@ -19,8 +19,6 @@ from rig.tick.safety.layout import GuardMode
 from rig.tick.tick import Tick
 from vibrolock.compiled import bound
 
-__all__ = ["CHUNK_DONE", "LONGEST_STALL_S", "WallClockLoop", "suspended_s"]
-
 CHUNK_DONE = b"."
 """Message to the campaign with every chunk."""
 NOTICE = struct.pack("!i", len(CHUNK_DONE)) + CHUNK_DONE  # format of `Connection.send_bytes`

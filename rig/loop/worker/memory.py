@@ -18,8 +18,6 @@ from rig.bench import Bench
 from rig.loop.worker.histogram import WORDS, Histogram
 from rig.tick.layout import ROW, TickArrays
 
-__all__ = ["TIMES", "Layout", "SharedMemory", "Slot", "anonymous_file", "packed"]
-
 CHUNK_S = 0.02
 ALIGNMENT = 64
 STOP, TAKEN, PUBLISHED, RELEASE_START, START_JUDGED = range(5)

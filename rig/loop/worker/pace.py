@@ -7,8 +7,6 @@ from typing import Protocol
 
 from rig.daq import DAQ
 
-__all__ = ["DevicePace", "HostPace", "Lockstep", "Pace", "pace_of", "pacing_of"]
-
 DRIFT = 2e-4  # the clocks of host and device differ by less
 WINDOW_S = 0.2  # if no block is on time for so long, the device's clock counts as stopped for a while
 WINDOW_BLOCKS = 20

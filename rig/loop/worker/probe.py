@@ -17,8 +17,6 @@ from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
 
-__all__ = ["measured_timing", "probe", "round_trips", "smallest_steps_v", "timing_of"]
-
 SETTLE_BLOCKS = 10
 ROUNDING = 1e-9  # of the largest reading: a smaller difference is none
 KEPT_ROWS = 20_000  # of readings, for the smallest step between two

@@ -24,8 +24,6 @@ from rig.system.privileges import ordinary_scheduling, prepare
 from rig.tick.kernels import tick_block
 from rig.tick.tick import TickSettings
 
-__all__ = ["main"]
-
 SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
 
 

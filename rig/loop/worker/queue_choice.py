@@ -17,16 +17,6 @@ from rig.daq import DAQ, Adjustable
 from rig.loop.recommendation import RESERVE, Timing, milliseconds, queue_reason, shortest_queue
 from rig.loop.worker.probe import measured_timing
 
-__all__ = [
-    "LONGEST_S",
-    "MEASURED_S",
-    "QueueChoice",
-    "covering_queue",
-    "presumed_latency",
-    "settle_queue",
-    "usual_delay_s",
-]
-
 MEASURED_S = 1.5
 LONGEST_S = 0.1
 """Longest queue that is chosen, s, unless a block lasts longer."""

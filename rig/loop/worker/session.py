@@ -21,8 +21,6 @@ from rig.loop.worker.queue_choice import QueueChoice
 from rig.loop.worker.spawn import Worker, rebuilt
 from rig.tick.tick import TickSettings
 
-__all__ = ["WorkerLoop", "WorkerSession"]
-
 RING_S = 10.0
 LONGEST_SILENCE_S = 10.0
 HUNG_S = 0.5

@@ -12,8 +12,6 @@ import rig.errors
 from rig.errors import DaqError, RigError
 from rig.loop.worker.memory import anonymous_file
 
-__all__ = ["Worker", "ask", "rebuilt", "supported"]
-
 KILLED = "the loop's process was killed; only the device's watchdog has acted"
 
 

@@ -8,8 +8,6 @@ import time
 from rig.loop.worker.memory import SharedMemory
 from rig.loop.worker.pace import Pace
 
-__all__ = ["STALL_NS", "BlockTimes", "disturbances", "since"]
-
 
 def disturbances() -> dict[str, int]:
     """Return counts of events so far that may delay a thread: modules imported, runs of the garbage collector.

@@ -26,8 +26,6 @@ from rig.measurements.experiments.records import FEWEST_PERIODS, segment, sweep_
 from rig.measurements.experiments.signals import Signals
 from rig.recording.reader import Recording
 
-__all__ = ["default_rate_hz", "experiments", "kinds_with_experiments", "rows_from_rest"]
-
 SAMPLES_PER_PERIOD = 25
 """Samples per period of the highest excited frequency. The paper has 22.9 and 28.4."""
 FEWEST_SAMPLES_PER_PERIOD = 2.5

@@ -13,8 +13,6 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import MultisineResult, turned_periods
 from rig.measurements.experiments.signals import Signals
 
-__all__ = ["Periods", "WantedPeriods", "realisation"]
-
 Periods = Literal["mean", "all"]
 
 

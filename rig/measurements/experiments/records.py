@@ -13,8 +13,6 @@ from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.measurements.experiments.signals import Signals
 
-__all__ = ["segment", "sweep_pieces"]
-
 AT_REST = 0.01
 """Largest RMS in the first period of a record that begins at rest, relative to the largest value of the signal."""
 FEWEST_PERIODS = 8

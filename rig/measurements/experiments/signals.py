@@ -11,8 +11,6 @@ from identification.channels import chosen_rows
 from rig.bench import Bench
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 
-__all__ = ["SKEW_EDGE", "Signals"]
-
 SKEW_EDGE = 32
 """Samples at either end of a record that are spoilt when a fraction of a sample of skew is removed, in addition to the skew."""
 _KAISER_BETA = 8.6

@@ -6,8 +6,6 @@ from identification import DecayBackbone
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["DECAY"]
-
 
 def _summarise(found: DecayBackbone) -> dict[str, Any]:
     modes = [

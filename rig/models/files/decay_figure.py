@@ -8,8 +8,6 @@ from rig.drawing.style import MAIN, SECOND, engineering, title
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_decay"]
-
 _SMALL_CHANGE = 2e-4
 
 

@@ -9,8 +9,6 @@ from identification.prediction.exciter import PARAMETERS
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["EXCITER"]
-
 _SHOWN = {
     "force_per_volt_n_v": ("force per volt, blocked", "N/V"),
     "coil_time_constant_s": ("time constant of the coil", "s"),

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_exciter"]
-
 _DRAWS = 400
 _DECADES = 5.0
 _DOTS: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0, "color": REJECTED, "alpha": 0.5}

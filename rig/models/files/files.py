@@ -14,8 +14,6 @@ from rig.models.files.kinds import KINDS, kind_of_file_for
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
 from rig.text.printable import error_text
 
-__all__ = ["KINDS", "load", "load_as", "save", "understood"]
-
 _MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 
 

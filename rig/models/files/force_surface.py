@@ -18,8 +18,6 @@ from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
 from vibrolock.results import Result
 
-__all__ = ["FORCE_SURFACE", "MeasuredSurface"]
-
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSurface(Result):

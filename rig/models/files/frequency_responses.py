@@ -6,8 +6,6 @@ from identification import FrequencyResponse, pack_frequency_responses, unpack_f
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["FREQUENCY_RESPONSES"]
-
 
 def _summarise(responses: tuple[FrequencyResponse, ...]) -> dict[str, Any]:
     return {

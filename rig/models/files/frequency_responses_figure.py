@@ -11,8 +11,6 @@ from rig.drawing.style import REJECTED, engineering, plain_log, shade, title
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_responses"]
-
 
 def draw_responses(page: "Figure", responses: tuple[FrequencyResponse, ...]) -> None:
     """Draw amplitude and phase lag over frequency."""

@@ -8,8 +8,6 @@ from identification import HammerTest
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["HAMMER_TEST"]
-
 
 def _summarise(found: HammerTest) -> dict[str, Any]:
     responses = found.responses

@@ -13,8 +13,6 @@ from rig.drawing.style import COLOURS, MAIN, REJECTED, title, unit_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_hammer_test"]
-
 _MOST_OUTPUTS = 6
 
 

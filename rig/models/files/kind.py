@@ -6,8 +6,6 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-__all__ = ["Arrays", "Attributes", "FileKind"]
-
 Arrays = Mapping[str, NDArray[Any]]
 Attributes = Mapping[str, Any]
 

@@ -6,8 +6,6 @@ from typing import Any
 from rig.models.files.kind import FileKind
 from vibrolock.on_use import Registry
 
-__all__ = ["KINDS", "as_kept", "kind_of_file_for"]
-
 _DECLARED = {
     "nonlinear-mode": ("nonlinear_mode:NONLINEAR_MODE", ("NonlinearMode",)),
     "decay-backbone": ("decay:DECAY", ("DecayBackbone",)),

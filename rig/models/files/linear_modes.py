@@ -6,8 +6,6 @@ from identification import LinearModes, ModalAnalysis
 from rig.models.files.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["LINEAR_MODES"]
-
 
 def _pack(found: ModalAnalysis | LinearModes) -> tuple[Arrays, Attributes]:
     return (ModalAnalysis(found) if isinstance(found, LinearModes) else found).to_arrays()

@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_linear_modes"]
-
 _MOST_OUTPUTS = 4
 _MOST_DOTS = 4000
 

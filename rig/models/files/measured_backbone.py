@@ -14,8 +14,6 @@ from rig.text.console import number, print_table
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["MEASURED_BACKBONE"]
-
 _COLUMNS = ("force_n", "frequency_hz", "amplitude_m", "phase_error_deg")
 _PATTERNS = (".4f", ".4f", ".5f", ".2f")
 _SCALES = (1.0, 1.0, 1e3, 1.0)

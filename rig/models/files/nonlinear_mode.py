@@ -6,8 +6,6 @@ from identification import NonlinearMode
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["NONLINEAR_MODE"]
-
 
 def _summarise(mode: NonlinearMode) -> dict[str, Any]:
     return {

@@ -27,8 +27,6 @@ from rig.models.files.simulated import (
 )
 from rig.text.console import number
 
-__all__ = ["PNLSS", "IdentifiedPnlss", "check_trusted", "functions_of", "poles_of"]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedPnlss(SimulatedModel):

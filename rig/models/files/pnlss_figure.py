@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from identification import PnlssFit
     from rig.models.files.pnlss import IdentifiedPnlss
 
-__all__ = ["draw_pnlss"]
-
 
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
     """Draw the drive point's spectrum and a stretch of time, measured and simulated, the course of the fit, and all errors."""

@@ -9,8 +9,6 @@ from identification import Predictions, SimulatedRun
 from rig.drawing.style import MARKERS, REJECTED, plain_log, say_why_empty, shade
 from rig.models.files.predictions import PLANNED
 
-__all__ = ["draw_runs"]
-
 
 def draw_runs(area: Any, predictions: Predictions) -> None:
     """Draw one mark per realisation and output. Unbounded runs have no error; they are only counted."""

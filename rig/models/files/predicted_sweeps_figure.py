@@ -12,8 +12,6 @@ from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_sweeps", "sweeps_shown"]
-
 _MOST_SWEEPS, _MOST_ON_A_COLUMN, _MOST_BESIDE_OTHERS = 4, 2, 1
 _LINES_OF_TEXT = 14.0  # a row of panels takes the height of so many
 _MOST_SHOWN = 2.0  # times the largest recorded value: an unbounded run is not shown beyond

@@ -17,8 +17,6 @@ from identification import (
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["CUT", "PLANNED", "PREDICTIONS"]
-
 PLANNED = "planned"
 """Use of a multisine that has not been measured."""
 CUT = "the response from "

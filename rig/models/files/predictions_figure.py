@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["draw_predictions"]
-
 _MOST_NAMED = 12
 _NEAR = 1.3
 _MARGIN = 0.15

@@ -13,8 +13,6 @@ from rig.rehearsal.report import lines, summary
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
 
-__all__ = ["REHEARSAL"]
-
 TRIAL = ("end", "text", "tripped", "completed", "channel", "level", "duration_s")
 POINT = tuple(one.name for one in fields(TrialPoint))
 

@@ -8,8 +8,6 @@ from identification import FrequencyResponseMatrix
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["RESPONSE_MATRIX"]
-
 
 def _summarise(matrix: FrequencyResponseMatrix) -> dict[str, Any]:
     return {

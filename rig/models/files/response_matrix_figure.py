@@ -13,8 +13,6 @@ from rig.drawing.style import COLOURS, REJECTED, title, unit_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_response_matrix"]
-
 _LINES = ("-", "--", ":", "-.")
 
 

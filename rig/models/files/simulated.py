@@ -23,17 +23,6 @@ from rig.models.files.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result
 
-__all__ = [
-    "SimulatedModel",
-    "errors_in",
-    "packed_errors",
-    "rows_of_scatter",
-    "say_errors",
-    "say_scatter",
-    "scatter_in",
-    "unpacked_errors",
-]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedModel(Result):

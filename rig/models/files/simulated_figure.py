@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from identification.pnlss.simulators import Simulator
     from rig.models.files.simulated import SimulatedModel
 
-__all__ = ["channels_of", "draw_simulated"]
-
 _FLOOR = 0.1  # of the median residual: smaller values are not shown
 _USES = {"training": (MAIN, "o"), "validation": (SECOND, "s"), "test": (REJECTED, "^")}
 

@@ -22,9 +22,6 @@ from rig.models.files.simulated import (
 )
 from rig.text.console import number, print_table
 
-__all__ = ["STRUCTURED", "IdentifiedStructured", "functions_of"]
-
-
 _LEAST_SUPPORT_N_M = 1e-3
 """Stiffness of the support below which it counts as none."""
 

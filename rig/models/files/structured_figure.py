@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from identification import NonlinearElement
     from rig.models.files.structured import IdentifiedStructured
 
-__all__ = ["draw_structured"]
-
 _BEYOND = 1.5
 """Drawn displacements relative to the largest of the training data."""
 _POINTS = 301

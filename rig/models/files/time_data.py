@@ -9,8 +9,6 @@ from identification.time_data.periodicity import period_remark
 from rig.models.files.kind import FileKind
 from rig.text.console import number, print_table
 
-__all__ = ["TIME_DATA"]
-
 
 def _summarise(data: TimeRecords) -> dict[str, Any]:
     rate, size = data.sample_rate_hz, data.period_samples

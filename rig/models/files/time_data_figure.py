@@ -4,22 +4,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from identification import TimeRecord, TimeRecords
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, TRACE_BINS, shade, title, unit_text
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_time_data"]
-
 _MOST_CHANNELS, _MOST_LEVELS = 6, 8
 _SEGMENT = 4096
 _THIN = 0.7
-
-Float = NDArray[np.float64]
 
 
 def draw_time_data(page: "Figure", data: TimeRecords) -> None:

@@ -15,8 +15,6 @@ from rig.models.files.time_data import TIME_DATA
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
-__all__ = ["KINDS", "exciter_in", "experiments_in", "rates_hz_in", "specimen_in", "time_records_in"]
-
 KINDS = (*kinds_with_experiments(), TIME_DATA.name)
 """Kinds of files from which experiments are made."""
 

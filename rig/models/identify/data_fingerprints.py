@@ -7,8 +7,6 @@ import numpy as np
 
 from identification import Experiment
 
-__all__ = ["features_of", "fingerprint", "uses_of"]
-
 
 def features_of(experiment: Experiment) -> str:
     """Describe the data of an experiment to six digits, without its weight, names and files."""

@@ -7,8 +7,6 @@ from typing import Any
 
 from rig.errors import ConfigurationError
 
-__all__ = ["DataOptions", "Options"]
-
 _INPUTS = ("force", "voltage")
 _SCATTERING = ("frequency", "damping", "gain")
 

@@ -11,16 +11,13 @@ from identification import Channel, DecayBackbone, decay_backbone
 from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import channels_of
-from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.campaigns.kinds import kinds_that_yield
+from rig.campaigns.kinds import KINDS as CAMPAIGNS, kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, decays, point_rows
 from rig.models.files.time_data import TIME_DATA
 from rig.models.identify.decay_request import DecayOptions
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
-
-__all__ = ["identified_decay"]
 
 
 @dataclass(frozen=True, eq=False)

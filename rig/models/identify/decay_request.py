@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from rig.errors import ConfigurationError
 from rig.models.identify.data_request import Options
 
-__all__ = ["DecayOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class DecayOptions(Options):

@@ -19,8 +19,6 @@ from rig.models.identify.data_fingerprints import features_of
 from rig.models.identify.data_request import DataOptions
 from rig.recording.arrays import kind_of
 
-__all__ = ["FitData", "fit_data", "fitted"]
-
 Fit = TypeVar("Fit", StructuredFit, PnlssFit)
 
 _EVERY = 4

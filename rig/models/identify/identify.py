@@ -42,9 +42,10 @@ from rig.measurements import (
 )
 from rig.measurements.points_left_out import points_left_out
 from rig.models.files.decay import DECAY
-from rig.models.files.files import KINDS, load, load_as
+from rig.models.files.files import load, load_as
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.files.frequency_responses import FREQUENCY_RESPONSES
+from rig.models.files.kinds import KINDS
 from rig.models.files.linear_modes import LINEAR_MODES
 from rig.models.identify.decay import identified_decay
 from rig.models.identify.request import Request
@@ -53,8 +54,6 @@ from rig.recording.reader import Recording
 
 if TYPE_CHECKING:
     from identification import FitProgress, TimeRecords
-
-__all__ = ["Request", "identify_model", "modes_in"]
 
 
 def identify_model(

@@ -21,8 +21,6 @@ from rig.models.identify.data_request import DataOptions
 from rig.models.identify.fit_data import FitData, fit_data, fitted
 from rig.models.identify.pnlss_request import PnlssOptions
 
-__all__ = ["identified_pnlss"]
-
 Progress = Callable[[FitProgress], None]
 
 

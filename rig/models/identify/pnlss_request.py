@@ -6,8 +6,6 @@ from pathlib import Path
 from rig.errors import ConfigurationError
 from rig.models.identify.data_request import Options
 
-__all__ = ["PnlssOptions"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class PnlssOptions(Options):

@@ -13,8 +13,6 @@ from rig.models.identify.decay_request import DecayOptions
 from rig.models.identify.pnlss_request import PnlssOptions
 from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 
-__all__ = ["Request"]
-
 _OPTIONS: dict[str, tuple[str, ...]] = {
     "nonlinear-mode": ("modes", "near"),
     "linear": ("estimator", "band_hz", "count", "near", "order", "weighting"),

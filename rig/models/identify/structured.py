@@ -18,8 +18,6 @@ from rig.models.identify.fit_data import fit_data, fitted
 from rig.models.identify.structured_request import MODES_OF_A_STRUCTURE, StructuredOptions
 from rig.recording.arrays import kind_of
 
-__all__ = ["identified_structured"]
-
 _KINDS = ("multisine", "sweep", "time-data")
 """Data that may begin at rest."""
 

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from identification.structured.further import ElementPlan
     from identification.structured.laws import Law
 
-__all__ = ["MODES_OF_A_STRUCTURE", "StructuredOptions"]
-
 MODES_OF_A_STRUCTURE = (
     "the modes with which a structured model begins; make them from a test at a low level with "
     "`rig identify RECORDING --model linear -o MODES.h5`"

@@ -5,16 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import Channel, Experiment, PnlssModel
 from identification.pnlss.simulators import Simulator
 from rig.errors import ConfigurationError
 from rig.models.predict.driven_models import DrivenModel
-
-__all__ = ["CONSTANT", "all_inputs", "constants_of", "driving", "with_constants"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 CONSTANT = "constant"
 """Name of the input of `identification.Experiment.with_constant_input`, whose value a model remembers."""

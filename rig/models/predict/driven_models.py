@@ -18,8 +18,6 @@ from identification import (
     structured_steady_state,
 )
 
-__all__ = ["DrivenModel", "coupled_run", "frequency_response_at", "steady_state_at"]
-
 DrivenModel = PnlssModel | StructuredModel
 
 

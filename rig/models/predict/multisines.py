@@ -15,8 +15,6 @@ from rig.models.predict.constants import driving, with_constants
 from rig.models.predict.sweeps import strangers
 from rig.recording.reader import Recording
 
-__all__ = ["simulated_multisines"]
-
 
 def simulated_multisines(
     paths: Sequence[Path], identified: SimulatedModel, specimen: str, constants: Mapping[str, float]

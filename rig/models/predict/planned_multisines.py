@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import Exciter, PnlssModel, SimulatedRun
 from identification.pnlss.simulators import SimulatedMotion
@@ -15,10 +14,7 @@ from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD
 from rig.models.predict.constants import all_inputs
 from rig.models.predict.driven_models import DrivenModel, coupled_run
 from rig.models.predict.sweeps import strangers
-
-__all__ = ["planned_multisines"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _LOWEST = 0.8
 """Part of the lowest frequency above which the exciter's reaction is exact."""

@@ -45,9 +45,6 @@ from rig.models.predict.sweeps import SweepModels, Swept, planned_sweeps, record
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 
-__all__ = ["predict_vibrations"]
-
-
 _Compared = tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None, ResponseBand | None]
 
 _DRAWS = 40

@@ -13,8 +13,6 @@ from identification.prediction.frequency_response import HeldForce
 from rig.errors import ConfigurationError
 from rig.models.predict.sweeps import CROSSINGS
 
-__all__ = ["PredictionRequest"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class PredictionRequest:

@@ -34,8 +34,6 @@ from rig.models.predict.simulated_steady import Held, Reference, compared, defau
 from rig.models.predict.simulated_sweep_models import SimulatedSweepModels
 from rig.models.predict.simulated_sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
 
-__all__ = ["simulated_predictions"]
-
 _DRAWS = 40
 """Models of a band."""
 

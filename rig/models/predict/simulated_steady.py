@@ -18,8 +18,6 @@ from identification import (
 from identification.prediction.comparison import Over
 from rig.models.predict.driven_models import DrivenModel, frequency_response_at, steady_state_at
 
-__all__ = ["Held", "Reference", "compared", "default_held"]
-
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 _MARGIN = 0.02
 """Relative margin by which a response is followed beyond the frequencies of a reference."""

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import (
     Channel,
@@ -20,10 +19,7 @@ from identification.pnlss.simulators import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.models.predict.constants import all_inputs, driving
 from rig.models.predict.driven_models import DrivenModel, coupled_run
-
-__all__ = ["SimulatedSweepModels", "SweepGiven"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _SHOWN = 10.0
 """An unbounded run is shown while it is below this many times the largest recorded amplitude, or the largest in training."""

@@ -5,7 +5,6 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import (
     IdentificationError,
@@ -32,10 +31,7 @@ from rig.models.predict.simulated_sweep_models import SimulatedSweepModels, Swee
 from rig.models.predict.sweeps import Swept, force_and_drive, planned, strangers
 from rig.recording.reader import Recording
 from rig.tick.layout import SAMPLE_LOST
-
-__all__ = ["planned_simulated_sweeps", "recorded_simulated_sweeps"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def recorded_simulated_sweeps(path: Path, models: SimulatedSweepModels) -> Iterator[Swept]:

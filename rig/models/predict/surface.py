@@ -16,8 +16,6 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.models.files.force_surface import MeasuredSurface
 from rig.models.predict.request import PredictionRequest
 
-__all__ = ["surface_predictions"]
-
 _INTERVAL = 1.96
 
 

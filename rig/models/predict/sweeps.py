@@ -26,17 +26,6 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
 
-__all__ = [
-    "CROSSINGS",
-    "SweepModels",
-    "Swept",
-    "force_and_drive",
-    "planned",
-    "planned_sweeps",
-    "recorded_sweeps",
-    "strangers",
-]
-
 CROSSINGS = ("half-periods", "periods")
 """Zero crossings between which a force is read: all of them, or only those in the same direction."""
 

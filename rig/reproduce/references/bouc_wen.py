@@ -10,16 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import Channel, Experiment, FitSettings, PnlssFit, identify_pnlss, linear_pnlss, pnlss_errors
 from rig.errors import RecordingError
 from rig.reproduce.references.data import DataFile, DataSet
 from rig.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
-
-__all__ = ["BOUC_WEN", "HystereticData", "fitted", "read"]
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 _RATE_HZ = 750.0
 _STATES, _FEATURES = 3, 10

@@ -23,8 +23,6 @@ from rig.exchange.reading import read_frequency_responses
 from rig.reproduce.references.data import DataFile, DataSet
 from rig.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
 
-__all__ = ["BRAKE_REUSS"]
-
 _MAPPING = Path(__file__).with_name("brake-reuss-mapping.toml")
 _WINDOW_DEG = 60.0
 """Distance from phase resonance within which a response to the recorded force is compared."""

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from rig.errors import ConfigurationError, RecordingError
 
-__all__ = ["DataFile", "DataSet", "found"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class DataFile:

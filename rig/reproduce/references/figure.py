@@ -12,8 +12,6 @@ from rig.reproduce.references.result import Line, Panel, StudyResult
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["draw_reference"]
-
 _STYLES: dict[str, dict[str, Any]] = {
     "measured": {"color": REJECTED, "lw": 3.0, "alpha": 0.6},
     "points": {"color": REJECTED, "marker": "o", "ms": 3.5, "lw": 0.0},

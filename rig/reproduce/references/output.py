@@ -11,8 +11,6 @@ from rig.reproduce.references.figure import draw_reference
 from rig.reproduce.references.result import OURS, Line, StudyResult
 from rig.text.console import number, print_table
 
-__all__ = ["RESULTS", "prepared", "say_reference", "summary_of", "write_reference"]
-
 RESULTS = "reference.json"
 
 

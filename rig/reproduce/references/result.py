@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from rig.reproduce.references.data import DataSet
 
-__all__ = ["OURS", "Column", "Curve", "Line", "Panel", "ReferenceStudy", "Say", "StudyResult"]
-
 Say = Callable[[str], None]
 
 OURS = "this version"

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import (
     Channel,
@@ -26,10 +25,6 @@ from identification import (
 from rig.errors import RecordingError
 from rig.reproduce.references.data import DataFile, DataSet
 from rig.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
-
-__all__ = ["SILVERBOX", "Oscillator", "fitted", "read"]
-
-Float = NDArray[np.float64]
 
 _ARROW = 40_000
 _FIRST_PERIOD, _PERIOD, _BLOCK, _AHEAD = 40_984, 8192, 8692, 500

@@ -5,6 +5,4 @@ from rig.reproduce.references.brake_reuss import BRAKE_REUSS
 from rig.reproduce.references.result import ReferenceStudy
 from rig.reproduce.references.silverbox import SILVERBOX
 
-__all__ = ["STUDIES"]
-
 STUDIES: dict[str, ReferenceStudy] = {study.data.name: study for study in (SILVERBOX, BOUC_WEN, BRAKE_REUSS)}

@@ -8,8 +8,6 @@ from controller.tuning import PlantModel
 from rig.bench import Bench
 from rig.tick.safety.following import EXPECTED, VISIBLE
 
-__all__ = ["expected_record"]
-
 # Only amplitudes above JUDGED times the smallest readable amplitude plus NOISES times the channel's RMS noise are judged.
 JUDGED = 16.0
 NOISES = 8.0

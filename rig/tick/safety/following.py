@@ -15,8 +15,6 @@ from controller.primitives import TWO_PI, size
 from rig.tick.safety.keeping import FAR, KEPT
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["EXPECTED", "FOLLOWING"]
-
 LARGEST_RISE = 2.0  # largest output over the output that last sufficed; this also bounds the rise within one period
 CREEP = 1.05  # a period: largest rise of the reference output while the held quantity stays at its level
 ASTRAY_RISE = 1.5  # rise of the output from which a held quantity that does not follow counts as astray

@@ -20,8 +20,6 @@ import numpy as np
 
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["KEPT"]
-
 FAR = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
 FAR_PERIODS = 2
 ARRIVED = 1.5  # times a lower level; what is held has reached it below

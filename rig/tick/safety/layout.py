@@ -4,8 +4,6 @@ from enum import IntEnum
 
 import numpy as np
 
-__all__ = ["GUARD", "INPUT", "INPUT_WATCH", "LIMITS", "POLARITY_HINT", "TEXT", "EndReason", "GuardMode"]
-
 
 class GuardMode(IntEnum):
     """Output that the guard permits."""

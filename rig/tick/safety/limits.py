@@ -10,8 +10,6 @@ from rig.tick.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_H
 
 INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
 
-__all__ = ["describe_end", "end_reason_of", "guard_record", "input_records", "limits_record", "watch_records"]
-
 
 def limits_record(bench: Bench) -> np.ndarray:
     """Return the limits in samples and SI units (one record of `LIMITS`)."""

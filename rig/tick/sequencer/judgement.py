@@ -8,8 +8,6 @@ from controller.lock import LOCKED, LOST, SEARCHING
 from rig.tick.sequencer.layout import RECORD, SETTLE, Outcome
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["LONGEST_AVERAGE", "SETTLE_RULE", "SETTLING"]
-
 RUNNING = int(Outcome.RUNNING)
 DONE = int(Outcome.DONE)
 NOT_SETTLED = int(Outcome.NOT_SETTLED)

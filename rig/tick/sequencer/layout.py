@@ -9,8 +9,6 @@ import numpy as np
 
 from controller.harmonics.records import ORDERS
 
-__all__ = ["OUTCOME", "PROGRESS", "REFUSED", "RING", "SEGMENT", "Drive", "OnFailure", "Outcome", "SegmentKind"]
-
 
 class SegmentKind(IntEnum):
     """Action of a segment on level or frequency."""

@@ -7,8 +7,6 @@ import numpy as np
 from rig.tick.sequencer.layout import RING, Outcome
 from vibrolock.compiled import Record, kernel
 
-__all__ = ["LARGEST_CONTINUED", "LARGEST_HELD", "LARGEST_LOST", "measure_again", "step_is_over", "too_many_faults"]
-
 PENDING = int(Outcome.PENDING)
 DONE = int(Outcome.DONE)
 OUTPUT_HELD = int(Outcome.OUTPUT_HELD)

@@ -14,8 +14,6 @@ from rig.bench.configuration import Configured
 from rig.tick.sequencer.judgement import LONGEST_AVERAGE, SETTLE_RULE
 from rig.tick.sequencer.layout import OUTCOME, SEGMENT, Drive, OnFailure, SegmentKind
 
-__all__ = ["Excitation", "Segment", "SettleRule", "highest_frequency_hz", "segment_table"]
-
 
 class SettleRule(Configured):
     """When a vibration counts as settled at its set-point."""

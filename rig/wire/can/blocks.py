@@ -9,8 +9,6 @@ from rig.wire.can.frames import Frame, padded_length
 from rig.wire.can.protocol import FrameKind, Protocol, Shape
 from rig.wire.messages import Stream
 
-__all__ = ["COUNT", "OPEN_BLOCKS", "Blocks", "Piece", "StreamFrames", "check_stream"]
-
 COUNT = np.dtype("<i2")
 
 

@@ -13,8 +13,6 @@ from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.lean_import import lean_import
 from rig.wire.can.protocol import NODE_MASK
 
-__all__ = ["BUS_COUNTERS", "FrameBus", "PythonCanBus", "only_loopback"]
-
 BUS_COUNTERS = ("error_frames", "expired_frames", "foreign_frames", "send_errors")
 """Counters of a bus: error frames, own frames not sent in time, foreign frames, failed sends."""
 

@@ -24,8 +24,6 @@ from rig.wire.messages import (
     Stream,
 )
 
-__all__ = ["COUNTERS", "CanCodec"]
-
 COUNTERS = (
     *("foreign_frames", "own_frames", "damaged_frames", "repeated_frames"),
     *("out_of_order_frames", "late_frames", "incomplete_blocks", "resynchronised"),

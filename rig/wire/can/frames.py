@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-__all__ = ["DATA_BIT_RATE_HZ", "FD_LENGTHS", "BusTiming", "Frame", "frame_seconds", "padded_length"]
-
 DATA_BIT_RATE_HZ = 5_000_000
 """CAN FD's bit rate within the data where none is given: common adapters have it, and it carries 5 kHz sample by sample."""
 

@@ -13,8 +13,6 @@ from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
 from rig.wire.can.lean_import import lean_import
 
-__all__ = ["STRUCT_CODES", "CompiledMessage", "Layout", "compile_layout", "compile_text"]
-
 STRUCT_CODES = {
     "u1": "B",
     "i1": "b",

@@ -4,8 +4,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["lean_import"]
-
 _UNUSED = "asammdf"  # of the extra `formats`; it takes seconds
 
 

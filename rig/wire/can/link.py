@@ -14,8 +14,6 @@ from rig.wire.can.readbacks import Readbacks
 from rig.wire.link import LATE_SHARE, Link, Load
 from rig.wire.messages import HEARTBEATS_HZ, LOWEST_VERSION, VERSION, Message, Output, Readback, Samples, Stream
 
-__all__ = ["CanLink", "Traffic", "bus_load", "frame_lengths", "traffic"]
-
 
 class Traffic(NamedTuple):
     """Frames of one kind."""

@@ -1,7 +1,5 @@
 """How the outputs of a block go on, told by frames of their own that hold until the next one (version 2)."""
 
-__all__ = ["TOLD_EVERY_S", "PeriodsHeard", "PeriodsTold"]
-
 TOLD_EVERY_S = 0.01
 """Shortest time between two frames that only tell another period."""
 

@@ -23,18 +23,6 @@ from rig.wire.can.layout import Layout, compile_layout, compile_text
 from rig.wire.can.readbacks import COUNTS_A_FRAME
 from rig.wire.messages import LOWEST_VERSION, VERSION
 
-__all__ = [
-    "CLASSICAL_OUTPUTS",
-    "HIGHEST_NODE",
-    "NODE_MASK",
-    "FrameKind",
-    "Protocol",
-    "Shape",
-    "definition",
-    "protocol",
-    "shape_of",
-]
-
 HIGHEST_NODE = 15
 NODE_MASK = 0x00F
 CLASSICAL_OUTPUTS = 32

@@ -4,8 +4,6 @@ import numpy as np
 
 from rig.wire.can.frames import Frame, padded_length
 
-__all__ = ["COUNTS_A_FRAME", "Readbacks"]
-
 COUNT = np.dtype("<i2")
 INDEX_SIZE = 2  # bytes
 INDICES = 1 << 16  # a frame has 16 bits for the index of a count

@@ -13,8 +13,6 @@ from rig.wire.can.bus import FrameBus
 from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.slcan_lines import SlcanLines, encode_line, opening
 
-__all__ = ["SlcanBus", "TextPort"]
-
 _READ_BYTES = 4096
 _NOBODY_S = 0.01
 

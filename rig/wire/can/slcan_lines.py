@@ -10,8 +10,6 @@ from collections import deque
 from rig.errors import DaqRefused
 from rig.wire.can.frames import FD_LENGTHS, BusTiming, Frame
 
-__all__ = ["LONGEST_LINE", "SlcanLines", "encode_line", "opening"]
-
 LONGEST_LINE = 2 + 8 + 128
 BIT_RATES = {10_000: 0, 20_000: 1, 50_000: 2, 100_000: 3, 125_000: 4, 250_000: 5, 500_000: 6, 750_000: 7, 1_000_000: 8}
 DATA_BIT_RATES = (1_000_000, 2_000_000, 4_000_000, 5_000_000, 8_000_000)

@@ -19,8 +19,6 @@ from rig.wire.messages import (
     Stream,
 )
 
-__all__ = ["HEARTBEAT_BODY", "LARGEST_PAYLOAD", "Codec", "Damaged", "ForeignVersion", "Malformed", "Oversize"]
-
 LARGEST_PAYLOAD = 65_536
 """Largest header and body of any message, bytes; it bounds a receiver's memory."""
 

@@ -11,8 +11,6 @@ from cobs.cobs import DecodeError, decode, encode
 from rig.wire.messages import Message, Stream
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Oversize
 
-__all__ = ["COUNTERS", "FrameReader", "frame", "largest_frame", "payload_of"]
-
 CRC_SIZE = 4
 CRC = struct.Struct("<I").pack
 RESIDUE = crc32(bytes(CRC_SIZE))  # of any bytes with their CRC-32 behind them, low byte first

@@ -17,8 +17,6 @@ from rig.wire.serial.frames import FrameReader, frame, largest_frame
 from rig.wire.serial.port import is_pseudo_terminal
 from rig.wire.serial.reading import Input, NoInput, PolledInput, TimedInput
 
-__all__ = ["SerialLink", "line_load"]
-
 BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
 
 

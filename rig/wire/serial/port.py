@@ -17,15 +17,6 @@ from rig.wire.serial.reading import wait_of_a_read
 if sys.platform != "win32":
     import termios
 
-__all__ = [
-    "PseudoTerminal",
-    "is_pseudo_terminal",
-    "open_port",
-    "open_pseudo_terminal",
-    "port_names",
-    "second_descriptor",
-]
-
 MASTER_DEVICE = (5, 2)  # /dev/ptmx in Linux's list of devices
 SLAVE_MAJORS = range(136, 144)  # /dev/pts/*
 

@@ -9,8 +9,6 @@ import os
 import select
 from typing import Any, Protocol
 
-__all__ = ["CHUNK", "Input", "NoInput", "PolledInput", "TimedInput", "wait_of_a_read"]
-
 CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
 CONTROL_CHARACTERS = 6  # in the list that termios returns
 COARSE_S = 0.01  # from this wait on, the milliseconds of epoll are fine enough

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from identification.continuation.follow import continued
 from identification.continuation.newton import solved
 from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
+from vibrolock.arrays import Float
 
-Float = NDArray[np.float64]
 Answer = tuple[Float, Float, Float]
 
 

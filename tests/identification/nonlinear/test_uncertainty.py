@@ -6,8 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import Backbone, Channel, IdentificationError, ModeShapes, NonlinearMode, PeriodicVibration
-from identification import nonlinear_mode as identify
+from identification import (
+    Backbone,
+    Channel,
+    IdentificationError,
+    ModeShapes,
+    NonlinearMode,
+    PeriodicVibration,
+    nonlinear_mode as identify,
+)
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
 from tests.identification.rigs import PHI, one_mode_point
 

@@ -3,11 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import Channel, Experiment, Features, PnlssModel, StateSpace
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def channels(kind: str, count: int) -> tuple[Channel, ...]:

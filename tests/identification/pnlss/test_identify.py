@@ -19,8 +19,7 @@ from identification import (
     pnlss_errors,
 )
 from identification.linear.state_space_fit import spectral_radius
-from identification.pnlss import compared_starts, identify
-from identification.pnlss import linear_model as linear_model_module
+from identification.pnlss import compared_starts, identify, linear_model as linear_model_module
 from identification.pnlss.fitting import checks
 from identification.pnlss.linear_model import linear_start, reflected
 from tests.identification.pnlss.multisines import RATE_HZ, channels, linear_model, measured, multisine, oscillator

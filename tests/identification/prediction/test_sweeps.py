@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from identification import Channel, HalfPeriods, IdentificationError, Transient, demodulate, zero_crossings
@@ -14,8 +13,7 @@ from identification.prediction.properties import ExtrapolationError, ModalProper
 from identification.prediction.sweep_inputs import VoltageSweep
 from identification.prediction.sweep_prediction import SweepPrediction, compare_sweep
 from identification.prediction.sweeps import predict_sweep
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 W0, Z0, PHI, CUBIC = 2.0 * np.pi * 24.0, 0.004, 0.9, 3.2e9
 EXCITER = Exciter(

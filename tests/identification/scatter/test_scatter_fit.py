@@ -12,8 +12,7 @@ from identification.scatter.fit import fit_with_scatter
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Effect, effects_of, modes_of, shifted
 from identification.structured.laws import PolynomialDamper, PolynomialSpring
-from tests.identification.pnlss.systems import experiment as run_of_system
-from tests.identification.pnlss.systems import nonlinear_system
+from tests.identification.pnlss.systems import experiment as run_of_system, nonlinear_system
 from tests.identification.structured.models import beam, linear_modes
 from tests.identification.structured.test_fit import experiment
 

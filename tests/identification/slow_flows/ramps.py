@@ -4,11 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import Channel
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 RATE_HZ = 5000.0
 PHI = 0.9

@@ -14,8 +14,6 @@ from tests.reliability.faults.observing import Observation
 from tests.reliability.faults.plans import plan_for
 from tests.reliability.faults.table import Fault
 
-__all__ = ["Bound", "bound_for", "objections"]
-
 OUTPUT_RATIO, OUTPUT_EXTRA_V = 2.0, 0.1
 FADED = {"middle": 3.5, "start": 5.5}
 """Of what is held: a run ends at three times the output of a level; what fades from the start has faded by its first level."""

@@ -16,8 +16,6 @@ from tests.reliability.faults.plant import BrokenRig
 from tests.reliability.faults.table import Fault
 from tests.rig.wire.memory_link import MemoryLink, MemoryWire
 
-__all__ = ["EmulatedRig", "HostKilledError", "VirtualRigInProcess"]
-
 STALE_SAMPLES = 50
 SKIPPED_SAMPLES = 37
 LOST_OF_BLOCKS = 20

@@ -4,8 +4,6 @@ from typing import NamedTuple
 
 from tests.reliability.faults.table import FAULTS, Fault
 
-__all__ = ["CASES", "Case"]
-
 
 class Case(NamedTuple):
     """One cell of the matrix."""

@@ -27,8 +27,6 @@ from tests.reliability.faults.plant import BrokenRig
 from tests.reliability.faults.table import Fault
 from tests.rig.rigs import bench_with
 
-__all__ = ["DEVICES", "Healthy", "Observation", "healthy", "observe"]
-
 DEVICES = {"virtual": VirtualRigInProcess, "emulated": EmulatedRig}
 SPOILT = (0.05, 0.001, 0.03)  # of a channel's true fundamental, of the modal frequency, of the damping
 SEED = 3

@@ -9,8 +9,6 @@ from tests.reliability.faults.plans import bench_for
 from tests.reliability.faults.table import FAULTS
 from tests.reliability.pages import between, measured
 
-__all__ = ["BEGIN", "END", "TABLES", "rows_of", "written"]
-
 TABLES = {
     "A driver in the process, magnet beam": ("virtual", ("V", "N logarithmic", "N linear", "m")),
     "A device behind the wire protocol, magnet beam": ("emulated", ("V", "N logarithmic", "N linear", "m")),

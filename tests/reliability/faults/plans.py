@@ -7,8 +7,6 @@ from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
 from tests.rig.rigs import bench_with
 
-__all__ = ["LEVELS", "bench_for", "plan_for"]
-
 BLOCK = 10
 SHORT = {
     "kind": "backbone",

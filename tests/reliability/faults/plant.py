@@ -14,8 +14,6 @@ from tests.reliability.faults.spoiling import AMPLIFIER, SENSOR
 from tests.reliability.faults.table import Fault
 from vibrolock.compiled import bound
 
-__all__ = ["BrokenRig"]
-
 SOFTER = 0.8  # of the stiffness
 SOFTENING_PERIODS, SOFTENING_STEPS = 50.0, 20
 CLIPPED = 0.25  # of the largest voltage of the run without a fault

@@ -5,8 +5,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-__all__ = ["AMPLIFIER", "SENSOR"]
-
 NOISE_V = 0.2e-3
 RANGE_V = 5.0
 SPIKE_V, SPIKE_EVERY = 2.5, 971

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from itertools import product
 
-__all__ = ["FAULTS", "Fault", "fault_named"]
-
 
 @dataclass(frozen=True)
 class Fault:

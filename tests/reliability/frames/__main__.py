@@ -12,8 +12,6 @@ from itertools import product
 from tests.reliability.frames.hostile import ENDS, MODES, Counts, hostile_bytes
 from tests.reliability.frames.lines import LINES
 
-__all__ = ["table"]
-
 Cell = tuple[str, str, str]
 SHARES = {("serial", "damaged"): 0.3, ("serial", "forged"): 0.4, ("can", "damaged"): 0.01, ("can", "forged"): 0.3}
 """Of the bytes at one end. What a bus damages is lost whole, so that few bytes are many frames."""

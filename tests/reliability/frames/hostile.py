@@ -17,8 +17,6 @@ from tests.rig.drivers.test_wire import virtual, voltages
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink, MemoryWire
 
-__all__ = ["ENDS", "MODES", "Counts", "hostile_bytes"]
-
 ENDS = ("host", "device")
 MODES = ("damaged", "forged")
 """Frames that the wire can tell from right ones; frames of any content that are right in their form."""

@@ -11,8 +11,6 @@ from rig.wire.messages import Message, Stream
 from rig.wire.serial.codec import Codec
 from rig.wire.serial.frames import FrameReader, frame, payload_of
 
-__all__ = ["LINES", "CanLine", "Line", "SerialLine"]
-
 
 class Line(Protocol):
     """One direction of a wire: what a message is on it, what comes out, and what a damaged or a forged frame looks like."""

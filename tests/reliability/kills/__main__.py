@@ -13,8 +13,6 @@ from pathlib import Path
 from tests.reliability.kills.cases import DEVICES, PHASES, Case, drawn
 from tests.reliability.kills.killing import Outcome, carried_out
 
-__all__ = ["killed", "table"]
-
 
 def killed(case: Case) -> Outcome:
     """One kill in a folder of its own."""

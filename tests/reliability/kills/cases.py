@@ -4,8 +4,6 @@ import random
 from collections.abc import Iterator
 from typing import NamedTuple
 
-__all__ = ["DEVICES", "PHASES", "Case", "drawn", "every"]
-
 PHASES = (
     "opening",
     "before the first row",

@@ -23,8 +23,6 @@ from tests.reliability.kills.scene import plan
 from tests.rig.rigs import bench_with
 from tests.waiting import wait_until
 
-__all__ = ["Outcome", "carried_out"]
-
 ROOT = Path(__file__).parents[3]
 MARK = "VIBROLOCK_KILLED_RUN"
 

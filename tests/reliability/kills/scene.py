@@ -24,8 +24,6 @@ from rig.loop.worker.session import WorkerSession
 from rig.recording.journal import JournalWriter
 from tests.rig.campaigns.running.test_runs import plan_with
 
-__all__ = ["plan"]
-
 
 def plan() -> Any:
     """Two short points."""

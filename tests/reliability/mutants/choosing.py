@@ -13,8 +13,6 @@ from typing import NamedTuple
 
 from tests.reliability.mutants.operators import Change, changes
 
-__all__ = ["EQUIVALENT", "PACKAGES", "Mutant", "chosen", "mirrored_tests", "mutants_of", "shares"]
-
 PACKAGES = ("rig", "controller", "simulators", "identification", "vibrolock")
 EQUIVALENT: dict[str, str] = tomllib.loads(Path(__file__).with_name("equivalent.toml").read_text(encoding="utf-8"))
 """Names of mutants that mean the same as the product, and the reason."""

@@ -8,8 +8,6 @@ import ast
 import re
 from typing import NamedTuple
 
-__all__ = ["Change", "changed", "changes"]
-
 COMPARED = {
     ast.Lt: ("<", ("<=", ">=")),
     ast.LtE: ("<=", ("<", ">")),

@@ -21,8 +21,6 @@ from queue import SimpleQueue
 from tests.reliability.mutants.choosing import Mutant, mirrored_tests
 from tests.reliability.mutants.operators import changed
 
-__all__ = ["FATES", "Verdict", "Workplace", "judged"]
-
 FATES = ("killed", "killed by time", "survived", "not covered", "not judged")
 """What becomes of a mutant: a test fails; they do not end in time; all pass; there is none; they fail without it as well."""
 OPTIONS = ("-x", "-q", "-p", "no:randomly", "-p", "no:cacheprovider", "-n", "0", "-m", "not slow and not hardware")

@@ -9,8 +9,6 @@ from typing import Any
 from tests.reliability.mutants.choosing import Mutant
 from tests.reliability.mutants.running import FATES, Verdict
 
-__all__ = ["compared", "read", "survivors", "table", "told", "write"]
-
 KILLED = ("killed", "killed by time")
 
 

@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from random import Random
 
-__all__ = ["BYTE_MUTATIONS"]
-
 PUT_BETWEEN = (
     b"\0",
     b"\xff\xfe",

@@ -21,8 +21,6 @@ from tests.reliability.mutations.judging import Verdict, judged
 from tests.reliability.mutations.table_mutations import TABLE_MUTATIONS, Table
 from tests.reliability.mutations.toml_text import toml_of
 
-__all__ = ["Spoilt", "compiled", "judge", "shipped_as_they_are", "spoilt_configurations"]
-
 RIG = Path(__file__).parents[3] / "rig"
 MUTATIONS = (1, 1, 1, 2, 3)
 PART_IN_BYTES = 0.15

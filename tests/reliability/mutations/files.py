@@ -24,17 +24,6 @@ from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.reliability.mutations.judging import Verdict, judged
 from tests.rig.recording.samples import fill, header
 
-__all__ = [
-    "FILE_KINDS",
-    "FILE_OUTCOMES",
-    "OTHERS",
-    "SpoiltFile",
-    "contents_of",
-    "judge_file",
-    "originals",
-    "spoilt_files",
-]
-
 FILE_KINDS = ("recording", "recording without digest", "journal", "model", "model without digest", "mat", "uff")
 FILE_OUTCOMES = ("refused", "identical", "told", "other numbers", "misbehaved")
 OTHERS = ("mat", "uff")

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from rig.errors import RigError
 
-__all__ = ["LONGEST_CPU_S", "LONGEST_TEXT", "Verdict", "judged"]
-
 LONGEST_TEXT = 1000
 """Characters of a line that refuses a file."""
 LONGEST_CPU_S = 5.0

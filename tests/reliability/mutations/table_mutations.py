@@ -5,8 +5,6 @@ from copy import deepcopy
 from random import Random
 from typing import Any
 
-__all__ = ["TABLE_MUTATIONS", "Table"]
-
 Table = dict[str, Any]
 Place = tuple[Any, Any]
 """A table or list, and the key or index in it."""

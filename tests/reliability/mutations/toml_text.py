@@ -5,8 +5,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["toml_of"]
-
 
 def toml_of(table: Mapping[str, Any]) -> str:
     """One key a line, tables inside written in the line."""

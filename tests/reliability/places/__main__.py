@@ -12,8 +12,6 @@ from pathlib import Path
 
 from tests.reliability.places.scenes import SCENES
 
-__all__ = ["gone_through", "table"]
-
 
 def gone_through(jobs: int) -> dict[str, list[str]]:
     """What was wrong in every scene."""

@@ -10,8 +10,6 @@ from rig.errors import RigError
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 
-__all__ = ["PLAN", "ROOT", "Ended", "command", "objections", "run_command", "write_plan"]
-
 ROOT = Path(__file__).parents[3]
 PLAN = """
 kind = "backbone"

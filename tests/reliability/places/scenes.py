@@ -12,8 +12,6 @@ from rig.recording.reader import Recording
 from tests.reliability.places.running import Ended, command, objections, run_command, write_plan
 from tests.waiting import wait_until
 
-__all__ = ["SCENES"]
-
 _LIMITED = """
 import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -15,8 +15,7 @@ from rig.analysis.modes import modes
 from rig.analysis.subject import peak, subject_of
 from rig.errors import ConfigurationError
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
-from tests.reference.harmonic_balance import backbone as reference_backbone
-from tests.reference.harmonic_balance import response_to_voltage
+from tests.reference.harmonic_balance import backbone as reference_backbone, response_to_voltage
 from tests.reference.parameters import ONE_SIDED
 from tests.rig.rigs import bench_with
 

@@ -37,7 +37,7 @@ def test_a_fifo_a_device_and_a_folder_are_refused_without_waiting(tmp_path, read
 
 
 def test_a_table_or_universal_file_that_is_a_fifo_is_refused_without_waiting(tmp_path):
-    from rig.exchange.reading import ImportFailed
+    from rig.exchange.child_reading import ImportFailed
 
     for name in ("fifo.csv", "fifo.uff"):
         os.mkfifo(tmp_path / name)

@@ -11,8 +11,6 @@ from identification.structured.laws import (
     Stop,
 )
 
-__all__ = ["structure"]
-
 
 def structure(**changes) -> StructuredModel:
     """Two modes, an element of springs and a damper, and one of joints."""

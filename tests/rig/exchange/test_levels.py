@@ -10,8 +10,9 @@ import pyuff
 import rig
 from rig.campaigns.plans import plan_from
 from rig.errors import ConfigurationError, RecordingError
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
-from rig.exchange.reading import ImportFailed, import_file, import_sep005
+from rig.exchange.reading import import_file, import_sep005
 from rig.measurements.sep005 import time_series
 from tests.rig.exchange.test_universal_files import response, units, written
 

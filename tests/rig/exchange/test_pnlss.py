@@ -9,8 +9,9 @@ from scipy.io import loadmat, savemat
 from identification import Channel, Features, PnlssModel
 from identification.linear.subspace import StateSpace
 from rig.errors import RecordingError
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
-from rig.exchange.reading import ImportFailed, import_file
+from rig.exchange.reading import import_file
 from rig.models.files.files import load, save
 
 FORCE, DRIVE, TIP = Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m")

@@ -8,7 +8,8 @@ import scipy.io
 
 from identification import stepped_sine_mode
 from rig.errors import ConfigurationError
-from rig.exchange.reading import ImportFailed, read_frequency_responses, read_mapping
+from rig.exchange.child_reading import ImportFailed
+from rig.exchange.reading import read_frequency_responses, read_mapping
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "brake-reuss-mapping.toml"
 LEVELS = [5, 20, 30, 40, 50, 60, 70, 80]

@@ -7,9 +7,10 @@ import pytest
 import pyuff
 
 from identification import LinearModes
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
-from rig.exchange.reading import ImportFailed, import_file
+from rig.exchange.reading import import_file
 from rig.exchange.time_data import TimeData
 from rig.exchange.uff.reading import read_uff, time_data_in
 from tests.rig.exchange.conftest import CHANNELS

@@ -12,7 +12,8 @@ from rig.figures.curves import View
 from rig.figures.files import plot
 from rig.figures.overlay import overlay
 from rig.models.files.files import save
-from rig.models.identify.identify import Request, identify_model
+from rig.models.identify.identify import identify_model
+from rig.models.identify.request import Request
 from rig.recording.reader import Recording
 from rig.show.summary import summarise
 from tests.rig.figures.conftest import texts

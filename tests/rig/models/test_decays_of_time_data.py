@@ -7,7 +7,8 @@ from identification import Channel, TimeRecord, TimeRecords
 from rig.errors import ConfigurationError
 from rig.models.files.files import save
 from rig.models.identify.decay_request import DecayOptions
-from rig.models.identify.identify import Request, identify_model
+from rig.models.identify.identify import identify_model
+from rig.models.identify.request import Request
 
 RATE_HZ, FREQUENCY_HZ, DAMPING = 1000.0, 20.0, 0.01
 

@@ -35,7 +35,8 @@ def recordings(tmp_path_factory) -> Path:
 
 def _fill(folder: Path) -> None:
     from rig.models.identify.data_request import DataOptions
-    from rig.models.identify.identify import Request, identify_model
+    from rig.models.identify.identify import identify_model
+    from rig.models.identify.request import Request
 
     for name, level in (("low", 0.02), ("lines", 0.4)):
         recorded_at(folder / f"{name}.h5", plan_from(LINES | {"levels_rms_v": [level]}, name), seed=1)

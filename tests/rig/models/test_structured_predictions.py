@@ -20,7 +20,8 @@ def model(shelf):
     """A model of the one-sided magnet beam beside its recordings, and the plan of a sweep."""
     from rig.models.files.files import save
     from rig.models.identify.data_request import DataOptions
-    from rig.models.identify.identify import Request, identify_model
+    from rig.models.identify.identify import identify_model
+    from rig.models.identify.request import Request
 
     recorded_at(shelf / "lines.h5", plan_from(LINES, "lines"), seed=1)
     request = Request(kind="structured", modes=shelf / "LIN.h5", data=DataOptions(rate_hz=400.0, outputs="drive"))

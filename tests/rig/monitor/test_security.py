@@ -8,8 +8,7 @@ from contextlib import ExitStack, suppress
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from rig.monitor import process
-from rig.monitor import server as module
+from rig.monitor import process, server as module
 from rig.monitor.process import PageServer
 from rig.monitor.security import HEADERS
 from rig.monitor.visits import MOST_SOCKETS

@@ -7,15 +7,15 @@ import zlib
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rig.errors import RecordingError
 from rig.recording import appending
 from rig.recording.blocks import LARGEST_PAYLOAD, BlockKind
 from rig.recording.conversion import finalise
 from rig.recording.header import Column
-from rig.recording.journal import JournalWriter, journal_path, read_journal
+from rig.recording.journal import JournalWriter, journal_path
+from rig.recording.journal_blocks import read_journal
 from rig.recording.journal_contents import JournalContents
 from rig.recording.reader import Recording
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows

@@ -6,7 +6,8 @@ import shutil
 
 import pytest
 
-from rig.models.files.files import KINDS, save
+from rig.models.files.files import save
+from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.report.paper import SAME_LEVEL, PaperError, agreement
 from rig.report.report import write_report

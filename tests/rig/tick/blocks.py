@@ -4,8 +4,6 @@ import numpy as np
 
 from rig.daq import CONTINUATION
 
-__all__ = ["nothing_told"]
-
 
 def nothing_told(n: int) -> tuple[np.ndarray, np.ndarray]:
     """``put_out`` of a device that has put out what was sent [n], and a ``continuation`` to fill."""

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from identification import (
     Exciter,
@@ -17,8 +16,7 @@ from identification import (
 )
 from identification.prediction.exciter import VoltagePath
 from tests.identification.pnlss.steady.oscillators import driven_by_voltage, oscillator, shaker
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 RATE_HZ, VOLTAGE_V, LOWEST_HZ = 800.0, 0.25, 10.0
 PERIODS, HARMONICS = 300, 11

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from identification import PnlssModel
@@ -14,9 +13,7 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record, records_of
 from identification.pnlss.fitting.threads import available_threads, threads
 from tests.identification.pnlss.systems import disturbed, experiment, nonlinear_system
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 
 def features(model: PnlssModel, v: Complex, weights: Complex) -> Complex:

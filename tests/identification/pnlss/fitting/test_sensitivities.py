@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from identification import Experiment, PnlssModel
 from identification.pnlss.features import FUNCTIONS
@@ -12,8 +11,7 @@ from identification.pnlss.fitting.parameters import Parameters
 from identification.pnlss.fitting.records import Record, records_of, simulated
 from identification.pnlss.fitting.settings import FitSettings
 from tests.identification.pnlss.systems import experiment, nonlinear_system, periodic_experiment
-
-Float = NDArray[np.float64]
+from vibrolock.arrays import Float
 
 
 def record(system: PnlssModel, one: Experiment) -> Record:

@@ -3,13 +3,10 @@
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from identification import Channel, Exciter, Features, PnlssModel, SteadyStates
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 HZ, DAMPING, RATE_HZ = 25.0, 0.01, 3200.0
 FORCE, VOLTAGE = Channel("force", "force", "N"), Channel("voltage", "monitor", "V")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from identification import PnlssModel, SteadyStates, pnlss_response, pnlss_steady_state
 from identification.pnlss.steady.stability import loss_of_stability
@@ -15,9 +14,7 @@ from tests.identification.pnlss.steady.oscillators import (
     phases,
     waveform,
 )
-
-Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from vibrolock.arrays import Complex, Float
 
 FORCE_N, CUBIC = 1.2, 6e8
 

@@ -190,7 +190,8 @@ def test_a_plan_without_a_measured_plant_is_refused_before_anything_moves():
 
 def test_a_decay_becomes_a_model_of_a_file(magnet, tmp_path):
     from rig.models.files.files import load
-    from rig.models.identify.identify import Request, identify_model
+    from rig.models.identify.identify import identify_model
+    from rig.models.identify.request import Request
 
     with pytest.raises(ConfigurationError, match="a decay campaign knows it from its plan"):
         identify_model([magnet.path], Request(kind="decay", near="24"))

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from rig.campaigns.evaluation.plausibility import REFUSED, WARNED, with_plausibility
+from rig.campaigns.evaluation.channel_misfit import REFUSED, WARNED
+from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.planning.plant import PlantFacts
 from rig.campaigns.plans import load_plan
 from tests.controller.tuning.rigs import plant_of

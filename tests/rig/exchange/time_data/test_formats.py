@@ -5,8 +5,9 @@ import pytest
 from sdypy_sep005.sep005 import assert_sep005
 
 from identification import TimeRecords
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.proposal.proposal import proposed_mapping
-from rig.exchange.reading import ImportFailed, import_file, import_sep005
+from rig.exchange.reading import import_file, import_sep005
 from tests.rig.exchange.time_data.files import ACCELERATION, FILES, FORCE, FULL_SCALE, RATE_HZ, series
 
 IN_SI = ("universal.uff", "series.json")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import scipy.io
 
+from rig.exchange.child_reading import ImportFailed
 from rig.exchange.proposal.guesses import dimensions, period_of, rate_in, role_of, transient_periods
 from rig.exchange.proposal.proposal import proposed_mapping
-from rig.exchange.reading import ImportFailed
 
 RANDOM = np.random.default_rng(4)
 

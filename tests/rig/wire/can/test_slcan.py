@@ -6,8 +6,7 @@ import time
 
 import can
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from rig.errors import DaqBusy, DaqDisconnected, DaqRefused
 from rig.wire.can.frames import FD_LENGTHS, BusTiming, Frame

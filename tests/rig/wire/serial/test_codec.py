@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from rig.errors import DaqRefused
 from rig.wire.messages import VERSION, EmergencyStop, Heartbeat, Output, Readback, Request, Samples, Stream
