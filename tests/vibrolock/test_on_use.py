@@ -49,6 +49,7 @@ def test_a_name_is_looked_up_once():
     figures = import_module("rig.figures")
     vars(figures).pop("View", None)
     get, names, exported = on_use("rig.figures")
-    assert "View" in names() and "View" in exported
+    assert "View" in names()
+    assert "View" in exported
     found = get("View")
     assert vars(figures)["View"] is found
