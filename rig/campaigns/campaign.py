@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from rig.campaigns.evaluation.point import Point
-from rig.campaigns.planning.plan import Column, Plan
+from rig.campaigns.planning.plan import Plan
 from rig.recording.reader import Recording
+from rig.text.column import Column
 
 
 @dataclass(frozen=True, kw_only=True)

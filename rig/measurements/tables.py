@@ -9,10 +9,10 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.planning.plan import Column
 from rig.errors import RecordingError
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
+from rig.text.column import Column
 from rig.text.units import unit_of
 
 if TYPE_CHECKING:

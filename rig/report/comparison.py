@@ -11,7 +11,6 @@ import numpy as np
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.campaigns.planning.plan import Column
 from rig.check.recorded import is_check
 from rig.drawing.style import MAIN, REJECTED, SECOND, title, unit_text
 from rig.models.files.kinds import KINDS
@@ -22,6 +21,7 @@ from rig.report.facts import endings
 from rig.report.pictures import Pictures
 from rig.show.point_table import points_from
 from rig.show.summary import summarise_recording
+from rig.text.column import Column
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

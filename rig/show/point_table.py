@@ -6,8 +6,8 @@ from typing import Any
 from rig.campaigns.evaluation.point import Attempt, Point, point_name
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.campaigns.planning.plan import Column
 from rig.show.progress import value_text
+from rig.text.column import Column
 
 
 def points_from(kind: str, tables: Sequence[Mapping[str, Any]]) -> list[Point[Any]]:

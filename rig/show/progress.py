@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from identification import FitProgress
-    from rig.campaigns.planning.plan import Column
+    from rig.text.column import Column
     from rig.tick.tick import Tick
 
 LOCK_WORDS = ("searching", "acquiring", "locked", "lost")

@@ -44,8 +44,9 @@ from rig.campaigns.evaluation.vibrations import (
     within_periods,
 )
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
+from rig.text.column import Column
 
 NEAR = 0.1  # a point counts as reached within this distance of its final amplitude, as a logarithm
 

@@ -38,9 +38,10 @@ from rig.campaigns.evaluation.recorded_flow import recorded_flow
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import channels_from, measured_with, not_evaluated, vibration_from
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
+from rig.text.column import Column
 
 CONTINUOUS_BACKBONE_COLUMNS = (
     Column("force_n", "force", "N", ".4f", plain=True),

@@ -34,8 +34,9 @@ from rig.campaigns.evaluation.vibrations import (
     within_periods,
 )
 from rig.campaigns.planning.drive_shape import drive_shape
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
+from rig.text.column import Column
 
 _RESIDUAL_ERROR = 0.01  # of the other modes' receptance, by rig tune; twice what it is on the shipped rigs
 _EARLY = 8  # instants of a decay from which its frequency is taken

@@ -19,8 +19,9 @@ from rig.campaigns.evaluation.rows import Rows, turned_rad
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.drive_shape import drive_shape
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
+from rig.text.column import Column
 from rig.text.contents import Contents
 
 DWELL_COLUMNS = (

@@ -9,7 +9,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.point import Purity, Spectrum, Vibration
 from rig.campaigns.evaluation.rows import Rows, mean_of, std_of, stretches
 from rig.campaigns.evaluation.vibrations import quantisation_warnings
-from rig.campaigns.planning.plan import Column
+from rig.text.column import Column
 
 PURITY_COLUMNS = (
     Column("force_purity", "force purity", "%", ".2f", 100.0),

@@ -22,9 +22,10 @@ from rig.campaigns.evaluation.point import Point, Quality, planned_point, result
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.daq import Channel
 from rig.recording.reader import Recording
+from rig.text.column import Column
 
 MULTISINE_COLUMNS = (
     Column("realisation", "realisation", "", ".0f", counts_from=1),

@@ -2,7 +2,7 @@
 
 import math
 from abc import abstractmethod
-from typing import Literal, NamedTuple, Self
+from typing import Literal, Self
 
 import numpy as np
 from pydantic import AliasChoices, Field, model_validator
@@ -48,29 +48,6 @@ class Target(Configured):
 def with_first_repeated(targets: tuple[Target, ...]) -> tuple[Target, ...]:
     """Append the first target once more. It is numbered after the last target, so that all others keep their numbers."""
     return (*targets, targets[0].model_copy(update={"number": len(targets), "repeats_first": True}))
-
-
-class Column(NamedTuple):
-    """A quantity of a point as it is shown in tables and progress lines."""
-
-    key: str
-    """Name of the field of the point or of one of its parts."""
-    heading: str
-    """Heading of the column."""
-    unit: str
-    """Unit as it is shown."""
-    pattern: str
-    """Format of the number."""
-    scale: float = 1.0
-    """Factor from the stored unit to the shown one."""
-    plain: bool = False
-    """Whether progress lines leave out the heading because the unit already identifies the quantity."""
-    in_line: bool = True
-    """Whether progress lines show the column, too."""
-    optional: bool = False
-    """Whether the column is shown only if there is a value."""
-    counts_from: int = 0
-    """Number that a stored 0 is shown as: 1 for numbers that people count from 1."""
 
 
 class Plan(Configured):

@@ -13,8 +13,9 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.campaigns.response_controlled.plan import ResponseControlledPlan
+from rig.text.column import Column
 
 RESPONSE_CONTROLLED_COLUMNS = (
     Column("asked_phase_lag_deg", "lag asked for", "deg", ".0f"),

@@ -15,8 +15,9 @@ from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
 from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.drive_shape import drive_shape
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
+from rig.text.column import Column
 
 STEPPED_PHASE_COLUMNS = (
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),

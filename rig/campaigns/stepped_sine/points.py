@@ -21,8 +21,9 @@ from rig.campaigns.evaluation.point import Point, Quality, planned_point
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
 from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
+from rig.text.column import Column
 
 TRUSTED_NONHARMONIC_FORCE = (
     0.1  # in open loop a larger value causes a warning; plans under a phase lock reject the point

@@ -12,9 +12,10 @@ from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of, to
 from rig.campaigns.evaluation.point import PART, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
-from rig.campaigns.planning.plan import Column, Target
+from rig.campaigns.planning.plan import Target
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.recording.reader import Recording
+from rig.text.column import Column
 from rig.tick.layout import SATURATED
 
 NOT_HELD = 0.05  # of its level: a larger deviation is reported
