@@ -1,5 +1,7 @@
 """The error that this package raises if measurements or models cannot be used as given."""
 
+from vibrolock.errors import InvalidValueError
 
-class IdentificationError(ValueError):
-    """Measurements, a mapping or a model are not usable; the message names the field, its value and what is allowed."""
+
+class IdentificationError(InvalidValueError):
+    """Measurements, a mapping or a model are not usable as given."""

@@ -1,6 +1,6 @@
 """The errors of the bench: a small tree, each with one clear line that says what happened, where, and what to do."""
 
-from rig.text.printable import one_line
+from vibrolock.errors import StatedError
 
 __all__ = [
     "ConfigurationError",
@@ -22,18 +22,12 @@ __all__ = [
 ]
 
 
-class RigError(Exception):
-    """Base class of the errors that are reported to the user; the command line prints each as one line.
-
-    The error's text is this line. It is printable, and shortened in the middle if a file or a device contributed a long text.
-    """
-
-    def __init__(self, *parts: object) -> None:
-        super().__init__(one_line(" ".join(str(part) for part in parts)))
+class RigError(StatedError):
+    """Base class of the errors that are reported to the user; the command line prints each as one line."""
 
 
 class ConfigurationError(RigError):
-    """A bench or plan holds a value that is not allowed; the message names its path, the value and what is allowed."""
+    """A bench, a plan or an option holds a value that is not allowed."""
 
 
 class RecordingError(RigError):

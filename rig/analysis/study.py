@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
-from rig.text.printable import printable
 from simulators.analysis import PeriodicResponses
 from simulators.layout import Flag
+from vibrolock.printable import printable
 from vibrolock.results import Result
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from rig.authoring.schemas import schema_of
 from rig.bench.configuration import read_toml
 from rig.errors import ConfigurationError
 from rig.system.whole_file import whole_file
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 BENCH_OF_DRIVER = "box-bench.toml"
 

@@ -12,7 +12,7 @@ from pydantic import AliasChoices, BaseModel
 from rig.authoring.changes import Loosened, reachable, requirements
 from rig.authoring.draft7 import DRAFT, Schema, draft7, plain
 from rig.errors import ConfigurationError
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 
 def schema_names() -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from rig.bench.configuration import Configured, find_toml, merged, read_toml, sh
 from rig.bench.cross_checks import refuse
 from rig.bench.sensors import with_sensors
 from rig.errors import ConfigurationError
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 HIGHEST_PART = 0.45  # of the sample rate; a phase-locked loop keeps to a quarter of its own accord
 

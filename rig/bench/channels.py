@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from rig.bench.configuration import Configured
 from rig.bench.data_sheet import volts_per_unit
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 UNITS = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}
 """Unit of a channel by its role; a monitor has any."""

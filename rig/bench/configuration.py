@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from rig.bench.vetting import objection_to
 from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
-from rig.text.printable import shown
 from vibrolock.described import Described
+from vibrolock.printable import shown
 
 LARGEST_TOML_BYTES = 1_000_000
 MOST_DOTS = 100  # between two commas of a line: the parser's time grows with the square of the number of a key's parts

@@ -12,7 +12,7 @@ from rig.bench.channels import DATE, check_day
 from rig.bench.configuration import Configured, read_toml, validated
 from rig.bench.data_sheet import volts_per_unit
 from rig.errors import ConfigurationError
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 
 class Sensor(Configured):

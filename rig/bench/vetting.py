@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 from unicodedata import category
 
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 DEEPEST = 16
 """Largest number of nested tables and lists."""

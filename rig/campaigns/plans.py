@@ -9,7 +9,7 @@ from rig.bench.configuration import find_toml, read_toml, shipped_names, validat
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 
 def _folder() -> Path:

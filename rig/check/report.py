@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from rig.text.console import number, print_table
-from rig.text.printable import printable_strings
+from vibrolock.printable import printable_strings
 
 if TYPE_CHECKING:
     from rig.check.assessment import Assessment

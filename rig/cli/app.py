@@ -118,7 +118,7 @@ def main() -> None:
 
 
 def _complain(line: str, status: int) -> int:
-    from rig.text.printable import one_line
+    from vibrolock.printable import one_line
 
     print(f"rig: {one_line(line)}", file=sys.stderr)
     return status

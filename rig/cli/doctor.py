@@ -118,7 +118,7 @@ def _matrix(
 def _show(facts: dict[str, Any], json: bool) -> None:
     """Print what was found of this machine, or of a device."""
     from rig.text.console import print_json
-    from rig.text.printable import printable_strings
+    from vibrolock.printable import printable_strings
 
     if json:
         print_json(facts)

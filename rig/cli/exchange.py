@@ -52,7 +52,7 @@ def export_(
     from rig.exchange.export import export_file
     from rig.exchange.sources import EXPORTS, format_of
     from rig.text.console import print_json
-    from rig.text.printable import printable_strings
+    from vibrolock.printable import printable_strings
 
     format_ = format_of(output, to, "--to", EXPORTS)
     keep_existing([file], output, overwrite)

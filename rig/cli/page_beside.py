@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rig.system.child import child_environment
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 START_S = 20.0
 """Time in which a page must have said where it is, once the run is over."""

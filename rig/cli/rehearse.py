@@ -119,7 +119,7 @@ def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Pa
     from rig.models.rehearse import improve_into, rehearse_into, request_for
     from rig.rehearsal.report import lines, summary
     from rig.text.console import print_json
-    from rig.text.printable import printable_strings
+    from vibrolock.printable import printable_strings
 
     request = request_for(subject)
     with Rehearsing(subject.draws) as listener:

@@ -129,7 +129,7 @@ def _arm_from(arm: bool) -> "Arm":
 
 def ask(request: "ArmingRequest") -> bool:
     """Show what is going to move; return whether the bench's name was typed."""
-    from rig.text.printable import printable
+    from vibrolock.printable import printable
 
     for line in request.lines():
         print(printable(line), file=sys.stderr)

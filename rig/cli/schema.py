@@ -64,7 +64,7 @@ def new(
     """A commented file to begin with, every key explained, and its schema for the editor beside it."""
     from rig.authoring.new_files import new_driver, new_file
     from rig.errors import ConfigurationError
-    from rig.text.printable import shown
+    from vibrolock.printable import shown
 
     if what == "mapping":
         _mapping(files or [], output, format_, overwrite)

@@ -24,7 +24,7 @@ def stop(
     from rig.live.place import base_folder, runs
     from rig.live.reader import left_behind, run_into
     from rig.monitor.coming_down import ComingDown
-    from rig.text.printable import printable
+    from vibrolock.printable import printable
 
     base_folder()  # says what is wrong with it
     if file is None:

@@ -51,10 +51,10 @@ def tune_(
     from rig.rehearsal.report import verdict_in_one_line
     from rig.system.whole_file import whole_file
     from rig.text.console import print_json
-    from rig.text.printable import printable_strings
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import TuningRequest, tune
+    from vibrolock.printable import printable_strings
 
     load_bench(bench)
     request = TuningRequest(

@@ -26,7 +26,7 @@ from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.system.whole_file import whole_file
 from rig.text.contents import Contents
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 DATA = ("results", "time")
 """Choices of data to take from a recording."""

@@ -9,7 +9,7 @@ from rig.errors import ConfigurationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.mat import read_mat, structures_of_ours
 from rig.exchange.sources import format_of, read_data
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 if TYPE_CHECKING:
     from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra

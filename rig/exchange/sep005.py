@@ -11,7 +11,7 @@ from identification.errors import IdentificationError
 from identification.mapping.units import si_of
 from rig.exchange.child_reading import ImportFailed
 from rig.system.text_files import read_text
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 _LARGEST_JSON_BYTES = 500_000_000
 _HIGHEST_HZ = 1e100  # of any number

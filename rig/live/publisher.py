@@ -23,8 +23,8 @@ from rig.live.stopping import heeding
 from rig.live.time_left import time_left_s
 from rig.loop.loop import RunningLoop
 from rig.recording.jsontext import encode
-from rig.text.printable import error_text
 from rig.tick.layout import recorded_row
+from vibrolock.printable import error_text
 
 FRAMES_PER_S = 30.0
 LATENESS_S = 1.0

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rig.errors import RecordingError
 from rig.live.place import STOP
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 LOOK_S = 0.05
 LONGEST = 300

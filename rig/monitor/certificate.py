@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rig.errors import ConfigurationError
 from rig.live.place import base_folder
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 VALID_D = 30
 EARLIER_D = 1  # the phone's clock may be behind

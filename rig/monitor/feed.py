@@ -25,7 +25,7 @@ import numpy as np
 from rig.live.layout import bin_dtype
 from rig.live.reader import View
 from rig.monitor.shown import as_json, shown_bins, shown_frame, shown_line
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 TICK_S = 1.0 / 15.0
 STILL_S = 0.25

@@ -16,7 +16,7 @@ from rig.recording.journal import journal_path
 from rig.recording.journal_blocks import read_journal
 from rig.recording.layout import kind_in, open_unchecked, reading
 from rig.system.child import confine
-from rig.text.printable import one_line, printable
+from vibrolock.printable import one_line, printable
 
 
 def _kinds(paths: list[Path]) -> bytes:

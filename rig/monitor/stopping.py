@@ -6,7 +6,7 @@ from collections.abc import Callable
 from rig.live.reader import View
 from rig.monitor.feed import Moment
 from rig.monitor.plain_pages import HARDWARE
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 SILENT_S = 2.0
 REST_S = 10.0

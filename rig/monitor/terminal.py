@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rig.monitor.words import duration, event_text, figure, point_cells, point_headings, share_word
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 STALE_S = 0.7  # with the time between two drawings, stale data is grey within one second
 WIDE, LEFT = 120, 62

@@ -9,7 +9,7 @@ from typing import Any
 from rig.live.reader import View
 from rig.monitor.shown import shown_frame
 from rig.monitor.words import event_text, point_text, state_text
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 LOOK_S = 0.1
 DRAWINGS_PER_S = 5.0

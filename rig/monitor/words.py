@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rig.text.console import number
-from rig.text.printable import one_line, printable
+from vibrolock.printable import one_line, printable
 
 CLOSE = 0.8
 

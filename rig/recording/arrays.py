@@ -13,7 +13,7 @@ from rig.recording.journal import journal_path
 from rig.recording.journal_blocks import read_journal
 from rig.recording.layout import identify, kind_in, new_file, open_file, reading
 from rig.recording.tables import StoredTexts, write_object
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
 _COMPRESSED_FROM_BYTES = 65536

@@ -13,7 +13,7 @@ from rig.recording.header import FORMAT, SCHEMA, check_schema
 from rig.recording.integrity import append_trailer, integrity_of
 from rig.system.locking import synchronise_folder
 from rig.system.whole_file import beginning
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _CACHE_BYTES = 2**20  # of each dataset: chunks are written whole and once

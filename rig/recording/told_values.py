@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rig.errors import RecordingError
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 LARGEST_NUMBER = 1e100
 """A finite number beyond it is no measurement; its square could be no number any more."""

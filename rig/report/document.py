@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from rig.text.console import PrintedTable
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
 _DIGIT = re.compile(r"\d")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.text.console import number
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 if TYPE_CHECKING:
     import numpy as np

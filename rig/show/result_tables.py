@@ -27,10 +27,10 @@ from rig.recording.reader import Recording
 from rig.show.summary import summarise_recording
 from rig.show.tables import print_findings, print_points
 from rig.text.console import number, print_table
-from rig.text.printable import printable_strings
 from rig.tuning import Tuning
 from rig.tuning.report import lines, summary
 from simulators.analysis import PeriodicResponses
+from vibrolock.printable import printable_strings
 
 
 def say_recording(recording: Recording) -> None:

@@ -15,7 +15,7 @@ from rig.show.point_table import attempts_refused, point_rows, points_from, show
 from rig.text.console import number, print_table
 from rig.text.disorder import LATE_BLOCKS, LATE_FRAMES, OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, disorder_text
 from rig.text.message_pages import where_explained
-from rig.text.printable import printable, printable_strings
+from vibrolock.printable import printable, printable_strings
 
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rig.errors import RecordingError, RigError
 from rig.system.locking import synchronise_folder
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 
 def beginning(path: Path) -> Path:

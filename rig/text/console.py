@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rig.text.printable import printable
+from vibrolock.printable import printable
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from rig.campaigns.evaluation.point import ARRAY, PAIRS, PART, Point, Quality
 from rig.errors import RecordingError
-from rig.text.printable import shown
+from vibrolock.printable import shown
 
 Result = TypeVar("Result")
 

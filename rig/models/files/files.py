@@ -12,7 +12,7 @@ from rig.errors import RecordingError
 from rig.models.files.kind import FileKind
 from rig.models.files.kinds import KINDS, kind_of_file_for
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
-from rig.text.printable import error_text
+from vibrolock.printable import error_text
 
 _MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rig.text.printable import one_line
 from tests.reliability.mutations.configurations import compiled, judge, spoilt_configurations
 from tests.reliability.mutations.files import FILE_OUTCOMES, contents_of, judge_file, originals, spoilt_files
 from tests.reliability.mutations.judging import Verdict
+from vibrolock.printable import one_line
 
 OUTCOMES = ("refused", "accepted", "misbehaved")
 

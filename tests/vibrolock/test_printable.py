@@ -9,7 +9,7 @@ from rig.errors import ConfigurationError, DaqError
 from rig.show.progress import RunProgress
 from rig.show.tables import print_summary
 from rig.text.console import print_table
-from rig.text.printable import LONGEST_LINE, one_line, printable, shown
+from vibrolock.printable import LONGEST_LINE, one_line, printable, shown
 
 
 def test_control_and_direction_characters_are_shown_by_their_escape():
