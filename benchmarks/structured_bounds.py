@@ -18,8 +18,8 @@ from scipy.signal import lfilter
 
 from identification import StructuredModel, bound_of
 from identification.structured.bound import Bound
-from rig.models.files.files import load
-from rig.models.files.structured import IdentifiedStructured
+from rig.results.files import load
+from rig.results.structured.kind import IdentifiedStructured
 from vibrolock.arrays import Float
 
 HUNDRED, LEVELS, DECAYS = 100.0, 40, 12.0

@@ -17,9 +17,9 @@ from rig.bench.user_code import refuse_code
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
 from rig.measurements import bench_of_recording
-from rig.models.files.files import load_as
-from rig.models.files.structured import STRUCTURED, functions_of
 from rig.recording.reader import Recording
+from rig.results.files import load_as
+from rig.results.structured.kind import STRUCTURED, functions_of
 from vibrolock.arrays import Float
 
 _FAITHFUL = 1e-6

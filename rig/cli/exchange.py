@@ -25,7 +25,7 @@ def import_(
     """Bring in measurements, time data and modes from elsewhere."""
     from rig.exchange.reading import import_file
     from rig.exchange.time_data import TimeData, records_of_series
-    from rig.models.files.files import save
+    from rig.results.files import save
 
     keep_existing([file], output, overwrite)
     found = import_file(file, format_, mapping, units=units, drive=drive, item=item)

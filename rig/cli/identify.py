@@ -194,13 +194,13 @@ def identify(
     json: Json = False,
 ) -> None:
     """Turn recordings into a model."""
-    from rig.models.files.files import save
-    from rig.models.identify.data_request import DataOptions
-    from rig.models.identify.decay_request import DecayOptions
-    from rig.models.identify.identify import identify_model
-    from rig.models.identify.pnlss_request import PnlssOptions
-    from rig.models.identify.request import Request
-    from rig.models.identify.structured_request import StructuredOptions
+    from rig.results.decay_backbone.options import DecayOptions
+    from rig.results.files import save
+    from rig.results.identify import identify_model
+    from rig.results.identify_request import Request
+    from rig.results.pnlss.options import PnlssOptions
+    from rig.results.simulated.options import DataOptions
+    from rig.results.structured.options import StructuredOptions
     from rig.show.progress import FitLines
     from rig.system.stop_signals import insisting
 

@@ -45,7 +45,7 @@ def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> Non
 
 def show_file(path: Path, json: bool) -> None:
     """Print the contents of a file."""
-    from rig.models.files.files import understood
+    from rig.results.files import understood
     from rig.show.summary import summarise
     from rig.show.tables import print_summary
     from rig.text.console import print_json

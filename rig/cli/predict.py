@@ -114,9 +114,9 @@ def predict(
     json: Json = False,
 ) -> None:
     """Predict vibrations with a model, and compare them with recordings."""
-    from rig.models.files.files import save
-    from rig.models.predict.predict import predict_vibrations
-    from rig.models.predict.request import PredictionRequest
+    from rig.results.files import save
+    from rig.results.predict import predict_vibrations
+    from rig.results.predictions.request import PredictionRequest
 
     given = (model, exciter, modes, *(sweeps or ()), *(multisines or ()), *(references or ()))
     keep_existing([path for path in given if path is not None], output, overwrite)

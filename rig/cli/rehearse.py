@@ -10,8 +10,8 @@ import typer
 from rig.cli.options import Json, Overwrite, keep_existing
 
 if TYPE_CHECKING:
-    from rig.models.rehearse import Listener, Subject
     from rig.rehearsal.comparison import Comparison
+    from rig.results.rehearsal.rehearse import Listener, Subject
 
 
 def rehearse_(
@@ -47,7 +47,7 @@ def rehearse_(
 ) -> None:
     """Run a plan on virtual twins of a bench: how probably it ends well, trips, or loses the lock, and what would help."""
     from rig.errors import ConfigurationError
-    from rig.models.rehearse import Subject
+    from rig.results.rehearsal.rehearse import Subject
 
     if compare is not None:
         _compare(Path(plan), compare, json)
@@ -81,7 +81,7 @@ def _plan_and_bench(plan: str, bench: str | None) -> tuple[Any, Any]:
 
 def _write_twin(subject: "Subject", number: int, output: Path, overwrite: bool) -> None:
     from rig.errors import ConfigurationError
-    from rig.models.rehearse import request_for, twin_into
+    from rig.results.rehearsal.rehearse import request_for, twin_into
 
     if output.suffix != ".toml":
         raise ConfigurationError(f"-o {output}: benches are written as .toml")
@@ -116,8 +116,8 @@ def _check_outputs(
 
 def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Path | None, how: dict[str, Any]) -> None:
     from rig.figures.files import plot
-    from rig.models.rehearse import improve_into, rehearse_into, request_for
     from rig.rehearsal.report import lines, summary
+    from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
     from rig.text.console import print_json
     from vibrolock.printable import printable_strings
 
@@ -163,7 +163,7 @@ class Rehearsing:
         self.task = self.bar.add_task("rehearsing", total=total)
 
     def __enter__(self) -> "Listener":
-        from rig.models.rehearse import Listener
+        from rig.results.rehearsal.rehearse import Listener
 
         self.bar.start()
         return Listener(self.draw, self.effect)
@@ -190,7 +190,7 @@ class Rehearsing:
 
 
 def _compare(rehearsal: Path, recording: Path, json: bool) -> None:
-    from rig.models.rehearse import compare_with, load_rehearsal
+    from rig.results.rehearsal.rehearse import compare_with, load_rehearsal
     from rig.text.console import print_json
 
     found = compare_with(load_rehearsal(rehearsal), recording)

@@ -92,8 +92,8 @@ def tune_(
 def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> dict[str, Any]:
     """Rehearse the plan on twins of what was measured, write its verdict above the plan, and return the summary."""
     from rig.cli.rehearse import Rehearsing
-    from rig.models.rehearse import Subject, rehearse_into, request_for
     from rig.rehearsal.report import summary, verdict_in_one_line
+    from rig.results.rehearsal.rehearse import Subject, rehearse_into, request_for
     from rig.system.whole_file import whole_file
 
     subject = Subject(plan=found.plan, bench=found.bench, sources=[recording], draws=draws)

@@ -19,11 +19,11 @@ from rig.exchange.mat import write_mat
 from rig.exchange.time_data import TimeData, series_of_records
 from rig.exchange.uff.writing import write_uff
 from rig.measurements import bench_of_recording, point_rows
-from rig.models.files.files import load
-from rig.models.files.force_surface import MeasuredSurface
-from rig.models.files.simulated import SimulatedModel
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
+from rig.results.files import load
+from rig.results.force_surface.kind import MeasuredSurface
+from rig.results.simulated.model import SimulatedModel
 from rig.system.whole_file import whole_file
 from rig.text.contents import Contents
 from vibrolock.printable import shown

@@ -30,13 +30,13 @@ from rig.drawing.folding import folds_back
 from rig.drawing.style import unit_text
 from rig.errors import RecordingError
 from rig.figures.curves import Curves, Line, Panel, Quantity, Trace, View, channel_of, peak
-from rig.models.files.files import load
-from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
+from rig.results.files import load
+from rig.results.kinds import KINDS
 
 if TYPE_CHECKING:
-    from rig.models.files.structured import IdentifiedStructured
+    from rig.results.structured.kind import IdentifiedStructured
 
 FREQUENCY = Quantity("frequency", "Hz", "frequency")
 LAG = Quantity("phase lag of displacement", "deg")
@@ -131,7 +131,7 @@ def _modes(
 def _structured_mode(source: "IdentifiedStructured") -> NonlinearMode:
     """Return the nonlinear mode of a structured model; refuse code that the model names."""
     from identification import structured_mode  # a second, which other files need not wait for
-    from rig.models.files.structured import functions_of
+    from rig.results.structured.kind import functions_of
 
     if functions := functions_of(source.model):
         raise RecordingError(f"names a function, {functions[0]}, which is not imported to draw; use structured_mode")

@@ -15,10 +15,10 @@ from rig.errors import RecordingError
 from rig.figures.curves import View
 from rig.figures.lateness import draw_lateness
 from rig.figures.overlay import overlay
-from rig.models.files.files import load, understood
-from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
+from rig.results.files import load, understood
+from rig.results.kinds import KINDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

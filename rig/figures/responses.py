@@ -17,8 +17,8 @@ from identification import (
 from identification.channels import MOTION_UNIT
 from rig.drawing.style import MAIN, REJECTED, SECOND, shade, title, unit_text
 from rig.figures.axes import branches, length_factor
-from rig.models.files.frequency_responses_figure import draw_responses
-from rig.models.files.predictions_figure import draw_predictions
+from rig.results.frequency_responses.figure import draw_responses
+from rig.results.predictions.figure import draw_predictions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from identification import FrequencyResponse
 from rig.drawing.style import STYLE, page_in
 from rig.figures.files import drawing_of
-from rig.models.files.kinds import as_kept, kind_of_file_for
 from rig.recording.reader import Recording
+from rig.results.kinds import as_kept, kind_of_file_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ RESULTS = {
     "Tuning": ResultFigure("rig.tuning.figure:draw_on", (11.0, 6.8)),
     "Assessment": ResultFigure("rig.check.figure:draw_check", (9.0, 6.4)),
 }
-"""By the name of the type: results that no file of ours holds. For others see `rig.models.files.kinds`."""
+"""By the name of the type: results that no file of ours holds. For others see `rig.results.kinds`."""
 
 
 def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Any) -> "tuple[Axes, ...]":

@@ -25,7 +25,7 @@ def _kinds(paths: list[Path]) -> bytes:
 
 def _kind(path: Path) -> dict[str, str]:
     """Return kind and a few words. The file is not checked from end to end: in here a damaged one may do what it likes."""
-    from rig.models.files.kinds import KINDS
+    from rig.results.kinds import KINDS
 
     try:
         if not path.exists():
@@ -52,7 +52,7 @@ def _figure(path: Path) -> bytes:
 
 
 def _table(path: Path) -> bytes:
-    from rig.models.files.files import understood
+    from rig.results.files import understood
     from rig.show.summary import summarise
     from rig.show.tables import print_summary
 

@@ -13,12 +13,12 @@ from rig.campaigns.evaluation.stored_point import value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
 from rig.drawing.style import MAIN, REJECTED, SECOND, title, unit_text
-from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.report.document import Chapter, Section, Table
 from rig.report.facts import endings
 from rig.report.pictures import Pictures
+from rig.results.kinds import KINDS
 from rig.show.point_table import points_from
 from rig.show.summary import summarise_recording
 from rig.text.column import Column

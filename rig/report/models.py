@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from rig.models.files.files import understood
-from rig.models.files.kinds import KINDS
 from rig.report.document import Chapter, Facts, Section, Text, blocks_of
 from rig.report.files import table_of_files
 from rig.report.pictures import Pictures
+from rig.results.files import understood
+from rig.results.kinds import KINDS
 from rig.show.summary import summarise
 from rig.text.console import collected
 

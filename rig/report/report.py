@@ -7,8 +7,6 @@ from importlib import resources
 from pathlib import Path
 
 from rig.errors import RecordingError
-from rig.models.files.files import understood
-from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.report.comparison import comparisons
 from rig.report.document import Chapter, typeset
@@ -16,6 +14,8 @@ from rig.report.models import model_chapter
 from rig.report.pictures import Pictures
 from rig.report.recordings import recording_chapter
 from rig.report.study import study_chapters
+from rig.results.files import understood
+from rig.results.kinds import KINDS
 from rig.system.whole_file import whole_file
 from vibrolock import __version__
 

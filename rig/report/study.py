@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
-from rig.models.files.files import understood
 from rig.report.document import Block, Chapter, Facts, Picture, Section, Table, Text
 from rig.report.files import table_of_files
 from rig.report.paper import SAME_LEVEL, agreement
+from rig.results.files import understood
 from rig.system.text_files import read_bytes, read_text
 from rig.text.console import number
 

@@ -25,14 +25,14 @@ from identification import (
 from identification.structured.laws import Law
 from rig.errors import RecordingError
 from rig.measurements import response_matrices
-from rig.models.files.files import load_as, save
-from rig.models.files.pnlss import PNLSS, IdentifiedPnlss
-from rig.models.files.structured import STRUCTURED, IdentifiedStructured
-from rig.models.identify.data_fingerprints import uses_of
 from rig.recording.reader import Recording
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded
+from rig.results.files import load_as, save
+from rig.results.pnlss.kind import PNLSS, IdentifiedPnlss
+from rig.results.simulated.data_fingerprints import uses_of
+from rig.results.structured.kind import STRUCTURED, IdentifiedStructured
 
 _CHOOSES = 3
 """Every third of the experiments besides the multisines is not fitted; together with the held-out multisines it chooses the

@@ -7,10 +7,10 @@ from typing import Any
 
 from identification.pnlss.error_table import SAME_LEVEL
 from rig.errors import RecordingError
-from rig.models.files.predictions import CUT
 from rig.reproduce.folder import write_json
 from rig.reproduce.options import Options
 from rig.reproduce.study import Study
+from rig.results.predictions.kind import CUT
 from rig.system.text_files import read_text
 from rig.text.console import number, print_table
 

@@ -11,10 +11,10 @@ from identification import (
     IdentificationError,
     SteadyPrediction,
 )
-from rig.models.predict.driven_models import DrivenModel, frequency_response_at
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.true_responses import Truth, truths
+from rig.results.simulated.driven_models import DrivenModel, frequency_response_at
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from typing import Any
 
 from identification import ErrorTable, Experiment, IdentificationError, PnlssModel, StructuredModel
 from identification.scatter.own_model import OwnModel
-from rig.models.files.simulated import rows_of_scatter
 from rig.reproduce.folder import prepare
 from rig.reproduce.identified import Models, identify_all
 from rig.reproduce.options import Options
@@ -14,6 +13,7 @@ from rig.reproduce.recordings import multisines, segments
 from rig.reproduce.steady import Steady, steady
 from rig.reproduce.sweeps import SweepResult, simulated_sweeps
 from rig.reproduce.true_responses import Truth
+from rig.results.simulated.model import rows_of_scatter
 
 VARIANTS: dict[str, dict[str, Callable[[Any], PnlssModel | StructuredModel | None]]] = {
     "pnlss": {

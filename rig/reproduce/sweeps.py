@@ -12,10 +12,10 @@ from identification.channels import find_role
 from identification.pnlss.simulators import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
-from rig.models.predict.driven_models import DrivenModel, coupled_run
 from rig.reproduce.exciter import exciter_of
 from rig.reproduce.options import Options
 from rig.reproduce.recordings import recorded, training_data
+from rig.results.simulated.driven_models import DrivenModel, coupled_run
 
 COUPLED = "voltage, exciter coupled"
 _LOWEST = 0.8

@@ -22,8 +22,8 @@ from identification import (
 from rig.check import report as checks
 from rig.check.assessment import Assessment
 from rig.figures.responses import as_predictions
-from rig.models.files.predictions import PREDICTIONS
 from rig.recording.reader import Recording
+from rig.results.predictions.kind import PREDICTIONS
 from rig.show.summary import summarise_recording
 from rig.show.tables import print_findings, print_points
 from rig.text.console import number, print_table

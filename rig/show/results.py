@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from rig.models.files.kinds import as_kept, kind_of_file_for
 from rig.recording.reader import Recording
+from rig.results.kinds import as_kept, kind_of_file_for
 from rig.show import result_tables
 from rig.text.console import PrintedTable, collected, print_table
 

@@ -16,13 +16,13 @@ from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
 from rig.check.recorded import is_check
 from rig.check.report import summary
-from rig.models.files.files import load, understood
-from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 from rig.rehearsal.comparison import compared
+from rig.results.files import load, understood
+from rig.results.kinds import KINDS
 from rig.text.message_pages import page_of
 from rig.tick.safety.layout import EndReason
 

@@ -8,8 +8,8 @@ from rig.arming.run_facts import About, user_name
 from rig.campaigns.evaluation.point import point_name
 from rig.check.report import say
 from rig.daq import CONTINUED
-from rig.models.files.kinds import KINDS
 from rig.recording.integrity import VERIFIED
+from rig.results.kinds import KINDS
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
 from rig.text.console import number, print_table

@@ -120,7 +120,7 @@ def test_a_page_selects_no_test_of_the_libraries(project):
     [
         "tests.conftest, tests.controller.test_pll",
         "tests.conftest, tests.identification.decays.test_result",
-        "tests.conftest, tests.rig.models.conftest, tests.rig.models.test_predict",
+        "tests.conftest, tests.rig.results.conftest, tests.rig.results.test_predict",
     ],
 )
 def test_all_that_a_test_file_imports_is_known(project, modules):

@@ -10,7 +10,7 @@ from identification.nonlinear.nonlinear_modes import STANDARD_ERRORS
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
-from rig.models.files import files
+from rig.results import files
 from tests.docs.pages import ROOT
 from tests.recorded import recorded_run
 

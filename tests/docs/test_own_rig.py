@@ -11,7 +11,7 @@ import pytest
 
 from rig.bench import load_bench
 from rig.drivers import make_daq
-from rig.models.files.files import load
+from rig.results.files import load
 from rig.tick.layout import DEVICE_SHIFT
 from simulators.analysis import phase_resonance_backbone
 from simulators.layout import Flag

@@ -7,8 +7,8 @@ says how often it would end well, trip, or miss points.
 """
 
 import rig
-from rig.models.rehearse import Subject, request_for
 from rig.rehearsal.rehearsal import rehearse
+from rig.results.rehearsal.rehearse import Subject, request_for
 
 bench = rig.load_bench("magnet-beam")
 plan = rig.load_plan("magnet-beam/continuous-backbone")  # which says what is known of the plant

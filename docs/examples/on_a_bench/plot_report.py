@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 
 import identification
 import rig
-from rig.models.files.files import save
 from rig.report.report import write_report
+from rig.results.files import save
 
 with TemporaryDirectory() as folder:
     recording, model, page = (Path(folder) / name for name in ("backbone.h5", "model.h5", "report.html"))

@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
-from rig.models.files.files import save
 from rig.reproduce.folder import begin, write_json
 from rig.reproduce.references.data import DataSet
 from rig.reproduce.references.figure import draw_reference
 from rig.reproduce.references.result import OURS, Line, StudyResult
+from rig.results.files import save
 from rig.text.console import number, print_table
 
 RESULTS = "reference.json"

@@ -12,7 +12,6 @@ from identification import Channel, LinearModes
 from rig.errors import RigError
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
-from rig.models.files.files import load, save
 from rig.recording.arrays import read_arrays
 from rig.recording.conversion import finalise
 from rig.recording.integrity import VERIFIED
@@ -20,6 +19,7 @@ from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.recording.layout import file_integrity
 from rig.recording.reader import Recording
+from rig.results.files import load, save
 from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.reliability.mutations.judging import Verdict, judged
 from tests.rig.recording.samples import fill, header

@@ -14,7 +14,7 @@ from rig.bench.cross_checks import cautions
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
-from rig.models.files.files import save
+from rig.results.files import save
 from simulators.analysis import phase_resonance_backbone
 from simulators.simulation import Simulation
 from tests.identification.structured.models import beam

@@ -5,13 +5,13 @@ import pytest
 from rig.arming.run_options import RunOptions
 from rig.cli.app import app
 from rig.cli.flags import flags, with_flags
-from rig.models.identify.data_request import DataOptions
-from rig.models.identify.decay_request import DecayOptions
-from rig.models.identify.pnlss_request import PnlssOptions
-from rig.models.identify.request import Request
-from rig.models.identify.structured_request import StructuredOptions
-from rig.models.predict.request import PredictionRequest
 from rig.reproduce.options import Options
+from rig.results.decay_backbone.options import DecayOptions
+from rig.results.identify_request import Request
+from rig.results.pnlss.options import PnlssOptions
+from rig.results.predictions.request import PredictionRequest
+from rig.results.simulated.options import DataOptions
+from rig.results.structured.options import StructuredOptions
 from rig.tuning import TuningRequest
 
 FILLED_OTHERWISE = {"pnlss", "structured", "decay", "data", "specimen", "folder", "progress", "about"}

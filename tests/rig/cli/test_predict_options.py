@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rig.errors import ConfigurationError
-from rig.models.predict.request import PredictionRequest
+from rig.results.predictions.request import PredictionRequest
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def asked(command, monkeypatch):
         requests.append((model, request))
         raise ConfigurationError("noted")
 
-    monkeypatch.setattr("rig.models.predict.predict.predict_vibrations", note)
+    monkeypatch.setattr("rig.results.predict.predict_vibrations", note)
 
     def of(options):
         ended = command(f"predict MODEL.h5 -o P.h5 --frequency-response 0.25 {options}")

@@ -15,7 +15,7 @@ from identification import FrequencyResponseMatrix, ModalAnalysis, nonlinear_mod
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file
-from rig.models.files.files import load, save
+from rig.results.files import load, save
 
 
 def test_a_backbone_goes_to_mat_as_a_structure_with_units(command, backbone_file, backbone, tmp_path):

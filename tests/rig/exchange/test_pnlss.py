@@ -12,7 +12,7 @@ from rig.errors import RecordingError
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
-from rig.models.files.files import load, save
+from rig.results.files import load, save
 
 FORCE, DRIVE, TIP = Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m")
 MAPPING = """

@@ -10,7 +10,7 @@ from rig.errors import RecordingError
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file
-from rig.models.files.files import save
+from rig.results.files import save
 from tests.rig.exchange.structured_models import structure
 
 

@@ -8,8 +8,8 @@ import pytest
 from rig.cli.options import show_file
 from rig.errors import RecordingError
 from rig.figures.files import plot
-from rig.models.files.files import load, save
 from rig.recording.arrays import read_arrays, write_arrays
+from rig.results.files import load, save
 
 WRONG_ARRAYS = {
     "text": lambda values: np.full(values.shape, "x"),
@@ -60,7 +60,7 @@ def test_whatever_is_wrong_in_a_model_showing_it_works_or_says_so_in_one_line(st
     path = tmp_path / "wrong.h5"
     refused = 0
     for arrays, attributes in variants(stored):
-        monkeypatch.setattr("rig.models.files.files.read_arrays", lambda _, a=arrays, b=attributes: (stored[0], a, b))
+        monkeypatch.setattr("rig.results.files.read_arrays", lambda _, a=arrays, b=attributes: (stored[0], a, b))
         monkeypatch.setattr("rig.show.summary.kind_of", lambda _: stored[0])
         monkeypatch.setattr("rig.show.summary.file_integrity", lambda _: "verified")
         with np.errstate(all="ignore"):

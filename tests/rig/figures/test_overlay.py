@@ -11,10 +11,10 @@ from rig.errors import RecordingError
 from rig.figures.curves import View
 from rig.figures.files import plot
 from rig.figures.overlay import overlay
-from rig.models.files.files import save
-from rig.models.identify.identify import identify_model
-from rig.models.identify.request import Request
 from rig.recording.reader import Recording
+from rig.results.files import save
+from rig.results.identify import identify_model
+from rig.results.identify_request import Request
 from rig.show.summary import summarise
 from tests.rig.figures.conftest import texts
 

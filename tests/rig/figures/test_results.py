@@ -20,8 +20,8 @@ from identification import (
 )
 from rig import figures
 from rig.figures.results import RESULTS
-from rig.models.files.files import save
-from rig.models.files.kinds import KINDS
+from rig.results.files import save
+from rig.results.kinds import KINDS
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
 from tests.identification.rigs import CHANNELS, one_mode_point

@@ -165,7 +165,7 @@ def test_a_recording_whose_json_lacks_what_is_shown_is_refused_in_one_line(tmp_p
 @pytest.fixture
 def shown_model(tmp_path):
     from identification import FrequencyResponse
-    from rig.models.files.files import save
+    from rig.results.files import save
 
     path = tmp_path / "SHOWN.h5"
     hz = np.array([23.0, 24.0, 25.0])

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rig.campaigns.plans import load_plan
-from rig.models.rehearse import load_rehearsal
+from rig.results.rehearsal.rehearse import load_rehearsal
 from tests.rig.rehearsal.plans import SHORT_TEXT
 
 

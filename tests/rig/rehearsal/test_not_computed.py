@@ -8,12 +8,12 @@ import pytest
 from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
-from rig.models.rehearse import Subject, request_for
 from rig.rehearsal.foreseen import rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.report import lines, summary, verdict_in_one_line
 from rig.rehearsal.truth import NOT_BALANCED
 from rig.rehearsal.verdict import Share, verdict_of
+from rig.results.rehearsal.rehearse import Subject, request_for
 from simulators.ensemble import VariantError
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
 from tests.rig.rehearsal.plans import SHORT, magnet_beam

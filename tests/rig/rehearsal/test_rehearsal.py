@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rig.errors import ConfigurationError, RecordingError
-from rig.models.files.files import load, save
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
+from rig.results.files import load, save
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
 from tests.rig.rehearsal.plans import SHORT, magnet_beam
 

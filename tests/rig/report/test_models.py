@@ -6,11 +6,11 @@ import shutil
 
 import pytest
 
-from rig.models.files.files import save
-from rig.models.files.kinds import KINDS
 from rig.recording.arrays import kind_of
 from rig.report.paper import SAME_LEVEL, PaperError, agreement
 from rig.report.report import write_report
+from rig.results.files import save
+from rig.results.kinds import KINDS
 from rig.show.summary import summarise
 from rig.text.console import PrintedTable, collected
 from tests.command import run_command

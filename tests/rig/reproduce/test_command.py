@@ -10,13 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 
 from rig.bench import load_bench
-from rig.models.files.files import load
-from rig.models.files.pnlss import IdentifiedPnlss
-from rig.models.files.pnlss_figure import draw_pnlss
 from rig.reproduce.options import Options
 from rig.reproduce.specimens import specimen_of
 from rig.reproduce.steady import steady
 from rig.reproduce.sweeps import COUPLED, simulated_sweeps
+from rig.results.files import load
+from rig.results.pnlss.figure import draw_pnlss
+from rig.results.pnlss.kind import IdentifiedPnlss
 from simulators.analysis import constant_force_response
 from simulators.virtual_rig import VirtualRig
 from tests.command import run_command

@@ -11,8 +11,8 @@ from identification import nonlinear_mode
 from rig.bench import Bench
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
 from rig.campaigns.plans import plan_from
-from rig.models.files.files import load
 from rig.recording.reader import Recording
+from rig.results.files import load
 from rig.show.summary import summarise_recording
 from rig.tuning import tune
 from simulators.analysis import phase_resonance_backbone

@@ -17,8 +17,8 @@ from identification import (
     pnlss_response,
     pnlss_steady_state,
 )
-from rig.models.files.predictions import PREDICTIONS
-from rig.models.files.predictions_figure import draw_predictions
+from rig.results.predictions.figure import draw_predictions
+from rig.results.predictions.kind import PREDICTIONS
 from tests.identification.pnlss.steady.oscillators import HZ, oscillator, shaker
 
 CUBIC, FORCE_N = 6e8, 1.2

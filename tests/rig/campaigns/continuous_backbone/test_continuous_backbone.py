@@ -16,8 +16,8 @@ from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
 from rig.figures.files import plot
 from rig.measurements import continuous_backbones
-from rig.models.identify.identify import identify_model
-from rig.models.identify.request import Request
+from rig.results.identify import identify_model
+from rig.results.identify_request import Request
 from rig.show.summary import summarise
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 from simulators.analysis import phase_resonance_backbone

@@ -189,16 +189,16 @@ def test_a_plan_without_a_measured_plant_is_refused_before_anything_moves():
 
 
 def test_a_decay_becomes_a_model_of_a_file(magnet, tmp_path):
-    from rig.models.files.files import load
-    from rig.models.identify.identify import identify_model
-    from rig.models.identify.request import Request
+    from rig.results.files import load
+    from rig.results.identify import identify_model
+    from rig.results.identify_request import Request
 
     with pytest.raises(ConfigurationError, match="a decay campaign knows it from its plan"):
         identify_model([magnet.path], Request(kind="decay", near="24"))
     found = identify_model([magnet.path], Request(kind="decay"))
     assert isinstance(found, DecayBackbone)
     assert found.mode().amplitude_m[0] == pytest.approx(decays(magnet)[1].mode().amplitude_m[0])
-    from rig.models.files.files import save
+    from rig.results.files import save
 
     save(found, tmp_path / "decay.h5")
     assert load(tmp_path / "decay.h5").mode().table() == found.mode().table()

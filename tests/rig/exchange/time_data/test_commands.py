@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from rig.models.files.files import load, save
+from rig.results.files import load, save
 from tests.identification.time_data.test_time_data import F0, ZETA, multisines
 
 RATE_HZ, SIZE, SETTLING, PERIODS = 512.0, 512, 6, 2

@@ -10,10 +10,10 @@ import pytest
 
 from identification import FitSettings, pnlss_errors
 from rig.errors import ConfigurationError, RecordingError
-from rig.models.files.files import load
 from rig.reproduce.references import bouc_wen, silverbox
 from rig.reproduce.references.data import found
 from rig.reproduce.references.studies import STUDIES
+from rig.results.files import load
 from tests.command import run_command
 
 

@@ -1,1 +1,0 @@
-"""Models, predictions and imported measurements: their files, and their identification from recordings."""

@@ -1,1 +1,0 @@
-"""Files of models, predictions and imported measurements: one description per kind."""

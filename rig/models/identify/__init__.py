@@ -1,1 +1,0 @@
-"""Identify models from recordings."""

@@ -1,1 +1,0 @@
-"""Predictions by models, compared with recordings."""

@@ -1,0 +1,1 @@
+"""Models, predictions and imported measurements: one folder for each kind of result."""

@@ -1,0 +1,1 @@
+"""Decays: modal frequency and damping over the amplitude."""

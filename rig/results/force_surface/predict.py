@@ -1,0 +1,128 @@
+"""Predictions of frequency responses at constant force, cut from a force surface."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification import (
+    ConstantForceCurve,
+    FrequencyResponse,
+    Predictions,
+    ResponseBand,
+    SteadyPrediction,
+    compare,
+)
+from rig.errors import ConfigurationError, RecordingError
+from rig.results.force_surface.kind import MeasuredSurface
+from rig.results.predictions.request import PredictionRequest
+
+_INTERVAL = 1.96
+
+
+def surface_predictions(
+    measured: MeasuredSurface, request: PredictionRequest, references: Sequence[FrequencyResponse]
+) -> Predictions:
+    """Return the curves at the requested forces and at those of ``references``, with errors over the phase.
+
+    The frequency is not suitable for the comparison: where a curve ends at the lowest level, points of the branch beyond have
+    no counterpart. Raises `ConfigurationError` for requests that a force surface cannot answer, `RecordingError` for references
+    whose fundamental force was not held, `identification.IdentificationError` for forces beyond the measured levels.
+    """
+    _check(request)
+    for measured_at in references:
+        if measured_at.controlled != "force":
+            raise RecordingError(
+                f"`references`: '{measured_at.label}' is not at constant force; a force surface is compared with responses "
+                "whose fundamental force was held"
+            )
+    forces: list[tuple[float, FrequencyResponse | None]] = [
+        (force, None) for force in request.forces_without_reference(references, "fundamental")
+    ]
+    forces += [(one.level, one) for one in references]
+    steady, bands, errors = [], [], []
+    for force_n, reference in forces:
+        curve = measured.surface.constant_force(force_n)
+        steady.append(_as_prediction(curve, measured))
+        bands.append(_band(curve))
+        errors.append(None if reference is None else compare(steady[-1], reference, over="phase").error)
+    others = {one.specimen for one in references} - {"", measured.surface.specimen}
+    strangers = [f"the model is of {measured.surface.specimen}, a reference of {other}" for other in sorted(others)]
+    return Predictions(
+        steady=tuple(steady),
+        steady_references=tuple(reference for _, reference in forces),
+        steady_errors=tuple(errors),
+        steady_bands=tuple(bands),
+        specimen=measured.surface.specimen,
+        notes=(*measured.notes, *strangers),
+    )
+
+
+def _check(request: PredictionRequest) -> None:
+    """Refuse options that only a nonlinear mode understands."""
+    given = {
+        "held": request.held not in (None, "fundamental"),
+        "sweeps": bool(request.sweeps),
+        "multisines": bool(request.multisines),
+        "planned": bool(request.planned),
+        "planned_multisines": bool(request.planned_multisines),
+        "constants": bool(request.constants),
+        "exciter": request.exciter is not None,
+        "modes": request.modes is not None,
+        "allow_extrapolation": request.allow_extrapolation,
+    }
+    for name in (name for name, is_given in given.items() if is_given):
+        raise ConfigurationError(
+            f"`{name}`: means nothing to a force surface, which answers `forces_n` and `references`, at constant "
+            "fundamental force between its measured levels"
+        )
+
+
+def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> SteadyPrediction:
+    """Convert a curve to a prediction. Its modal amplitude is unknown, because a force surface needs no mode shape."""
+    response = curve.response
+    amplitude = response.amplitude_m
+    turned = amplitude * np.exp(-1j * np.radians(response.phase_lag_deg))
+    turns = np.flatnonzero(np.diff(curve.stable.astype(int)))
+    return SteadyPrediction(
+        force_n=response.level,
+        force="fundamental",
+        channels=("drive",),
+        frequency_hz=response.frequency_hz,
+        modal_amplitude=np.full(amplitude.size, np.nan),
+        fundamental_n=response.force_n,
+        displacement_m=np.asarray(turned, np.complex128)[:, None],
+        stable=curve.stable,
+        branch=np.zeros(amplitude.size, dtype=np.int64),
+        range_use=amplitude / float(measured.surface.amplitude_m.max()),
+        fold_frequency_hz=0.5 * (response.frequency_hz[turns] + response.frequency_hz[turns + 1]),
+        fold_amplitude_m=0.5 * (amplitude[turns] + amplitude[turns + 1]),
+        fold_modal_amplitude=np.full(turns.size, np.nan),
+        notes=(*curve.notes, *_interpolated(curve)),
+    )
+
+
+def _interpolated(curve: ConstantForceCurve) -> tuple[str, ...]:
+    """Return a note on how much the curve changes if every second level is left out."""
+    if not np.isfinite(curve.amplitude_change).any():
+        return ()
+    amplitude = 100.0 * float(np.nanmax(curve.amplitude_change))
+    frequency = 100.0 * float(np.nanmax(curve.frequency_change_hz / curve.response.frequency_hz))
+    return (
+        f"without every second level amplitudes change by up to {amplitude:.2g} %, frequencies by up to {frequency:.2g} %: "
+        "more than what the interpolation between all levels costs",
+    )
+
+
+def _band(curve: ConstantForceCurve) -> ResponseBand:
+    """Return 95 % intervals computed from the scatter of the measured points."""
+    response = curve.response
+    top = int(np.argmax(response.amplitude_m))
+    ends = _INTERVAL * np.array([[-1.0], [1.0]])
+    return ResponseBand(
+        phase_lag_deg=response.phase_lag_deg,
+        amplitude_m=response.amplitude_m + ends * curve.amplitude_std_m,
+        frequency_hz=response.frequency_hz + ends * curve.frequency_std_hz,
+        peak_amplitude_std_m=float(curve.amplitude_std_m[top]),
+        peak_frequency_std_hz=float(curve.frequency_std_hz[top]),
+        draws=0,
+    )

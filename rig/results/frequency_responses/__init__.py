@@ -1,0 +1,1 @@
+"""Stepped-sine frequency responses."""

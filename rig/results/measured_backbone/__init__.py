@@ -1,0 +1,1 @@
+"""Backbones measured with other systems."""

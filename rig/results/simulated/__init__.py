@@ -1,0 +1,1 @@
+"""What models that are simulated have in common: data, errors, predictions."""

@@ -1,0 +1,239 @@
+"""What files of models that are simulated have in common: errors by experiment, spectra and a stretch of one experiment."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import compress
+from typing import Any, Self, cast
+
+import numpy as np
+
+from identification import (
+    ErrorSpectra,
+    Experiment,
+    OutputStretch,
+    RunScatter,
+    SimulatedRun,
+    error_spectra,
+    output_stretch,
+    simulated_run,
+)
+from identification.packing import pack_all, unpack_all
+from identification.pnlss.simulators import Simulator
+from rig.results.kind import Arrays, Attributes
+from rig.text.console import number, print_table
+from vibrolock.results import Result
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SimulatedModel(Result):
+    """A model with its errors on the data with which it was identified.
+
+    Parameters
+    ----------
+    model
+        The model.
+    runs, linear_runs
+        Every experiment as simulated by the model, and by the linear start; the latter may be empty.
+    spectra
+        Spectra of one periodic experiment, of validation data if there is any; None if there is no periodic experiment.
+    stretch
+        A short stretch of one experiment over time, of validation data if there is any; None if it was not kept.
+    seconds
+        Wall time of the identification; NaN if unknown.
+    notes
+        Remarks on the data for the user, one line each.
+    data
+        Fingerprint that identifies the data of the fit; empty if unknown.
+    uses
+        ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
+    scatter
+        Shifts of the model from run to run; None if it has none. Then ``model`` is that of a run in the middle.
+    """
+
+    model: Simulator
+    runs: tuple[SimulatedRun, ...] = ()
+    linear_runs: tuple[SimulatedRun, ...] = ()
+    spectra: ErrorSpectra | None = None
+    stretch: OutputStretch | None = None
+    seconds: float = float("nan")
+    notes: tuple[str, ...] = ()
+    data: str = ""
+    uses: Mapping[str, str] = field(default_factory=dict)
+    scatter: RunScatter | None = None
+
+    @property
+    def linear(self) -> Simulator | None:
+        """Linear start of the fit; None if unknown."""
+        return None
+
+    def judged(
+        self,
+        training: Sequence[Experiment],
+        validation: Sequence[Experiment],
+        initial_states: Iterable[np.ndarray] = (),
+        recordings: Sequence[str] = (),
+    ) -> Self:
+        """Return it with its errors on all data, with spectra and a stretch over time.
+
+        ``initial_states``: those of the training experiments that do not begin at rest, in their order. ``recordings``: that of
+        each experiment, whose own shifts the model then has.
+        """
+        every = [(one, "training") for one in training] + [(one, "validation") for one in validation]
+        begins = iter(initial_states)
+        states = [
+            next(begins) if use == "training" and one.initial_state == "estimated" else None for one, use in every
+        ]
+        models = [self._of(recording) for recording in recordings] or [self.model] * len(every)
+        moved = [bool(np.all(np.any(one.counted_outputs != 0.0, axis=1))) for one, _ in every]
+        still = [
+            f"{one.name}: an output is zero throughout, so that it has no errors"
+            for (one, _), is_moved in zip(every, moved, strict=True)
+            if not is_moved
+        ]
+        linear = self.linear
+        found = replace(
+            self,
+            runs=tuple(
+                simulated_run(model, one, initial_state=begin, use=use)
+                for (one, use), begin, model in compress(zip(every, states, models, strict=True), moved)
+            ),
+            linear_runs=()
+            if linear is None
+            else tuple(simulated_run(linear, one, use=use) for one, use in compress(every, moved)),
+            notes=(*self.notes, *still),
+        )
+        return found.on(training, validation, recordings)
+
+    def _of(self, recording: str) -> Simulator:
+        """Return the model of a recording, with its shifts if there is scatter."""
+        return self.model if self.scatter is None else self.scatter.model_of(cast(Any, self.model), recording)
+
+    def on(
+        self, training: Sequence[Experiment], validation: Sequence[Experiment], recordings: Sequence[str] = ()
+    ) -> Self:
+        """Return it with spectra and a stretch over time of the last experiment, preferably periodic and of validation data."""
+        every = [*training, *validation]
+        periodic = [one for one in validation if one.period_samples] or [one for one in training if one.period_samples]
+        shown = (periodic or every)[-1]
+        at = next(index for index, one in enumerate(every) if one is shown)
+        model = self._of(recordings[at]) if recordings else self.model
+        spectra = error_spectra(model, self.linear, shown) if periodic else None
+        return replace(self, spectra=spectra, stretch=output_stretch(model, shown))
+
+
+def scatter_in(found: SimulatedModel) -> list[dict[str, Any]] | None:
+    """Return the widths of the scatter as ``rig show --json`` prints them."""
+    return None if found.scatter is None else rows_of_scatter(found.scatter)
+
+
+def rows_of_scatter(of: RunScatter) -> list[dict[str, Any]]:
+    """Return the widths of a scatter, one row for each effect."""
+    return [
+        {
+            "effect": str(effect),
+            "width": width.width,
+            "width_low": width.low,
+            "width_high": width.high,
+            "mean_std": width.mean_std,
+            "recordings": len(of.runs),
+            "settled": of.settled,
+        }
+        for effect, width in zip(of.effects, of.widths, strict=True)
+    ]
+
+
+def say_scatter(rows: list[dict[str, Any]] | None) -> None:
+    """Print the widths of the scatter, if there is any."""
+    if not rows:
+        return
+    print(
+        f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those "
+        "with each run's shifts"
+    )
+    print_table(
+        ("shift of", "standard deviation %", "95 % interval", "+- of the middle %"),
+        [
+            (
+                row["effect"],
+                number(row["width"], ".3g", 100.0),
+                f"{number(row['width_low'], '.3g', 100.0)} to {number(row['width_high'], '.3g', 100.0)}",
+                number(row["mean_std"], ".2g", 196.0),
+            )
+            for row in rows
+        ],
+    )
+    if not rows[0]["settled"]:
+        print("the shifts had not settled when the fit ended")
+
+
+def packed_errors(found: SimulatedModel) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return arrays and attributes of everything but the model."""
+    arrays: dict[str, Any] = {}
+    attributes = {
+        "seconds": found.seconds,
+        "notes": list(found.notes),
+        "data": found.data,
+        "uses": dict(found.uses),
+    }
+    kept_runs = {"runs": found.runs, "linear_runs": found.linear_runs}
+    ones = {"spectra": found.spectra, "stretch": found.stretch}
+    for name, things in (kept_runs | {name: () if one is None else (one,) for name, one in ones.items()}).items():
+        inside, of_things = pack_all(name, things)
+        arrays, attributes = arrays | inside, attributes | of_things
+    if found.scatter is not None:
+        inside, attributes["scatter"] = found.scatter.to_arrays()
+        arrays |= {f"scatter/{name}": array for name, array in inside.items()}
+    return arrays, attributes
+
+
+def unpacked_errors(arrays: Arrays, attributes: Attributes) -> dict[str, Any]:
+    """Invert `packed_errors`: return the fields of a `SimulatedModel` by name, without the model."""
+    kinds: dict[str, type] = {"runs": SimulatedRun, "linear_runs": SimulatedRun, "spectra": ErrorSpectra}
+    parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in kinds.items()}
+    spectra = parts.pop("spectra")
+    stretch = unpack_all(OutputStretch, "stretch", arrays, attributes) if "stretch" in attributes else ()
+    if "scatter" in attributes:
+        inside = {name.removeprefix("scatter/"): array for name, array in arrays.items() if name.startswith("scatter/")}
+        parts["scatter"] = RunScatter.from_arrays(inside, attributes["scatter"])
+    return parts | {
+        "spectra": spectra[0] if spectra else None,
+        "stretch": stretch[0] if stretch else None,
+        "seconds": float(attributes["seconds"]),
+        "notes": tuple(attributes["notes"]),
+        "data": str(attributes.get("data", "")),
+        "uses": {str(name): str(use) for name, use in attributes.get("uses", {}).items()},
+    }
+
+
+def errors_in(found: SimulatedModel) -> dict[str, Any]:
+    """Return the errors as ``rig show --json`` prints them."""
+    return {
+        "errors": [run.row() for run in found.runs],
+        "linear_errors": [run.row() for run in found.linear_runs],
+    }
+
+
+def say_errors(summary: dict[str, Any]) -> None:
+    """Print the errors of all experiments, if there are any."""
+    if not summary["errors"]:
+        return
+    print("relative errors of the model, in brackets those of its linear start, %")
+    linear = summary["linear_errors"] or [None] * len(summary["errors"])
+    print_table(
+        ("experiment", "use", *summary["outputs"], "range use"),
+        [
+            (
+                run["name"],
+                run["use"],
+                *(_error(run, before, name) for name in summary["outputs"]),
+                "unbounded" if run["unbounded"] else number(run["range_use"], ".2f"),
+            )
+            for run, before in zip(summary["errors"], linear, strict=True)
+        ],
+    )
+
+
+def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str:
+    """Return one error of the model, with the error of the linear start in brackets."""
+    own = "unbounded" if run["unbounded"] else number(run["errors"][name], ".3f", 100.0)
+    return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"

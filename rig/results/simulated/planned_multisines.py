@@ -1,0 +1,91 @@
+"""Planned multisines as a model simulates them: what its outputs will reach, and whether it stays bounded."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from identification import Exciter, PnlssModel, SimulatedRun
+from identification.pnlss.simulators import SimulatedMotion
+from rig.bench import Bench
+from rig.campaigns.multisine.plan import MultisinePlan
+from rig.campaigns.plans import bench_of, load_plan
+from rig.errors import ConfigurationError
+from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD
+from rig.results.predictions.sweeps import strangers
+from rig.results.simulated.constants import all_inputs
+from rig.results.simulated.driven_models import DrivenModel, coupled_run
+from vibrolock.arrays import Float
+
+_LOWEST = 0.8
+"""Part of the lowest frequency above which the exciter's reaction is exact."""
+
+
+def planned_multisines(
+    source: str, model: DrivenModel, exciter: Exciter | None, constants: Mapping[str, float]
+) -> tuple[tuple[SimulatedRun, ...], tuple[str, ...]]:
+    """Simulate every level and realisation of a planned multisine from its voltage, the last period of it after the transient.
+
+    The ramps are left out: every run begins from rest. Returns the runs, whose errors are NaN, and notes. Raises
+    `ConfigurationError` if the plan is no multisine, or its lines or period do not fit the rate of the model.
+    """
+    plan = load_plan(source)
+    if not isinstance(plan, MultisinePlan):
+        raise ConfigurationError(f"{source}: is a plan of kind {plan.kind}, wanted is a multisine")
+    bench = bench_of(plan, source)
+    samples = _period_samples(source, plan, model.sample_rate_hz)
+    ahead = max(plan.transient_periods, 1)
+    runs = []
+    for target in plan.targets():
+        index = target.realisation or 0
+        period = target.level * _period(plan, bench, index, samples)
+        run = _run(model, exciter, constants, np.tile(period, ahead + 1), plan.lowest_hz)
+        last = run.outputs[:, ahead * samples :]
+        at = run.unbounded_at
+        runs.append(
+            SimulatedRun(
+                name=f"planned {target.level:.4g} V RMS, realisation {index + 1}",
+                level=target.level,
+                outputs=tuple(channel.name for channel in model.outputs),
+                error=np.full(len(model.outputs), np.nan),
+                range_use=run.range_use,
+                unbounded_at_s=None if at is None else at / model.sample_rate_hz,
+                use="planned",
+                rms=np.sqrt(np.mean(last**2, axis=1)),
+                peak=np.max(np.abs(last), axis=1),
+            )
+        )
+    return tuple(runs), strangers(bench, model.specimen, exciter, source)
+
+
+def _period_samples(source: str, plan: MultisinePlan, rate_hz: float) -> int:
+    """Number of samples of a period at the model's rate."""
+    if FEWEST_SAMPLES_PER_PERIOD * plan.highest_hz >= rate_hz:
+        raise ConfigurationError(
+            f"{source}: goes up to {plan.highest_hz:g} Hz; a model at {rate_hz:g} Hz allows below "
+            f"{rate_hz / FEWEST_SAMPLES_PER_PERIOD:g} Hz"
+        )
+    samples = rate_hz / plan.resolution_hz
+    if abs(samples - round(samples)) > 1e-6:
+        raise ConfigurationError(
+            f"{source}: resolution_hz = {plan.resolution_hz:g}: a period has {samples:.4f} samples at the model's "
+            f"{rate_hz:g} Hz; allowed is a whole number"
+        )
+    return round(samples)
+
+
+def _period(plan: MultisinePlan, bench: Bench, index: int, samples: int) -> Float:
+    """One period of a realisation of RMS one, as the bench plays it, at another number of samples."""
+    played = plan.design(bench.sample_rate_hz).realisation(plan.phase_seed, index)
+    lines = np.fft.rfft(played / np.sqrt(np.mean(played**2)))
+    return np.fft.irfft(lines[: samples // 2 + 1], samples) * (samples / played.size)
+
+
+def _run(
+    model: DrivenModel, exciter: Exciter | None, constants: Mapping[str, float], voltage_v: Float, lowest_hz: float
+) -> SimulatedMotion:
+    if exciter is None:
+        return model.simulate(all_inputs(model, voltage_v[None], constants))
+    lowest = _LOWEST * lowest_hz
+    if isinstance(model, PnlssModel) and model.excited_hz:
+        lowest = min(lowest, _LOWEST * model.excited_hz[0])
+    return coupled_run(model, exciter, voltage_v, lowest_hz=lowest)

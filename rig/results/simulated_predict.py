@@ -1,0 +1,199 @@
+"""Predictions by PNLSS and structured models: steady vibrations, recorded sweeps, recorded multisines."""
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, cast
+
+from identification import (
+    Exciter,
+    FrequencyResponse,
+    IdentificationError,
+    PnlssModel,
+    PredictionError,
+    Predictions,
+    ResponseBand,
+    SteadyPrediction,
+    StructuredModel,
+)
+from identification.prediction.uncertainty import band_of_responses
+from identification.structured.uncertainty import drawn
+from rig.errors import ConfigurationError
+from rig.results.exciter.kind import EXCITER
+from rig.results.files import load_as
+from rig.results.kind import FileKind
+from rig.results.pnlss.kind import IdentifiedPnlss, check_trusted
+from rig.results.predictions.request import PredictionRequest
+from rig.results.simulated.constants import constants_of
+from rig.results.simulated.driven_models import DrivenModel, frequency_response_at
+from rig.results.simulated.multisines import simulated_multisines
+from rig.results.simulated.planned_multisines import planned_multisines
+from rig.results.simulated.steady import Held, Reference, compared, default_held
+from rig.results.simulated.sweep_models import SimulatedSweepModels
+from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
+from rig.results.structured.kind import IdentifiedStructured, functions_of
+
+_DRAWS = 40
+"""Models of a band."""
+
+
+def simulated_predictions(
+    path: Path, kind: FileKind, request: PredictionRequest, references: Sequence[Reference]
+) -> Predictions:
+    """Return the requested predictions, with errors where there is a reference. Unbounded runs are also results.
+
+    Raises `ConfigurationError` for requests that such a model cannot answer and for code that is not trusted,
+    `identification.IdentificationError` if it has no periodic vibration or its channels do not fit.
+    """
+    found: IdentifiedPnlss | IdentifiedStructured = load_as(kind, path)
+    model = found.model
+    if isinstance(model, PnlssModel):
+        check_trusted(path, model, request.trust_code)
+    elif (functions := functions_of(model)) and not request.trust_code:
+        raise ConfigurationError(
+            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
+            "`trust_code`"
+        )
+    _check(request, model, path)
+    exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
+    constants = constants_of(model, request.constants, path)
+    fixed: dict[str, Any] = {"exciter": exciter, **({"held_inputs": constants} if constants else {})}
+    held = cast(Held, request.held or default_held(model, exciter))
+    references_held = default_held(model, exciter)
+    alone = request.forces_without_reference([one.measured for one in references], references_held)
+    steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
+        (frequency_response_at(model, level, force=one, **fixed), None, None)
+        for one, levels in ((held, alone), ("voltage", request.voltages_v))
+        for level in levels
+    ]
+    if request.bands and not steady:
+        raise ConfigurationError("`bands`: are those of responses without a reference; add `forces_n` or `voltages_v`")
+    others = _others(found, request.bands, path) if steady else []
+    bands = [_band(others, one, fixed) for one, _, _ in steady]
+    steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
+    models = SimulatedSweepModels(model, exciter, constants)
+    swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
+    swept += [one for plan in request.planned for one in planned_simulated_sweeps(plan, models)]
+    runs, said = simulated_multisines(request.multisines, found, model.specimen, constants)
+    for plan in request.planned_multisines:
+        more, remarks = planned_multisines(plan, model, exciter, constants)
+        runs, said = (*runs, *more), (*said, *remarks)
+    if request.bands and None in bands:
+        said = (*said, "a response has no band where most of the models that the fit allows have no such response")
+    if any(bands):
+        of = (
+            "the model that was fitted, by the covariance of the fit"
+            if found.scatter is None
+            else "runs that nobody has measured, by the scatter of the model alone"
+        )
+        said = (*said, f"bands and +- of responses: of {of}")
+    elif found.scatter is not None:
+        said = (
+            *said,
+            "the model is that of a run in the middle; its scatter from run to run is not in these predictions",
+        )
+    notes = [*(_default(request, held) if request.forces_n else ()), *said]
+    notes += _strangers(model, [reference.measured for reference in references])
+    notes += [note for one in swept for note in one.notes]
+    return Predictions(
+        steady=tuple(one for one, _, _ in steady),
+        steady_bands=(*bands, *[None] * (len(steady) - len(bands))),
+        steady_references=tuple(reference for _, reference, _ in steady),
+        steady_errors=tuple(error for _, _, error in steady),
+        sweeps=tuple(one.prediction for one in swept),
+        sweep_references=tuple(one.recorded for one in swept),
+        sweep_errors=tuple(one.error for one in swept),
+        runs=runs,
+        specimen=model.specimen,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _others(found: IdentifiedPnlss | IdentifiedStructured, asked: bool, path: Path) -> Sequence[DrivenModel]:
+    """Return models of fresh runs, or else, if asked for, models that the fit allows."""
+    if found.scatter is not None:
+        return list(found.scatter.fresh(found.model, _DRAWS))
+    if not asked:
+        return []
+    if not isinstance(found, IdentifiedStructured) or found.fit is None:
+        raise ConfigurationError(
+            f"`bands`: {path} has a model without its fit, whose covariance they need; leave it out"
+        )
+    return list(drawn(found.fit, _DRAWS))
+
+
+def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Mapping[str, Any]) -> ResponseBand | None:
+    """Return the band of a response over other models; None if there are none, or if most have no such response."""
+    responses: list[SteadyPrediction] = []
+    for model in others:
+        with suppress(IdentificationError):
+            responses.append(
+                frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), **fixed)
+            )
+    return band_of_responses(responses) if len(responses) > _DRAWS // 2 else None
+
+
+def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
+    """Refuse options that only a nonlinear mode understands, and requests that the model's channels do not allow."""
+    given = {
+        "zero_crossings": request.zero_crossings is not None,
+        "modes": request.modes is not None,
+        "allow_extrapolation": request.allow_extrapolation,
+    }
+    which = "structured" if isinstance(model, StructuredModel) else "PNLSS"
+    for name in (name for name, is_given in given.items() if is_given):
+        raise ConfigurationError(
+            f"`{name}`: means nothing to a {which} model, which answers `forces_n`, `voltages_v`, `references`, `sweeps`, "
+            "`planned`, `multisines` and `planned_multisines`"
+        )
+    steady = bool(request.forces_n or request.voltages_v or request.references)
+    swept = bool(request.sweeps or request.planned)
+    inputs, outputs = ([channel.role for channel in channels] for channels in (model.inputs, model.outputs))
+    named = ", ".join(channel.name for channel in (*model.inputs, *model.outputs))
+    if (steady or swept) and "force" not in (*inputs, *outputs):
+        raise ConfigurationError(
+            f"{path}: has no force among its channels ({named}), without which it answers `multisines` alone; identify it with "
+            "the force among `outputs`"
+        )
+    if swept and "drive" not in outputs:
+        raise ConfigurationError(
+            f"{path}: has no drive point among its channels ({named}), which sweeps are compared at; identify it with the "
+            "drive point among `outputs`"
+        )
+    if request.exciter is None and "force" in inputs:
+        for name, asked in (
+            ("voltages_v", request.voltages_v),
+            ("planned", request.planned),
+            ("planned_multisines", request.planned_multisines),
+        ):
+            if asked:
+                raise ConfigurationError(f"`{name}`: gives a voltage, and {path} is driven by a force; add `exciter`")
+    if request.exciter is not None and "force" not in inputs:
+        raise ConfigurationError(f"`exciter`: is inside {path}, whose input is the voltage; leave it out")
+    if request.exciter is not None and not (steady or swept or request.planned_multisines):
+        raise ConfigurationError(
+            "`exciter`: means nothing to `multisines`, which takes the recorded force; leave it out"
+        )
+
+
+def _asked(request: PredictionRequest, alone: Sequence[float], measured: FrequencyResponse) -> bool:
+    """Return whether the response to the force of a reference was asked for too, and so is wanted over the whole band."""
+    others = set(request.forces_n) - set(alone)
+    return measured.controlled == "force" and any(math.isclose(force, measured.level, rel_tol=1e-6) for force in others)
+
+
+def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
+    """Return a note on the held force if it was chosen by default."""
+    if request.held is not None or held != "pure-sine":
+        return ()
+    return (
+        "constant is a force without harmonics, for nothing in the model makes any: an exciter model gives the "
+        "fundamental or the RMS of a force that a shaker makes",
+    )
+
+
+def _strangers(model: DrivenModel, references: Sequence[FrequencyResponse]) -> list[str]:
+    """Return a note on each specimen of the references other than the model's."""
+    others = {one.specimen for one in references} - {"", model.specimen}
+    return [f"the model is of {model.specimen}, a reference of {one}: not the same specimen" for one in sorted(others)]

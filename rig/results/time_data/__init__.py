@@ -1,0 +1,1 @@
+"""Time records measured with other systems."""

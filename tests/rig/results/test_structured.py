@@ -1,0 +1,381 @@
+"""Structured models from the command line: identified, kept in a file, shown, drawn, and asked for predictions."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import rig
+from identification import NonlinearElement
+from identification.structured.laws import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
+from rig.campaigns.plans import plan_from
+from rig.errors import RecordingError
+from rig.results.files import load, save
+from rig.results.structured.figure import draw_structured
+from rig.results.structured.kind import IdentifiedStructured
+from rig.results.structured.options import StructuredOptions
+from tests.recorded import recorded_at
+from tests.rig.exchange.structured_models import structure
+from tests.sharing import copy_of, made_once, shared_folder
+
+LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
+LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2}
+
+
+@pytest.fixture(scope="session")
+def recordings(tmp_path_factory) -> Path:
+    """A folder with recordings at two levels, the modes of the lower one, and a model of the higher one."""
+    return copy_of(made_once(shared_folder() / "structured", _fill), tmp_path_factory.mktemp("structured"))
+
+
+def _fill(folder: Path) -> None:
+    from rig.results.identify import identify_model
+    from rig.results.identify_request import Request
+    from rig.results.simulated.options import DataOptions
+
+    for name, level in (("low", 0.02), ("lines", 0.4)):
+        recorded_at(folder / f"{name}.h5", plan_from(LINES | {"levels_rms_v": [level]}, name), seed=1)
+    save(identify_model([folder / "low.h5"], Request(kind="linear", count=1)), folder / "modes.h5")
+    request = Request(
+        kind="structured",
+        modes=folder / "modes.h5",
+        structured=StructuredOptions(laws=("polynomial-spring",)),
+        data=DataOptions(rate_hz=200.0, outputs="drive"),
+    )
+    save(identify_model([folder / "lines.h5"], request), folder / "S.h5")
+
+
+@pytest.fixture
+def there(command, recordings, monkeypatch):
+    """The command in the folder of the recordings."""
+    monkeypatch.chdir(recordings)
+    return command
+
+
+def test_a_model_becomes_a_rig_like_the_bench_of_its_recording(there, recordings):
+    there("new rig --from S.h5 --bench lines.h5 -o mine.toml")
+    there("new rig --from S.h5 --bench magnet-beam -o other.toml")
+    mine, other = (rig.load_bench(recordings / f"{name}.toml") for name in ("mine", "other"))
+    assert mine.model_copy(update={"name": "other"}) == other
+    assert [channel.name for channel in mine.channels] == ["force", "drive"]
+    assert mine.driver.options["exciter"]["force_factor_n_a"] == 5.3
+
+
+def test_a_model_is_better_than_its_linear_start_on_data_that_were_held_out(there):
+    told = json.loads(there("show S.h5 --json").out)
+    assert (told["kind"], told["sample_rate_hz"], told["outputs"]) == ("structured", 200.0, ["drive"])
+    assert [run["use"] for run in told["errors"]] == ["training", "validation"]
+    for run, before in zip(told["errors"], told["linear_errors"], strict=True):
+        assert run["errors"]["drive"] < 0.3 * before["errors"]["drive"]
+    assert told["fit"]["training_error"] == pytest.approx(told["errors"][0]["errors"]["drive"], rel=0.5)
+    assert told["errors"][0]["range_use"] == pytest.approx(1.0)
+    assert told["modes"][0]["frequency_hz"] == pytest.approx(24.37, rel=1e-3)
+    assert 0.0 < told["modes"][0]["frequency_std_hz"] < 0.1
+    assert [law["kind"] for law in told["elements"][0]["laws"]] == ["polynomial-spring"]
+    assert 0.0 < told["elements"][0]["largest_m"] < told["elements"][0]["reach_m"]
+    assert "polynomial-spring" in there("show S.h5").out
+
+
+def test_small_vibrations_are_shown_with_stuck_joints_and_what_was_fitted_beside_them(there, recordings):
+    sliding = json.loads(there("show S.h5 --json").out)
+    assert sliding["linear_part"] is None  # a polynomial spring has no slope at rest
+    found = load(recordings / "S.h5")
+    (element,) = found.model.elements
+    joint = replace(element, laws=(*element.laws, Jenkins(0.05, 0.2)))
+    save(replace(found.model, elements=(joint,)), recordings / "joint.h5")
+    stuck = json.loads(there("show joint.h5 --json").out)
+    own = (2.0 * np.pi * found.model.frequency_hz) ** 2
+    matrix = np.diag(own) + 0.05 / element.scale_m * np.outer(element.direction, element.direction)
+    matrix_hz = np.sqrt(np.linalg.eigvalsh(matrix)) / (2.0 * np.pi)
+    assert [mode["frequency_hz"] for mode in stuck["modes"]] == pytest.approx(matrix_hz, rel=1e-3)
+    assert [mode["frequency_hz"] for mode in stuck["linear_part"]] == pytest.approx(found.model.frequency_hz)
+    said = there("show joint.h5").out
+    assert said.index("small vibrations, all joints stuck") < said.index("fitted linear part, all joints slipping")
+
+
+def test_errors_of_modes_that_no_law_moves_are_those_of_the_fit(there, recordings):
+    fit = load(recordings / "S.h5").fit
+    errors = dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)), strict=True))
+    assert "frequency 1" in errors
+    assert "frequency 2" not in errors  # the residual's, above half the sample rate
+    for index, mode in enumerate(json.loads(there("show S.h5 --json").out)["modes"], 1):
+        of_frequency, of_damping = (errors.get(f"{name} {index}", 0.0) for name in ("frequency", "damping"))
+        assert mode["frequency_std_hz"] == pytest.approx(of_frequency * mode["frequency_hz"], rel=1e-2, abs=1e-9)
+        assert mode["damping_ratio_std"] == pytest.approx(of_damping * mode["damping_ratio"], rel=1e-2, abs=1e-12)
+
+
+def test_multisines_have_the_errors_of_the_file(there):
+    told = json.loads(there("predict S.h5 --multisine lines.h5 -o P.h5 --overwrite --json").out)
+    shown = json.loads(there("show S.h5 --json").out)
+    assert [run["use"] for run in told["multisines"]] == ["training", "validation"]
+    for run, known in zip(told["multisines"], shown["errors"], strict=True):
+        assert run["errors"] == known["errors"]
+        assert run["range_use"] == known["range_use"]
+    fresh = json.loads(there("predict S.h5 --multisine low.h5 -o P.h5 --overwrite --json").out)["multisines"]
+    assert {run["use"] for run in fresh} == {"test"}
+    assert all(run["range_use"] < 0.2 for run in fresh)
+
+
+def test_every_recording_has_shifts_of_its_own(there, recordings):
+    (recordings / "restless.toml").write_text('base = "magnet-beam"\n[driver.options.scatter]\nfrequency = 0.001\n')
+    for seed in (2, 3):
+        plan = plan_from(LINES | {"bench": str(recordings / "restless.toml"), "levels_rms_v": [0.4]}, "restless")
+        rig.run(plan, output=recordings / f"restless{seed}.h5", seed=seed, overwrite=True).close()
+    of = "--model structured --modes modes.h5 --laws polynomial-spring --rate 200 --outputs drive"
+    line = f"identify restless2.h5 restless3.h5 {of} --scatter frequency -o T.h5 --overwrite"
+    told = json.loads(there(f"{line} --json").out)
+    (width,) = told["scatter"]
+    assert (width["effect"], width["recordings"]) == ("frequency 1", 2)
+    assert width["width_low"] < 0.001 < width["width_high"]
+    found = load(recordings / "T.h5")
+    one, other = (found.scatter.model_of(found.model, run).frequency_hz[0] for run in found.scatter.runs)
+    assert abs(one / other - 1.0) > 1e-4
+    assert max(run["errors"]["drive"] for run in told["errors"]) < 0.03
+    assert "shifts from run to run, 2 runs" in there("show T.h5").out
+
+
+def test_a_file_gives_back_fit_and_errors_to_the_bit(recordings, tmp_path):
+    first = load(recordings / "S.h5")
+    save(first, tmp_path / "again.h5")
+    again = load(tmp_path / "again.h5")
+    u = np.random.default_rng(0).normal(size=(1, 300))
+    for name in ("model", "linear"):
+        one, other = (getattr(found, name).simulate(u).outputs for found in (first, again))
+        assert np.array_equal(one, other)
+    assert again.fit.names == first.fit.names
+    assert np.array_equal(again.fit.covariance, first.fit.covariance)
+    assert again.fit.start.elements[0].laws[0].as_dict() == first.fit.start.elements[0].laws[0].as_dict()
+    assert [run.row() for run in again.runs] == [run.row() for run in first.runs]
+    assert np.array_equal(again.spectra.error, first.spectra.error)
+    assert (again.fit.stopped, again.uses, again.data) == (first.fit.stopped, first.uses, first.data)
+
+
+def test_elements_of_all_laws_come_back_from_a_model_alone(tmp_path):
+    sent = structure()
+    save(sent, tmp_path / "m.h5")
+    found = load(tmp_path / "m.h5")
+    assert found.fit is None
+    assert [law.as_dict() for e in found.model.elements for law in e.laws] == [
+        law.as_dict() for e in sent.elements for law in e.laws
+    ]
+    u = np.random.default_rng(0).normal(size=(1, 300))
+    assert np.array_equal(found.model.simulate(u).outputs, sent.simulate(u).outputs)
+
+
+def test_models_and_fits_draw_and_show_themselves(recordings):
+    fit = load(recordings / "S.h5").fit
+    for one in (fit, fit.model):
+        (axis,) = one.plot()
+        assert axis.get_xlabel() == "displacement of element 1, mm"
+        assert "polynomial-spring" in one._repr_html_()
+
+
+def drawn(found):
+    page = Figure(figsize=(12.0, 7.5), layout="constrained")
+    draw_structured(page, found)
+    lines = {axis.get_xlabel(): axis for axis in page.axes}
+    return page, lines
+
+
+def test_a_figure_shows_spectra_time_course_the_element_and_errors(there, recordings):
+    assert there("plot S.h5 -o S.png").status == 0
+    found = load(recordings / "S.h5")
+    page, axes = drawn(found)
+    assert {"frequency, Hz", "time, s", "displacement of element 1, mm", "range use"} == set(axes)
+    (element,) = found.model.elements
+    axis = axes["displacement of element 1, mm"]
+    (spring,) = [line for line in axis.get_lines() if line.get_label() == "spring"]
+    z, force = spring.get_data()
+    np.testing.assert_allclose(force, element.laws[0].force(z / (1e3 * element.scale_m)), rtol=1e-12, atol=1e-12)
+    assert axis.get_ylabel() == "force, N"
+    (span,) = axis.patches
+    assert span.get_x() + span.get_width() == pytest.approx(1e3 * element.scale_m * element.largest)
+    page, axes = drawn(replace(found, runs=(), spectra=None, stretch=None))
+    assert len(page.axes) == 1
+    assert "not in the file: spectra, time series, errors of experiments" in page.get_suptitle().replace("\n", " ")
+
+
+def test_the_loop_of_a_joint_is_that_of_its_sliders_moved_slowly():
+    element = NonlinearElement(direction=[0.9, 0.0], scale_m=1e-3, laws=(Jenkins(0.5, 0.3), Iwan(0.2)), largest=1.2)
+    _, axes = drawn(IdentifiedStructured(model=structure(elements=(element,))))
+    (line,) = [line for line in axes["displacement of element 1, mm"].get_lines() if line.get_label() == "joint"]
+    z, force = line.get_data()
+    stiffness, strength = np.concatenate([law.sliders() for law in element.laws], axis=1)
+    pulled, before, moved = np.zeros(strength.size), 0.0, []
+    for x in np.concatenate([np.linspace(0.0, z[0], 50), z, z]):  # to the first end, and two cycles
+        pulled = np.clip(pulled + stiffness * (x - before), -strength, strength)
+        before = x
+        moved.append(pulled.sum())
+    np.testing.assert_allclose(force, moved[-z.size :], rtol=1e-9, atol=1e-12)
+
+
+def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_them_alone(
+    there, recordings, monkeypatch
+):
+    (recordings / "own_law_of_a_test.py").write_text("def cubic(x, numbers):\n    return numbers[0] * x**3\n")
+    monkeypatch.syspath_prepend(recordings)
+    found = load(recordings / "S.h5")
+    (element,) = found.model.elements
+    law = UserSpring("own_law_of_a_test:cubic", (element.laws[0].coefficients_n[1],))
+    own = replace(found.model, elements=(replace(element, laws=(law,)),))
+    save(own, recordings / "own.h5")
+    shown = there("show own.h5")
+    assert "names a function, own_law_of_a_test:cubic: simulations import it" in shown.out
+    for line in ("plot own.h5 -o own.png", "export own.h5 -o own.mat"):
+        assert there(line).status == 0
+    refused = there("predict own.h5 --multisine lines.h5 -o O.h5")
+    assert "own.h5: function = 'own_law_of_a_test:cubic': is code that the model names" in refused.err
+    assert refused.err.endswith("--trust-code\n")
+    over = there("plot own.h5 S.h5 -o over.png")
+    assert "own.h5: names a function, own_law_of_a_test:cubic, which is not imported to draw" in over.err
+    assert json.loads(there("show own.h5 --json").out)["modes"] is None
+    assert "own_law_of_a_test" not in sys.modules
+    done = there("predict own.h5 --multisine lines.h5 --trust-code -o O.h5 --overwrite --json")
+    assert done.status == 0, done.err
+    assert "own_law_of_a_test" in sys.modules
+    cubic = PolynomialSpring((0.0, element.laws[0].coefficients_n[1]))
+    save(replace(own, elements=(replace(element, laws=(cubic,)),)), recordings / "same.h5")
+    same = json.loads(there("predict same.h5 --multisine lines.h5 -o O.h5 --overwrite --json").out)
+    for one, other in zip(json.loads(done.out)["multisines"], same["multisines"], strict=True):
+        assert one["errors"]["drive"] == pytest.approx(other["errors"]["drive"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda told: told["model"]["elements"][0]["laws"][0].update(kind="magic"), "kind is 'magic', allowed are"),
+        (lambda told: told["model"]["elements"][0].pop("laws"), "'laws' is missing or unknown"),
+        (lambda told: told["model"]["elements"][0].update(laws=[3]), "does not hold what makes a structured"),
+        (lambda told: told["model"].update(steps="many"), "does not hold what makes a structured"),
+        (lambda told: told["model"].update(later=1), "is missing or unknown"),
+        (lambda told: told.pop("model"), "holds neither a fit nor a model"),
+        (lambda told: told.pop("runs"), "runs: is missing"),
+    ],
+)
+def test_what_is_no_such_file_is_named(change, said, tmp_path):
+    from rig.recording.arrays import read_arrays, write_arrays
+
+    save(structure(), tmp_path / "m.h5")
+    kind, arrays, attributes = read_arrays(tmp_path / "m.h5")
+    change(attributes)
+    write_arrays(tmp_path / "m.h5", kind, arrays, attributes)
+    with pytest.raises(RecordingError, match=said):
+        load(tmp_path / "m.h5")
+
+
+def test_a_file_that_lacks_an_array_is_named(tmp_path):
+    save(structure(), tmp_path / "m.h5")
+    with h5py.File(tmp_path / "m.h5", "r+") as file:
+        del file["arrays/model/direct"]
+    with pytest.raises(RecordingError, match=r"m\.h5: "):
+        load(tmp_path / "m.h5")
+
+
+def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
+    page = (Path(__file__).parents[3] / "docs/how-to/identify-a-structured-model.md").read_text(encoding="utf-8")
+    for name in sorted(set(LAWS) - {"user-spring"}):
+        ((law,),) = [plan.laws for plan in StructuredOptions(laws=(name,)).elements()]
+        assert isinstance(law, LAWS[name])
+        assert f"`{name}`" in page
+
+
+@pytest.mark.parametrize(
+    ("place", "between"), [("", ()), ("@drive", ("drive",)), ("@ drive : base", ("drive", "base"))]
+)
+def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
+    (plan,) = StructuredOptions(laws=(f"polynomial-spring, masing{place}",)).elements()
+    assert [type(law) for law in plan.laws] == [LAWS["polynomial-spring"], LAWS["masing"]]
+    assert plan.between == between
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "identify lines.h5 --model structured",
+            "--modes: is missing, the modes with which a structured model begins; make",
+        ),
+        (
+            "identify lines.h5 --model structured --modes no.h5",
+            "no.h5: does not exist, wanted are the modes with which",
+        ),
+        (
+            "identify lines.h5 --model structured --modes low.h5",
+            "low.h5: is a file of kind multisine, wanted are the modes",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --states 2",
+            "--states: means nothing to --model structured",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --input force",
+            "--input: means nothing to --model struct",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --resume",
+            "--resume: means nothing to --model structured",
+        ),
+        ("identify lines.h5 --model pnlss --laws iwan", "--laws: means nothing to --model pnlss"),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws magic",
+            "--laws = 'magic': allowed are polynomial-spring, ",
+        ),
+        (
+            "identify S.h5 --model structured --modes modes.h5",
+            "S.h5: is a file of kind structured; a structured model comes from recordings: multisine, sweep",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws iwan@drive:drive",
+            "--laws = 'iwan@drive:drive': after @ allowed is an output, or two with a colon",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --laws iwan@nowhere",
+            "nowhere",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --scatter mass",
+            "--scatter = 'mass': allowed are frequency, damping, gain",
+        ),
+        (
+            "identify lines.h5 --model structured --modes modes.h5 --scatter gain",
+            "--scatter: needs two recordings at least",
+        ),
+        ("identify lines.h5 --model linear --scatter gain", "--scatter: means nothing to --model linear"),
+        ("identify lines.h5 --model structured --modes modes.h5 --hold-out 2", "no level has more than 2 realisations"),
+        (
+            "predict S.h5 --frequency-response 1 --modes modes.h5",
+            "--modes: means nothing to a structured model, which answers",
+        ),
+        (
+            "predict S.h5 --frequency-response 1 --allow-extrapolation",
+            "--allow-extrapolation: means nothing to a structu",
+        ),
+        (
+            "predict S.h5 --multisine lines.h5 --bands",
+            "--bands: are those of responses without a reference; add --freq",
+        ),
+        ("predict modes.h5 --frequency-response 1 --bands", "predictions are made with a nonlinear-mode, pnlss"),
+        ("predict S.h5 --frequency-response 1 --force rms", "'rms' of a model driven by a force needs an exciter"),
+        (
+            "predict S.h5 --voltage-response 1",
+            "--voltage-response: gives a voltage, and S.h5 is driven by a force; add --e",
+        ),
+        ("predict S.h5 --multisine lines.h5 --exciter S.h5", "--exciter: means nothing to --multisine"),
+        (
+            "predict S.h5 --frequency-response 1 --exciter S.h5",
+            "S.h5: is a file of kind structured, wanted is one of kin",
+        ),
+        ("predict S.h5 --multisine modes.h5", "modes.h5: "),
+        ("predict modes.h5 --multisine lines.h5", "predictions are made with a nonlinear-mode, pnlss, structured, "),
+    ],
+)
+def test_mistakes_are_named_in_one_line(there, line, said):
+    done = there(f"{line} -o X.h5")
+    assert done.status == 1
+    assert said in done.err
+    assert done.err.count("\n") == 1

@@ -1,0 +1,135 @@
+"""Structured models asked for steady vibrations and sweeps on the command line, against the virtual rig and its recordings."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rig.campaigns.plans import plan_from
+from simulators.analysis import constant_force_response, phase_resonance_backbone
+from simulators.virtual_rig import VirtualRig
+from tests.recorded import recorded_at
+
+LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
+LINES |= {"transient_periods": 3, "periods": 2, "realisations": 2, "levels_rms_v": [0.6]}
+SWEEP = {"bench": "magnet-beam", "kind": "sweep", "start_hz": 20.0, "stop_hz": 29.0, "rate_hz_per_s": 1.0}
+
+
+@pytest.fixture(scope="session")
+def model(shelf):
+    """A model of the one-sided magnet beam beside its recordings, and the plan of a sweep."""
+    from rig.results.files import save
+    from rig.results.identify import identify_model
+    from rig.results.identify_request import Request
+    from rig.results.simulated.options import DataOptions
+
+    recorded_at(shelf / "lines.h5", plan_from(LINES, "lines"), seed=1)
+    request = Request(kind="structured", modes=shelf / "LIN.h5", data=DataOptions(rate_hz=400.0, outputs="drive"))
+    save(identify_model([shelf / "lines.h5"], request), shelf / "ST.h5")
+    plan = SWEEP | {"levels_v": [0.3]}
+    (shelf / "ahead.toml").write_text("\n".join(f"{name} = {json.dumps(value)}" for name, value in plan.items()))
+    recorded_at(shelf / "ahead.h5", plan_from(plan, "ahead"), seed=2)
+    return shelf / "ST.h5"
+
+
+@pytest.fixture
+def told(command, model, monkeypatch):
+    """What a prediction says, typed in the folder of the model."""
+
+    def typed(line):
+        monkeypatch.chdir(model.parent)
+        done = command(f"predict ST.h5 {line} -o OUT.h5 --overwrite --json")
+        assert done.status == 0, done.err
+        return json.loads(done.out)
+
+    return typed
+
+
+def test_peaks_at_a_constant_force_are_those_of_the_rig(told):
+    truth = VirtualRig.shipped("magnet-beam")
+    (sine,) = told("--frequency-response 0.15")["frequency_responses"]
+    exact = phase_resonance_backbone(truth, forces_n=0.15 * np.linspace(0.1, 1.0, 8), excitation="pure-sine")
+    assert sine["peak_m"] == pytest.approx(exact.amplitude_m[-1], rel=0.02)
+    assert sine["peak_frequency_hz"] == pytest.approx(exact.frequency_hz[-1], rel=2e-3)
+    (held,) = told("--frequency-response 0.15 --exciter EX.h5")["frequency_responses"]
+    exact = constant_force_response(truth, 0.15, np.linspace(-150.0, -30.0, 41))
+    assert held["force"] == "fundamental"
+    assert held["peak_m"] == pytest.approx(np.max(exact.amplitude_m), rel=0.02)
+    assert held["peak_frequency_hz"] == pytest.approx(exact.frequency_hz[np.argmax(exact.amplitude_m)], rel=2e-3)
+
+
+@pytest.mark.slow
+def test_bands_hold_the_peaks_of_other_models_that_the_fit_allows(told, model):
+    """Against first-order errors along the numbers of the fit, of amplitude and frequency at phase resonance."""
+    from identification import structured_backbone
+    from identification.structured.uncertainty import std_of
+    from rig.results.files import load
+
+    (sine,) = told("--frequency-response 0.05 --bands")["frequency_responses"]
+
+    def peak_of(one):
+        backbone = structured_backbone(one, 0.05)
+        return np.array([abs(backbone.displacement_m[-1, 1, 0]), backbone.frequency_hz[-1]])
+
+    fit = load(model).fit
+    expected = std_of(fit, peak_of)
+    assert sine["peak_m"] == pytest.approx(peak_of(fit.model)[0], rel=1e-3)
+    assert [sine["peak_std_m"], sine["peak_frequency_std_hz"]] == pytest.approx(expected, rel=0.4)
+    assert told("--frequency-response 0.05")["frequency_responses"][0]["peak_std_m"] is None
+
+
+def test_a_model_without_its_fit_has_no_bands(model, command, monkeypatch):
+    from dataclasses import replace
+
+    from rig.results.files import load, save
+
+    monkeypatch.chdir(model.parent)
+    save(replace(load(model), fit=None), model.parent / "alone.h5")
+    done = command("predict alone.h5 --frequency-response 0.05 --bands -o OUT.h5 --overwrite")
+    assert done.status == 1
+    assert done.err == "rig: --bands: alone.h5 has a model without its fit, whose covariance they need; leave it out\n"
+
+
+def test_recorded_sweeps_are_followed_from_the_force_and_from_the_voltage(told):
+    for line, origin in (("", "the recorded force"), ("--exciter EX.h5", "the recorded voltage")):
+        found = told(f"--sweep ahead.h5 {line}")
+        assert found["sweeps"][0]["origin"] == origin
+        assert not found["sweeps"][0]["unbounded"]
+        (error,) = found["errors"]
+        assert abs(error["peak_error"]) < 0.005
+        assert error["envelope_error"] < 0.005
+
+
+def test_a_planned_sweep_is_that_which_is_recorded_later(told):
+    both = told("--planned-sweep ahead.toml --sweep ahead.h5 --exciter EX.h5")["sweeps"]
+    assert both[0]["peak_m"] == pytest.approx(both[1]["peak_m"], rel=0.02)
+
+
+def test_responses_to_a_voltage_and_references_are_answered(told):
+    found = told("--voltage-response 0.2 --reference stepped.h5 --exciter EX.h5")["frequency_responses"]
+    assert found[0]["force"] == "voltage"
+    assert abs(found[1]["error"]["peak_error"]) < 0.005
+
+
+def test_figures_are_drawn_and_other_responses_refused(told, command, model, monkeypatch):
+    told("--frequency-response 0.15 --sweep ahead.h5 --multisine lines.h5")
+    monkeypatch.chdir(model.parent)
+    assert command("plot OUT.h5 -o OUT.png").status == 0
+    assert "elements reach" in command("predict ST.h5 --frequency-response 0.9 -o BIG.h5 --overwrite").out
+
+
+def test_its_backbone_lies_on_that_which_is_measured(model, command, monkeypatch):
+    from identification import structured_mode
+    from rig.results.files import load
+
+    monkeypatch.chdir(model.parent)
+    done = command("plot ST.h5 backbone.h5 NM.h5 -o over.png")
+    assert done.status == 0, done.err
+    measured, found = load(model.parent / "NM.h5"), structured_mode(load(model).fit)
+    assert found.modal_frequency_std_hz.max() < 0.01
+    inside = measured.amplitude_m < found.amplitude_m.max()
+    assert inside.sum() > 3
+    at = measured.amplitude_m[inside]
+    for name, share in (("modal_frequency_hz", 5e-4), ("damping_ratio", 0.02)):
+        own = np.interp(at, found.amplitude_m, getattr(found, name))
+        np.testing.assert_allclose(own, getattr(measured, name)[inside], rtol=share)
