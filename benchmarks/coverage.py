@@ -110,7 +110,7 @@ def continuous(exact: VirtualRig) -> tuple[VirtualRig, int]:
 
 
 def true_vibrations(
-    exact: VirtualRig, recording: Recording, points: Sequence[Point[Any]], plan: BackbonePlan, seed: int
+    exact: VirtualRig, recording: Recording, points: Sequence[Point[object]], plan: BackbonePlan, seed: int
 ) -> list[tuple[float, float]]:
     """Return the fundamentals (peak) of the true force (N) and the true motion (m) of the drive point, point by point."""
     (part,) = recording.parts

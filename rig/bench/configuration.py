@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Mapping
 from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -95,7 +96,7 @@ def _refuse_absurd(table: Any, source: str) -> None:
         raise ConfigurationError(f"{source}: {fault}")
 
 
-def validated(model: type[Model], table: dict[str, Any], source: str) -> Model:
+def validated(model: type[Model], table: Mapping[str, object], source: str) -> Model:
     """Build a model from a table; raise `ConfigurationError` naming path, value and allowed values of each fault."""
     _refuse_absurd(table, source)
     try:

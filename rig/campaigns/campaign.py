@@ -30,7 +30,7 @@ class Campaign:
     in_one_go: bool = False
     """Whether several points are measured together; then ``measure`` is ``(bench, plan, targets, rows, passages, ended) ->
     points``."""
-    watch: Callable[[Any, Sequence[Point[Any]], Point[Any]], tuple[Point[Any], str]] | None = None
+    watch: Callable[[Any, Sequence[Point[object]], Point[object]], tuple[Point[object], str]] | None = None
     """``(plan, points so far, point) -> (point, why to stop)``: completes a new point with the help of the points before it. If
     the text is not empty, the output is ramped down and the run ends."""
     identity: tuple[str, ...] = ()

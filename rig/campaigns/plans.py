@@ -1,8 +1,8 @@
 """Load plans by name or from TOML files."""
 
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from rig.bench import Bench, load_bench
 from rig.bench.configuration import find_toml, read_toml, shipped_names, validated
@@ -31,7 +31,7 @@ def load_plan(name_or_path: str | Path) -> Plan:
     return plan_from(read_toml(find_toml(name_or_path, _folder(), "plan")), text)
 
 
-def plan_from(table: dict[str, Any], source: str) -> Plan:
+def plan_from(table: Mapping[str, object], source: str) -> Plan:
     """Build a plan of any kind from its table; raise `ConfigurationError` that names the error and the ``source``."""
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:

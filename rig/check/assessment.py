@@ -150,7 +150,7 @@ def responses_in(recording: Recording) -> Responses | None:
 
 
 def _plan(recording: Recording) -> MultisinePlan:
-    plan = plan_from(dict(recording.configuration["plan"]), f"{recording.path}: plan")
+    plan = plan_from(recording.configuration["plan"], f"{recording.path}: plan")
     if not isinstance(plan, MultisinePlan):
         raise RecordingError(f"{recording.path}: is not the recording of a check")
     return plan

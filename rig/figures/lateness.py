@@ -1,7 +1,7 @@
 """Figure of the timing of a wall-clock loop: histograms of wake-up, execution and response times."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
+from rig.recording.stored import HistogramTable, LoopTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,11 +33,16 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     if not loops:
         raise RecordingError(f"{recording.path}: its loop did not run by the clock, there is no lateness to draw")
     counts, beyond = grid(page, 2, sharex=True)[:, 0]
+    quantiles = {
+        "wake_up": [loop["wake_up_us"] for loop in loops],
+        "execution": [loop["execution_us"] for loop in loops],
+        "response": [loop["response_us"] for loop in loops],
+    }
     for key, colour in COLOURS.items():
         edges, blocks = together([loop["histograms"][key] for loop in loops])
         if not edges.size:
             continue
-        label = f"{TIMES[key]}, largest {max(loop[f'{key}_us']['largest'] for loop in loops):.0f} µs"
+        label = f"{TIMES[key]}, largest {max(one['largest'] for one in quantiles[key]):.0f} µs"
         counts.plot(edges, blocks, ".", color=colour)  # a line would fill bins that hold nothing
         beyond.step(edges, exceedance(blocks), where="post", color=colour, label=label)
     for deadline_us in sorted({loop["deadline_us"] for loop in loops}):
@@ -52,7 +58,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")
 
 
-def together(histograms: Sequence[Mapping[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+def together(histograms: Sequence[HistogramTable]) -> tuple[np.ndarray, np.ndarray]:
     """Add up several histograms; return the upper edges, us, in rising order, and the number of blocks of each bin."""
     edges = np.concatenate([np.asarray(one["upper_edge_us"], float) for one in histograms])
     counts = np.concatenate([np.asarray(one["count"], float) for one in histograms])
@@ -66,11 +72,11 @@ def exceedance(counts: np.ndarray) -> np.ndarray:
     return np.where(share > 0.5 / counts.sum(), share, np.nan)
 
 
-def _blocks(loop: Mapping[str, Any]) -> int:
+def _blocks(loop: LoopTable) -> int:
     return int(sum(loop["histograms"]["execution"]["count"]))
 
 
-def _pacing(loops: Sequence[Mapping[str, Any]]) -> str:
+def _pacing(loops: Sequence[LoopTable]) -> str:
     return " and ".join(
         sorted({PACED.get(pacing, pacing) for pacing in (loop["real_time"]["pacing"] for loop in loops)})
     )

@@ -5,6 +5,8 @@ import pytest
 
 from rig.api import Run
 from rig.bench import Bench
+from rig.campaigns.evaluation.point import vibration_of
+from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.hil.conftest import backbone_plan
 from rig.hil.subject import ArmedRig
 from simulators.analysis import phase_resonance_backbone
@@ -24,17 +26,17 @@ def _came_down(run: Run) -> None:
 
 def test_every_point_locks_settles_and_is_accepted(backbone_run: Run, armed_rig: ArmedRig) -> None:
     """With no sample lost."""
-    points = backbone_run.recording.points
+    points = [point_from(table) for table in backbone_run.recording.points]
     for point in points:
-        assert point["accepted"], point["reason"]
-        assert point["lost_samples"] == 0
-    armed_rig.notes({name: [point[name] for point in points] for name in REPEATS})
+        assert point.accepted, point.reason
+        assert point.lost_samples == 0
+    armed_rig.notes({name: [value_of(point, name) for point in points] for name in REPEATS})
 
 
 def test_levels_are_reached(backbone_run: Run) -> None:
     """The amplitude on the output is the level's."""
-    for point in backbone_run.recording.points:
-        assert point["voltage_v"] == pytest.approx(point["level"], rel=1e-3)
+    for point in map(point_from, backbone_run.recording.points):
+        assert vibration_of(point).voltage_v == pytest.approx(point.level, rel=1e-3)
 
 
 def test_the_output_comes_down_at_the_end(backbone_run: Run) -> None:
@@ -56,17 +58,14 @@ def test_a_limit_that_is_passed_brings_the_bench_down(backbone_run: Run, armed_r
 
 def test_the_bench_agrees_with_itself(backbone_run: Run, repeated_run: Run, armed_rig: ArmedRig) -> None:
     """Frequency, damping and force of every point, once more."""
-    for first, second in zip(backbone_run.recording.points, repeated_run.recording.points, strict=True):
-        assert second["accepted"], second["reason"]
-        for name, tolerance in REPEATS.items():
-            assert second[name] == pytest.approx(first[name], rel=tolerance), name
-    changes = {
-        f"{name}_change": [
-            b[name] / a[name] - 1.0
-            for a, b in zip(backbone_run.recording.points, repeated_run.recording.points, strict=True)
-        ]
-        for name in REPEATS
-    }
+    points, repeated = (list(map(point_from, run.recording.points)) for run in (backbone_run, repeated_run))
+    for second in repeated:
+        assert second.accepted, second.reason
+    changes = {}
+    for name, tolerance in REPEATS.items():
+        before, again = (np.array([value_of(one, name) for one in some], float) for some in (points, repeated))
+        assert again == pytest.approx(before, rel=tolerance), name
+        changes[f"{name}_change"] = (again / before - 1.0).tolist()
     armed_rig.notes(changes)
 
 

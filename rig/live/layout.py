@@ -1,7 +1,5 @@
 """What a run publishes, as records: the frame with the present state, and the bins of the traces."""
 
-from typing import Any
-
 import numpy as np
 
 FRAME = np.dtype(
@@ -58,12 +56,12 @@ BIN_S = 0.1
 """Least duration of a bin of the traces, s of the test: five minutes are kept of a test by the clock."""
 
 
-def window_rows(row_dtype: np.dtype[Any]) -> int:
+def window_rows(row_dtype: np.dtype) -> int:
     """Return how many of the last rows a frame holds at most."""
     return min(MOST_ROWS, WINDOW_BYTES // row_dtype.itemsize)
 
 
-def bin_dtype(n_channels: int) -> np.dtype[Any]:
+def bin_dtype(n_channels: int) -> np.dtype:
     """Return the record of a bin: its end in s of the part, lock and guard, and least and greatest values within it."""
     pair = ("f4", (2,))
     return np.dtype(

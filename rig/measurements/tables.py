@@ -37,7 +37,7 @@ def points_table(recording: Recording) -> "pandas.DataFrame":
     except ImportError:
         raise _missing("pandas") from None
     campaign = KINDS[recording.kind]
-    points: list[Point[Any]] = [point_from(table, campaign.result) for table in recording.latest.values()]
+    points: list[Point[object]] = [point_from(table, campaign.result) for table in recording.latest.values()]
     columns = {column.key: [_number(value_of(point, column.key)) for point in points] for column in campaign.columns}
     table = {
         "level": [point.level for point in points],

@@ -58,8 +58,8 @@ class Replay:
 
     def _prepare(self, path: Path) -> None:
         recording = self._recording
-        bench = validated(Bench, dict(recording.configuration["bench"]), f"{path.name}: bench")
-        plan = plan_from(dict(recording.configuration["plan"]), f"{path.name}: plan")
+        bench = validated(Bench, recording.configuration["bench"], f"{path.name}: bench")
+        plan = plan_from(recording.configuration["plan"], f"{path.name}: plan")
         about = recording.parts[0].information.get("about") or {} if recording.parts else {}
         self.facts: dict[str, Any] = watched_facts(plan, bench, path, about, started=recording.started)
         self.facts |= {"version": recording.software_version, "process": 0}

@@ -3,10 +3,10 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rig.errors import RecordingError
 from rig.recording.journal import journal_path
@@ -15,11 +15,16 @@ from rig.recording.layout import identify, kind_in, new_file, open_file, reading
 from rig.recording.tables import StoredTexts, write_object
 from vibrolock.printable import error_text
 
+if TYPE_CHECKING:
+    import h5py
+
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
 _COMPRESSED_FROM_BYTES = 65536
 
 
-def write_arrays(path: str | Path, kind: str, arrays: Mapping[str, ArrayLike], attributes: Mapping[str, Any]) -> None:
+def write_arrays(
+    path: str | Path, kind: str, arrays: Mapping[str, ArrayLike], attributes: Mapping[str, object]
+) -> None:
     """Write arrays of numbers or texts and JSON-able attributes to ``path``, whole or not at all.
 
     Names are letters, digits and underscores, with ``/`` between groups.
@@ -51,7 +56,7 @@ def write_arrays(path: str | Path, kind: str, arrays: Mapping[str, ArrayLike], a
             check()
 
 
-def _write_array(group: Any, name: str, values: NDArray[Any]) -> None:
+def _write_array(group: "h5py.Group", name: str, values: np.ndarray) -> None:
     import h5py
 
     if values.dtype.kind == "U":
@@ -61,7 +66,7 @@ def _write_array(group: Any, name: str, values: NDArray[Any]) -> None:
         group.create_dataset(name, data=values, **({"compression": "lzf", "shuffle": True} if large else {}))
 
 
-def read_arrays(path: str | Path) -> tuple[str, dict[str, NDArray[Any]], dict[str, Any]]:
+def read_arrays(path: str | Path) -> tuple[str, dict[str, np.ndarray], dict[str, Any]]:
     """Read back what ``write_arrays`` wrote.
 
     Returns:
@@ -75,13 +80,13 @@ def read_arrays(path: str | Path) -> tuple[str, dict[str, NDArray[Any]], dict[st
         kind = kind_in(file)
         if "arrays" not in file:
             raise RecordingError(f"{path}: holds no arrays; it is a recording of kind {kind!r}")
-        arrays: dict[str, NDArray[Any]] = {}
+        arrays: dict[str, np.ndarray] = {}
         texts = StoredTexts(path.stat().st_size)
         _collect(file["arrays"], "", arrays, texts)
         return kind, arrays, texts.object(file, "attributes")
 
 
-def _collect(group: Any, prefix: str, arrays: dict[str, NDArray[Any]], texts: StoredTexts) -> None:
+def _collect(group: "h5py.Group", prefix: str, arrays: dict[str, np.ndarray], texts: StoredTexts) -> None:
     for name, item in group.items():
         if hasattr(item, "items"):
             _collect(item, f"{prefix}{name}/", arrays, texts)

@@ -12,9 +12,10 @@ import struct
 import zlib
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from rig.recording import jsontext
+from rig.text.json_values import JsonValue
 
 MAGIC = b"VLJB"
 VERSION = 2
@@ -68,7 +69,7 @@ class Block:
     offset: int
     """Position of the payload in the file, bytes."""
     payload: bytes
-    value: dict[str, Any]
+    value: dict[str, JsonValue]
     """The payload decoded; empty for rows."""
     gap: Gap | None = None
     """The gap between the block before and this one, if there is one."""

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -66,7 +65,7 @@ def _each(checks: Sequence[Callable[[], None] | None]) -> None:
 
 
 def continue_recording(
-    output: str | Path, *, row_dtype: np.dtype[Any] | None = None, columns: Sequence[Column] | None = None
+    output: str | Path, *, row_dtype: np.dtype | None = None, columns: Sequence[Column] | None = None
 ) -> JournalWriter:
     """Open the journal of ``output`` for further parts: an interrupted run's, or a new one behind a finished file.
 

@@ -2,9 +2,14 @@
 
 from collections.abc import Iterator
 from math import ceil, prod
-from typing import Any
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rig.errors import RecordingError
+
+if TYPE_CHECKING:
+    import h5py
 
 MOST_OBJECTS = 200_000
 """Groups and datasets of a file; a recording of 1000 parts has about 60 000."""
@@ -19,7 +24,7 @@ _MOST_ATTRIBUTES = 1000
 _MOST_TEXTS = 2**22
 
 
-def examine(file: Any, size: int) -> None:
+def examine(file: "h5py.File", size: int) -> None:
     """Check every object of an open HDF5 file of ``size`` bytes without reading values.
 
     Raises:
@@ -43,7 +48,7 @@ def examine(file: Any, size: int) -> None:
         raise RecordingError(f"its datasets declare {texts} texts; allowed are {min(_MOST_TEXTS, size)}")
 
 
-def objects_in(file: Any) -> Iterator[Any]:
+def objects_in(file: "h5py.File") -> "Iterator[h5py.Group | h5py.Dataset]":
     """Yield every group and dataset, the root first.
 
     Raises:
@@ -75,7 +80,7 @@ def objects_in(file: Any) -> Iterator[Any]:
                 raise RecordingError(f"{where} is a {type(item).__name__}; allowed are groups and datasets")
 
 
-def check_attributes(item: Any) -> None:
+def check_attributes(item: "h5py.Group | h5py.Dataset") -> None:
     """Refuse an object with too many or too large attributes by `RecordingError`, before one of them is read."""
     attributes = item.attrs
     if len(attributes) > _MOST_ATTRIBUTES:
@@ -86,7 +91,7 @@ def check_attributes(item: Any) -> None:
             raise RecordingError(f"{item.name}: its attribute {name!r} is longer than {_LARGEST_ATTRIBUTE_BYTES} bytes")
 
 
-def _check_storage(dataset: Any, dtype: Any) -> None:
+def _check_storage(dataset: "h5py.Dataset", dtype: np.dtype) -> None:
     """Refuse values stored in other files or not stored at all, and types other than numbers and texts."""
     import h5py
 

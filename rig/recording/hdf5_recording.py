@@ -2,19 +2,22 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording.header import Column, Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.layout import file_integrity, identify, kind_in, open_unchecked, reading
 from rig.recording.parts import Part, rows_at_once
+from rig.recording.stored import ChannelTable, ColumnTable, Configuration, End, Event, Information, StoredPoint
 from rig.recording.tables import StoredTexts, write_object, write_table
 
-_COMPRESSED: dict[str, Any] = {"compression": "lzf", "shuffle": True, "fletcher32": True}
+if TYPE_CHECKING:
+    import h5py
+
+_COMPRESSED: dict[str, str | bool] = {"compression": "lzf", "shuffle": True, "fletcher32": True}
 _WORTH_IT = 0.6  # of its size: a field that stays larger when compressed is stored as it is
 _TAKEN_OVER = "taken over from an unverified file"
 
@@ -22,12 +25,13 @@ _TAKEN_OVER = "taken over from an unverified file"
 class StoredPart(Part):
     """A part in an open HDF5 file, its group ``/parts/N``."""
 
-    def __init__(self, group: Any, texts: StoredTexts, path: Path) -> None:
+    def __init__(self, group: "h5py.Group", texts: StoredTexts, path: Path) -> None:
         self._group, self._path = group, path
-        self.information = texts.object(group, "information")
-        self.points, self.events = texts.table(group, "points"), texts.table(group, "events")
-        self.end = texts.object(group, "end") if "end" in group else None
-        columns = texts.table(group, "columns")
+        self.information = cast(Information, texts.object(group, "information"))
+        self.points = cast(list[StoredPoint], texts.table(group, "points"))
+        self.events = cast(list[Event], texts.table(group, "events"))
+        self.end = cast(End, texts.object(group, "end")) if "end" in group else None
+        columns = cast(list[ColumnTable], texts.table(group, "columns"))
         self.columns = tuple(Column(c["name"], c["unit"], c["description"]) for c in columns)
         self.row_dtype = np.dtype([(c["name"], c["dtype"], tuple(c["shape"])) for c in columns])
         self.n_rows = int(group.attrs["n_rows"])
@@ -38,21 +42,21 @@ class StoredPart(Part):
             if values.shape != (self.n_rows, *wanted.shape) or values.dtype != wanted.base:
                 raise RecordingError(f"{path}: damaged: {values.name} is {values.dtype} of shape {values.shape}")
 
-    def _read_rows(self, start: int, stop: int) -> NDArray[Any]:
+    def _read_rows(self, start: int, stop: int) -> np.ndarray:
         rows = np.empty(stop - start, self.row_dtype)
         for name in self.row_dtype.names or ():
             rows[name] = self._read_field(name, start, stop)
         return rows
 
-    def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]:
+    def _read_field(self, field: str, start: int, stop: int) -> np.ndarray:
         if not self._group:
             raise RecordingError(f"{self._path}: is closed")
         with reading(self._path):
-            values: NDArray[Any] = self._group["rows"][field][start:stop]
+            values: np.ndarray = self._group["rows"][field][start:stop]
             return values
 
 
-def opened_recording(path: Path) -> tuple[Any, str]:
+def opened_recording(path: Path) -> "tuple[h5py.File, str]":
     """Open the file of a recording as `rig.recording.layout.open_file`; return it with its integrity.
 
     A recording that took parts over from an unverified file is unverified for good.
@@ -62,7 +66,7 @@ def opened_recording(path: Path) -> tuple[Any, str]:
     return file, _integrity(file, found)
 
 
-def _integrity(file: Any, found: str) -> str:
+def _integrity(file: "h5py.File", found: str) -> str:
     return f"unverified: {file.attrs['unverified']}" if found == VERIFIED and "unverified" in file.attrs else found
 
 
@@ -75,7 +79,7 @@ def taken_over(integrity: str, n_parts: int) -> str:
 
 
 def write_recording(
-    file: Any, header: Header, parts: Iterable[Part], check: Callable[[], None], unverified: str = ""
+    file: "h5py.File", header: Header, parts: Iterable[Part], check: Callable[[], None], unverified: str = ""
 ) -> None:
     """Write a whole recording into an open new file; ``check`` raises once the disk is full."""
     identify(file, header.kind)
@@ -92,7 +96,7 @@ def write_recording(
         _write_part(group.create_group(str(number)), part, check)
 
 
-def _write_part(group: Any, part: Part, check: Callable[[], None]) -> None:
+def _write_part(group: "h5py.Group", part: Part, check: Callable[[], None]) -> None:
     group.attrs["n_rows"], group.attrs["dropped_bytes"] = part.n_rows, part.dropped_bytes
     group.attrs["dropped_reason"] = part.dropped_reason
     write_object(group, "information", part.information)
@@ -144,7 +148,7 @@ def _shrinking(part: Part, step: int) -> set[str]:
     return names
 
 
-def _whole_chunk(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def _whole_chunk(values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Return the values as one chunk, the last of which ends with zeros."""
     if values.shape == shape:
         return np.ascontiguousarray(values)
@@ -153,8 +157,10 @@ def _whole_chunk(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     return chunk
 
 
-def _row_dataset(group: Any, column: Column, field: np.dtype[Any], n_rows: int, step: int, *, compressed: bool) -> Any:
-    storage: dict[str, Any] = {}
+def _row_dataset(
+    group: "h5py.Group", column: Column, field: np.dtype, n_rows: int, step: int, *, compressed: bool
+) -> "h5py.Dataset":
+    storage: dict[str, object] = {}
     if n_rows:
         storage = {
             "chunks": (min(step, n_rows), *field.shape),
@@ -165,7 +171,7 @@ def _row_dataset(group: Any, column: Column, field: np.dtype[Any], n_rows: int, 
     return dataset
 
 
-def read_recording(file: Any, path: Path) -> tuple[Header, list[StoredPart]]:
+def read_recording(file: "h5py.File", path: Path) -> tuple[Header, list[StoredPart]]:
     """Read an open recording; its rows stay in the file.
 
     Returns:
@@ -181,8 +187,8 @@ def read_recording(file: Any, path: Path) -> tuple[Header, list[StoredPart]]:
         parts = [StoredPart(file["parts"][str(number)], texts, path) for number in range(len(file["parts"]))]
         header = Header(
             kind=kind_in(file),
-            configuration=texts.object(file, "configuration"),
-            channels=texts.table(file, "channels"),
+            configuration=cast(Configuration, texts.object(file, "configuration")),
+            channels=cast(list[ChannelTable], texts.table(file, "channels")),
             row_dtype=parts[-1].row_dtype,
             columns=parts[-1].columns,
             software_version=str(file.attrs["software_version"]),

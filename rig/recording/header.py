@@ -2,14 +2,15 @@
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording import jsontext
+from rig.recording.stored import ChannelTable, Configuration, HeaderTable
 
 FORMAT = "vibrolock"
 """Value of the attribute ``format`` of every file."""
@@ -30,7 +31,7 @@ def check_schema(schema: object, path: object) -> None:
         raise RecordingError(f"{path}: written by schema {schema}, this version reads up to {SCHEMA}; update vibrolock")
 
 
-def packed(dtype: np.dtype[Any]) -> np.dtype[Any]:
+def packed(dtype: np.dtype) -> np.dtype:
     """Return the row as it is stored: the same fields in the same order, little-endian, without padding.
 
     Raises:
@@ -38,7 +39,7 @@ def packed(dtype: np.dtype[Any]) -> np.dtype[Any]:
     """
     if not dtype.names or not dtype.fields:
         raise RecordingError(f"row dtype: {dtype} has no fields; a structured dtype is wanted")
-    described: list[tuple[str, np.dtype[Any], tuple[int, ...]]] = []
+    described: list[tuple[str, np.dtype, tuple[int, ...]]] = []
     for name in dtype.names:
         base, shape = dtype.fields[name][0].base.newbyteorder("<"), dtype.fields[name][0].shape
         if not _NAME.match(name):
@@ -74,11 +75,11 @@ class Header:
 
     kind: str
     """Kind of recording, for example ``"backbone"``."""
-    configuration: Mapping[str, Any]
+    configuration: Configuration
     """The whole configuration as it was (bench, plan), JSON-able."""
-    channels: Sequence[Mapping[str, Any]]
+    channels: Sequence[ChannelTable]
     """Channel table: one JSON-able mapping per input channel, in the order of the channel block of a row."""
-    row_dtype: np.dtype[Any]
+    row_dtype: np.dtype
     """Structured dtype of one row; stored packed and little-endian."""
     columns: Sequence[Column]
     """One description for each field of ``row_dtype``, in its order."""
@@ -138,20 +139,23 @@ class Header:
             RecordingError: another format, a later schema, or a damaged header; the message begins with ``path``.
         """
         try:
-            value = jsontext.decode(text)
-            if value.get("format") != FORMAT:
+            found = jsontext.decode(text)
+            if found.get("format") != FORMAT:
                 raise RecordingError(f"{path}: not a recording of vibrolock")
-            check_schema(value.get("schema"), path)
+            check_schema(found.get("schema"), path)
+            value = cast(HeaderTable, found)
             return cls(
                 row_dtype=np.dtype([(name, base, tuple(shape)) for name, base, shape in value["row_dtype"]]),
                 columns=tuple(Column(*texts) for texts in value["columns"]),
-                **{
-                    name: value[name]
-                    for name in (
-                        *("kind", "configuration", "channels", "software_version", "started"),
-                        *("seed", "first_part", "identity", "schema"),
-                    )
-                },
+                kind=value["kind"],
+                configuration=value["configuration"],
+                channels=value["channels"],
+                software_version=value["software_version"],
+                started=value["started"],
+                seed=value["seed"],
+                first_part=value["first_part"],
+                identity=value["identity"],
+                schema=value["schema"],
             )
         except (KeyError, TypeError, ValueError, MemoryError) as error:
             raise RecordingError(f"{path}: damaged: its header cannot be read ({error})") from error

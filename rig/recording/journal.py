@@ -9,10 +9,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording import jsontext
@@ -128,7 +127,7 @@ class JournalWriter:
         self._blocks.cut(contents.size, contents.n_blocks)
         self._synchronise()
 
-    def part(self, information: Mapping[str, Any]) -> None:
+    def part(self, information: Mapping[str, object]) -> None:
         """Begin a part; ``information`` is the caller's (``first_sample``: number of its first row's sample)."""
         text = jsontext.encode(information, what="part")
         self._append(BlockKind.PART, text, self._part_number + 1)
@@ -136,7 +135,7 @@ class JournalWriter:
         self._part_number, self._rows_in_part = self._part_number + 1, 0
         self.n_parts += 1
 
-    def rows(self, rows: NDArray[Any]) -> None:
+    def rows(self, rows: np.ndarray) -> None:
         """Append rows, a one-dimensional structured array with the fields of the header's ``row_dtype``.
 
         Large arrays become several blocks: after an error, ``n_rows`` says how many rows are in the journal.
@@ -153,18 +152,18 @@ class JournalWriter:
             self._rows_in_part += len(block)
         self._synchronise(if_due=True)
 
-    def event(self, event: Mapping[str, Any]) -> None:
+    def event(self, event: Mapping[str, object]) -> None:
         """Append an event."""
         self._append_to_part(BlockKind.EVENT, jsontext.encode(event, what="event"))
         self._synchronise(if_due=True)
 
-    def point(self, point: Mapping[str, Any]) -> None:
+    def point(self, point: Mapping[str, object]) -> None:
         """Append the result of a completed point."""
         self._append_to_part(BlockKind.POINT, jsontext.encode(point, what="point"))
         self.n_points += 1
         self._synchronise(if_due=True)
 
-    def end(self, end: Mapping[str, Any]) -> None:
+    def end(self, end: Mapping[str, object]) -> None:
         """End the part and force all to the disk; ``completed: True`` in ``end`` says that the run is finished."""
         self._append_to_part(BlockKind.END, jsontext.encode(end, what="end"))
         self._in_part = False

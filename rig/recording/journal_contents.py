@@ -5,16 +5,16 @@ from bisect import bisect_right
 from io import BufferedReader
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording.blocks import Block, BlockKind, Gap
 from rig.recording.header import Header
 from rig.recording.journal_blocks import Tail, read_journal
 from rig.recording.parts import Part, missing_rows, rows_at_once
+from rig.recording.stored import End, Event, Information, StoredPoint
 
 MISSING = -1
 """Offset of rows that cannot be read."""
@@ -28,7 +28,7 @@ _SMALL_BYTES = 2**26
 class JournalPart(Part):
     """A part that is still in its journal."""
 
-    def __init__(self, stream: BufferedReader, header: Header, information: dict[str, Any]) -> None:
+    def __init__(self, stream: BufferedReader, header: Header, information: Information) -> None:
         self.information, self.points, self.events, self.end = information, [], [], None
         self.n_rows, self.row_dtype, self.columns = 0, header.row_dtype, header.columns
         self.dropped_bytes, self.dropped_reason, self._n_gaps = 0, "", 0
@@ -50,7 +50,7 @@ class JournalPart(Part):
         elif self._n_gaps == MOST_TOLD + 1:
             self.dropped_reason += "; and more of the kind"
 
-    def _read_rows(self, start: int, stop: int) -> NDArray[Any]:
+    def _read_rows(self, start: int, stop: int) -> np.ndarray:
         rows = np.empty(stop - start, self.row_dtype)
         view, itemsize = rows.view(np.uint8).data, self.row_dtype.itemsize
         row, block = start, bisect_right(self._firsts, start) - 1
@@ -74,7 +74,7 @@ class JournalPart(Part):
         if not complete:
             raise RecordingError("journal: it has become shorter while it was read")
 
-    def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]:
+    def _read_field(self, field: str, start: int, stop: int) -> np.ndarray:
         values = np.empty(stop - start, self.row_dtype[field])
         step = rows_at_once(self.row_dtype)
         for first in range(start, stop, step):
@@ -151,7 +151,7 @@ class JournalContents:
     def _begin(self, block: Block) -> None:
         self._tell_homeless()
         self._part_number = block.part
-        self.parts.append(JournalPart(self._stream, self.header, block.value))
+        self.parts.append(JournalPart(self._stream, self.header, cast(Information, block.value)))
         for n_bytes, text in self._before_parts:
             self.parts[-1].add_gap(n_bytes, text)
         self._before_parts.clear()
@@ -180,11 +180,11 @@ class JournalContents:
         if block.kind is BlockKind.ROWS:
             part.add_rows(block.offset, len(block.payload) // self.header.row_dtype.itemsize)
         elif block.kind is BlockKind.EVENT:
-            part.events.append(block.value)
+            part.events.append(cast(Event, block.value))
         elif block.kind is BlockKind.POINT:
-            part.points.append(block.value)
+            part.points.append(cast(StoredPoint, block.value))
         else:
-            part.end = block.value
+            part.end = cast(End, block.value)
 
     def close(self) -> None:
         """Close the file; may be called twice."""

@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from rig.errors import RecordingError
+from rig.text.json_values import JsonValue
 
 
 def _plain(value: object) -> object:
@@ -15,7 +15,7 @@ def _plain(value: object) -> object:
     raise TypeError(f"{type(value).__name__} is not a JSON value")
 
 
-def encode(value: Mapping[str, Any], *, what: str, indent: int | None = None) -> bytes:
+def encode(value: Mapping[str, object], *, what: str, indent: int | None = None) -> bytes:
     """JSON text of one object; ``what`` names it in the error.
 
     Non-finite floats are written as ``NaN`` and ``Infinity``, as Python's ``json`` and most readers take them.
@@ -33,7 +33,7 @@ def encode(value: Mapping[str, Any], *, what: str, indent: int | None = None) ->
     return text.encode("utf-8", "backslashreplace")
 
 
-def decode(text: bytes | str) -> dict[str, Any]:
+def decode(text: bytes | str) -> dict[str, JsonValue]:
     """Read the JSON object in ``text``.
 
     Raises:

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rig.errors import RecordingError
 from rig.recording.examination import check_attributes, examine
@@ -14,6 +14,9 @@ from rig.recording.integrity import append_trailer, integrity_of
 from rig.system.locking import synchronise_folder
 from rig.system.whole_file import beginning
 from vibrolock.printable import error_text
+
+if TYPE_CHECKING:
+    import h5py
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _CACHE_BYTES = 2**20  # of each dataset: chunks are written whole and once
@@ -54,7 +57,7 @@ def reading(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path}: damaged: cannot be read ({error_text(error)})") from error
 
 
-def open_file(path: Path) -> Any:
+def open_file(path: Path) -> "h5py.File":
     """Open one of our HDF5 files for reading, after its digest, or else a child process, has found it whole.
 
     Returns:
@@ -80,7 +83,7 @@ def file_integrity(path: Path) -> str:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def open_unchecked(path: Path) -> Any:
+def open_unchecked(path: Path) -> "h5py.File":
     """Open one of our HDF5 files whatever its digest: a changed byte in it may crash the HDF5 library. As `open_file`."""
     import h5py
 
@@ -102,18 +105,18 @@ def open_unchecked(path: Path) -> Any:
     return file
 
 
-def identify(file: Any, kind: str) -> None:
+def identify(file: "h5py.File", kind: str) -> None:
     """Mark an open new file as one of ours, of the present schema and of ``kind``."""
     file.attrs["format"], file.attrs["schema"], file.attrs["kind"] = FORMAT, SCHEMA, kind
 
 
-def kind_in(file: Any) -> str:
+def kind_in(file: "h5py.File") -> str:
     """Return the kind of the open file, for example ``"backbone"`` or ``"nonlinear-mode"``."""
     return str(file.attrs["kind"])
 
 
 @contextmanager
-def new_file(path: Path, *, kept: str) -> Iterator[tuple[Any, Callable[[], None]]]:
+def new_file(path: Path, *, kept: str) -> "Iterator[tuple[h5py.File, Callable[[], None]]]":
     """Write an HDF5 file that appears under ``path`` whole or not at all, in place of what was there before.
 
     It is written as ``PATH.vibrolock-part`` in the same folder, given its digest, forced to the disk and renamed. ``kept``

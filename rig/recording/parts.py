@@ -2,21 +2,20 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording.header import Column
+from rig.recording.stored import End, Event, Information, StoredPoint
 
 
-def rows_at_once(row_dtype: np.dtype[Any]) -> int:
+def rows_at_once(row_dtype: np.dtype) -> int:
     """Return how many rows are held in memory while reading or converting, and make one chunk of an HDF5 dataset."""
     return max(min(16384, 2**22 // row_dtype.itemsize), 1)
 
 
-def missing_rows(n_rows: int, row_dtype: np.dtype[Any]) -> NDArray[Any]:
+def missing_rows(n_rows: int, row_dtype: np.dtype) -> np.ndarray:
     """Return rows that take the place of lost ones: NaN where a field can hold it, else zero."""
     rows = np.zeros(n_rows, row_dtype)
     for name in row_dtype.names or ():
@@ -28,17 +27,17 @@ def missing_rows(n_rows: int, row_dtype: np.dtype[Any]) -> NDArray[Any]:
 class Part(ABC):
     """One uninterrupted stretch of a recording, from its beginning to its end, a kill or a change of plan."""
 
-    information: dict[str, Any]
+    information: Information
     """Information given when the part began."""
-    points: list[dict[str, Any]]
+    points: list[StoredPoint]
     """Results per point, in the order in which they were completed."""
-    events: list[dict[str, Any]]
+    events: list[Event]
     """Events, in the order in which they happened."""
-    end: dict[str, Any] | None
+    end: End | None
     """How the part ended, with its counters; ``None`` where it was cut short."""
     n_rows: int
     """Number of rows."""
-    row_dtype: np.dtype[Any]
+    row_dtype: np.dtype
     """Structured dtype of its rows."""
     columns: Sequence[Column]
     """Unit and meaning of each field of its rows."""
@@ -58,7 +57,7 @@ class Part(ABC):
         """Whether the part's end says ``"completed": true``."""
         return self.end is not None and self.end.get("completed") is True
 
-    def rows(self, field: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
+    def rows(self, field: str, start: int = 0, stop: int | None = None) -> np.ndarray:
         """Read one field of the rows ``start`` to ``stop``, which count as in a slice; nothing is kept between calls.
 
         Returns:
@@ -73,7 +72,7 @@ class Part(ABC):
         first, last, _ = slice(start, stop).indices(self.n_rows)
         return self._read_field(field, first, max(first, last))
 
-    def read(self, start: int, stop: int) -> NDArray[Any]:
+    def read(self, start: int, stop: int) -> np.ndarray:
         """Read rows ``start`` to ``stop``: a structured array, ``(stop - start,)``.
 
         Raises:
@@ -84,7 +83,7 @@ class Part(ABC):
         return self._read_rows(start, stop)
 
     @abstractmethod
-    def _read_rows(self, start: int, stop: int) -> NDArray[Any]: ...
+    def _read_rows(self, start: int, stop: int) -> np.ndarray: ...
 
     @abstractmethod
-    def _read_field(self, field: str, start: int, stop: int) -> NDArray[Any]: ...
+    def _read_field(self, field: str, start: int, stop: int) -> np.ndarray: ...

@@ -1,10 +1,10 @@
 """A recording is opened by the name of its HDF5 file, whether it is finished, interrupted or still running."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from rig.errors import RecordingError
 from rig.recording.conversion import check_continuation
@@ -15,6 +15,7 @@ from rig.recording.journal import journal_path
 from rig.recording.journal_blocks import EMPTY
 from rig.recording.journal_contents import JournalContents
 from rig.recording.parts import Part
+from rig.recording.stored import ChannelTable, Configuration, PlanTable, StoredPoint
 from rig.recording.told_values import check_told
 from vibrolock.results import Result
 
@@ -24,7 +25,7 @@ class RecordedPlan(NamedTuple):
 
     part: int
     """Number of that part."""
-    plan: Mapping[str, Any]
+    plan: PlanTable
     """The plan as it was."""
     numbers: Sequence[int] | None
     """Numbers in this recording of the points that it asks for, in its order; ``None``: 0, 1, 2 and so on."""
@@ -72,7 +73,7 @@ class Recording(Result):
     """The parts in the order in which they were recorded."""
 
     @property
-    def configuration(self) -> Mapping[str, Any]:
+    def configuration(self) -> Configuration:
         """The whole configuration as it was; its ``plan`` is the one in force, which the last change brought."""
         changes = self.plans[1:]
         return {**self._header.configuration, "plan": changes[-1].plan} if changes else self._header.configuration
@@ -85,7 +86,7 @@ class Recording(Result):
         return [first, *(RecordedPlan(n, said["plan"], said["numbers"]) for n, said in told if "plan" in said)]
 
     @property
-    def channels(self) -> Sequence[Mapping[str, Any]]:
+    def channels(self) -> Sequence[ChannelTable]:
         """Channel table, one mapping per input channel."""
         return self._header.channels
 
@@ -115,25 +116,25 @@ class Recording(Result):
         return sum(part.n_rows for part in self.parts)
 
     @property
-    def points(self) -> list[dict[str, Any]]:
+    def points(self) -> list[StoredPoint]:
         """Results of all points, in the order in which they were completed, each with the number of its ``part``."""
         return [{**point, "part": number} for number, part in enumerate(self.parts) for point in part.points]
 
     @property
-    def latest(self) -> dict[int, dict[str, Any]]:
+    def latest(self) -> dict[int, StoredPoint]:
         """The last result of each point of the current plan, keyed by the number of the point, in the order of the plan."""
         results = self._by_number()
         numbers = self.plans[-1].numbers
         return {n: results[n] for n in (sorted(results) if numbers is None else numbers) if n in results}
 
     @property
-    def former(self) -> dict[int, dict[str, Any]]:
+    def former(self) -> dict[int, StoredPoint]:
         """The last result of each point that an earlier plan asked for and the plan in force does not, by number."""
         asked = self.latest
         results = self._by_number()
         return {n: results[n] for n in sorted(results) if n not in asked}
 
-    def _by_number(self) -> dict[int, dict[str, Any]]:
+    def _by_number(self) -> dict[int, StoredPoint]:
         for point in self.points:
             if point.get("number") is None:
                 raise RecordingError(f"{self.path}: part {point['part'] + 1}: a point's number: is missing")

@@ -3,13 +3,17 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from math import prod
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.recording import jsontext
+from rig.text.json_values import JsonValue
+
+if TYPE_CHECKING:
+    import h5py
 
 LARGEST_TEXT_BYTES = 16 * 2**20
 """Length of one JSON text, as of a block of a journal."""
@@ -20,7 +24,7 @@ _COLUMN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _INT64 = np.iinfo(np.int64)
 
 
-def write_object(group: Any, name: str, value: Mapping[str, Any]) -> None:
+def write_object(group: "h5py.Group", name: str, value: Mapping[str, object]) -> None:
     """Write ``value`` as the scalar text dataset ``name`` (indented, UTF-8)."""
     import h5py
 
@@ -32,7 +36,7 @@ def write_object(group: Any, name: str, value: Mapping[str, Any]) -> None:
     group.create_dataset(name, data=text, dtype=h5py.string_dtype("utf-8"))
 
 
-def write_table(parent: Any, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_table(parent: "h5py.Group", name: str, rows: Sequence[Mapping[str, object]]) -> None:
     """Write the group ``name``: dataset ``json`` with one text per row, and one dataset per key that makes a column.
 
     A key makes a column where its values are all numbers (float64, NaN for what is missing), all integers (int64),
@@ -62,15 +66,15 @@ class StoredTexts:
         self._at_once = max(1, LARGEST_TEXTS_BYTES // max(size, 1))
         self._left = LARGEST_TEXTS_BYTES
 
-    def object(self, group: Any, name: str) -> dict[str, Any]:
+    def object(self, group: "h5py.Group", name: str) -> dict[str, JsonValue]:
         """Read back what ``write_object`` wrote."""
         return jsontext.decode(self._allowed(group[name], self._texts(group[name])[()]))
 
-    def table(self, parent: Any, name: str) -> list[dict[str, Any]]:
+    def table(self, parent: "h5py.Group", name: str) -> list[dict[str, JsonValue]]:
         """Read back what ``write_table`` wrote."""
         return [jsontext.decode(text) for text in self._read(parent[name]["json"])]
 
-    def array(self, dataset: Any) -> NDArray[np.str_]:
+    def array(self, dataset: "h5py.Dataset") -> NDArray[np.str_]:
         """An array of texts of any shape."""
         if dataset.shape == ():
             return np.asarray(self._allowed(dataset, self._texts(dataset)[()]), dtype=np.str_)
@@ -79,19 +83,19 @@ class StoredTexts:
             raise RecordingError(f"{dataset.name}: one of its {len(texts)} texts is too long for an array of them")
         return np.asarray(texts, dtype=np.str_).reshape(dataset.shape)
 
-    def _texts(self, dataset: Any) -> Any:
+    def _texts(self, dataset: "h5py.Dataset") -> "h5py.Dataset":
         if dataset.dtype.kind not in "SO":
             raise RecordingError(f"{dataset.name} is {dataset.dtype}; texts are wanted")
         return dataset.asstr()
 
-    def _read(self, dataset: Any) -> Iterator[str]:
+    def _read(self, dataset: "h5py.Dataset") -> Iterator[str]:
         texts, width = self._texts(dataset), prod(dataset.shape[1:])
         step = max(1, self._at_once // max(width, 1))
         for start in range(0, dataset.shape[0] if width else 0, step):
             for text in texts[start : start + step].reshape(-1):
                 yield self._allowed(dataset, text)
 
-    def _allowed(self, dataset: Any, text: str) -> str:
+    def _allowed(self, dataset: "h5py.Dataset", text: str) -> str:
         self._left -= len(text)
         if len(text) > LARGEST_TEXT_BYTES or self._left < 0:
             raise RecordingError(
@@ -101,11 +105,12 @@ class StoredTexts:
         return text
 
 
-def _column(values: list[Any]) -> NDArray[Any] | None:
+def _column(values: Sequence[JsonValue]) -> np.ndarray | None:
     present = [value for value in values if value is not None]
     whole = len(present) == len(values)
-    if all(isinstance(value, str) for value in present):
-        printable = all(value.isprintable() for value in present)
+    texts = [value for value in present if isinstance(value, str)]
+    if len(texts) == len(present):
+        printable = all(text.isprintable() for text in texts)
         return np.array([value or "" for value in values], dtype=object) if present and printable else None
     if all(isinstance(value, bool) for value in present):
         return np.array(present) if whole else None

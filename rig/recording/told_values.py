@@ -4,9 +4,10 @@ What the fields of points mean is checked where points are read (`rig.campaigns.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Protocol
 
 from rig.errors import RecordingError
+from rig.recording.stored import End, Event, Information, StoredPoint
 from vibrolock.printable import shown
 
 LARGEST_NUMBER = 1e100
@@ -18,14 +19,23 @@ _TEXTS = ("what", "text", "reason", "quality", "level_unit")
 _TRUTHS = ("accepted", "tripped", "completed")
 
 
-def check_told(part: Any, where: str) -> None:
+class _Told(Protocol):
+    """A part as far as it tells values (`rig.recording.parts.Part`)."""
+
+    information: Information
+    points: list[StoredPoint]
+    events: list[Event]
+    end: End | None
+
+
+def check_told(part: _Told, where: str) -> None:
     """Check points, events, information and end of a part (`rig.recording.parts.Part`).
 
     Raises:
         RecordingError: it names the value and what is allowed, after ``where``.
     """
-    ends = {} if part.end is None else {"end": part.end}
-    tables = {
+    ends: dict[str, Mapping[str, object]] = {} if part.end is None else {"end": part.end}
+    tables: dict[str, Mapping[str, object]] = {
         "information": part.information,
         **ends,
         **{f"points[{number}]": point for number, point in enumerate(part.points)},
@@ -43,7 +53,7 @@ def check_told(part: Any, where: str) -> None:
             )
 
 
-def _faults(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, Any, str]]:
+def _faults(table: Mapping[str, object], name: str) -> Iterator[tuple[str, object, str]]:
     """Yield key, value and what is allowed for each value that is not allowed."""
     for key in _COUNTS:
         least = int(key == "stride")
@@ -58,7 +68,7 @@ def _faults(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, Any, str
     yield from _too_large(table, name, 0)
 
 
-def _too_large(value: Any, name: str, depth: int) -> Iterator[tuple[str, Any, str]]:
+def _too_large(value: object, name: str, depth: int) -> Iterator[tuple[str, object, str]]:
     if isinstance(value, float | int):
         if LARGEST_NUMBER < abs(value) < float("inf"):
             yield name, value, f"a number up to {LARGEST_NUMBER:g}"

@@ -3,19 +3,33 @@
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 from rig.errors import RecordingError
 from rig.recording.examination import objects_in
 from rig.recording.layout import open_unchecked, reading
 from rig.system.child import confine
 
+if TYPE_CHECKING:
+    import h5py
+
 _AT_ONCE = 2**22
 
 
-def main(path: Path) -> dict[str, Any]:
-    """The verdict: why the file is refused, if it is, whether memory did not suffice, and the file's schema."""
-    verdict: dict[str, Any] = {"refused": "", "memory": False, "schema": 0}
+class Verdict(TypedDict):
+    """Result of reading a file."""
+
+    refused: str
+    """Why the file is refused; empty if it is not."""
+    memory: bool
+    """Whether it was refused because memory did not suffice."""
+    schema: int
+    """Schema of the file; 0 if it could not be read."""
+
+
+def main(path: Path) -> Verdict:
+    """Read the whole file and return the verdict."""
+    verdict: Verdict = {"refused": "", "memory": False, "schema": 0}
     try:
         with open_unchecked(path) as file, reading(path):
             verdict["schema"] = int(file.attrs["schema"])
@@ -29,7 +43,7 @@ def main(path: Path) -> dict[str, Any]:
     return verdict
 
 
-def _read_all(dataset: Any) -> None:
+def _read_all(dataset: "h5py.Dataset") -> None:
     """Read a dataset chunk by chunk, or by rows of some megabytes."""
     if dataset.shape == () or 0 in dataset.shape:
         dataset[()]

@@ -47,7 +47,7 @@ class Comparison:
         return {"points": points, "findings": list(self.findings)}
 
 
-def compared(foreseen: Mapping[str, Any], points: Iterable[Point[Any]], end: Mapping[str, Any] | None) -> Comparison:
+def compared(foreseen: Mapping[str, Any], points: Iterable[Point[object]], end: Mapping[str, Any] | None) -> Comparison:
     """Compare points of a run, and how it ended, with what was foreseen.
 
     A value outside all draws, a point refused that nearly all draws accept, and a trip that nearly none has, are findings.
@@ -61,7 +61,7 @@ def compared(foreseen: Mapping[str, Any], points: Iterable[Point[Any]], end: Map
     return Comparison(found, tuple(findings))
 
 
-def _point(foreseen: Mapping[str, Any] | None, point: Point[Any]) -> PointComparison:
+def _point(foreseen: Mapping[str, Any] | None, point: Point[object]) -> PointComparison:
     rank: dict[str, float] = {}
     findings: list[str] = []
     if foreseen is None:
@@ -81,7 +81,7 @@ def _point(foreseen: Mapping[str, Any] | None, point: Point[Any]) -> PointCompar
     return PointComparison(point.number, point.level, rank, tuple(findings))
 
 
-def _values(point: Point[Any]) -> dict[str, float]:
+def _values(point: Point[object]) -> dict[str, float]:
     out: dict[str, float] = {}
     if point.vibration is not None:
         for name in ("frequency_hz", "force_n", "amplitude_m", "voltage_v"):

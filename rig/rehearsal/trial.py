@@ -259,7 +259,7 @@ def _points(plan: Plan, stored: Sequence[Mapping[str, Any]]) -> list[TrialPoint]
     return [_point(point_from(table, result)) for table in latest.values()]
 
 
-def _point(point: Point[Any]) -> TrialPoint:
+def _point(point: Point[object]) -> TrialPoint:
     found: dict[str, float | None] = {"settle_periods": point.settle_periods}
     if point.vibration is not None:
         for name in ("frequency_hz", "force_n", "amplitude_m", "voltage_v"):

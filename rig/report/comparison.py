@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class _Compared:
 
     name: str
     row: tuple[str, ...]
-    points: Sequence[Point[Any]]
+    points: Sequence[Point[object]]
 
 
 def comparisons(paths: Sequence[Path], pictures: Pictures) -> list[Chapter]:
@@ -143,7 +143,7 @@ def _panel(axis: "Axes", one: _Compared, n: int, x: Column, y: Column, spread: C
     axis.plot(_values(refused, x), _values(refused, y), marker, ms=3, mfc="none", color=REJECTED)
 
 
-def _values(points: Sequence[Point[Any]], column: Column) -> np.ndarray:
+def _values(points: Sequence[Point[object]], column: Column) -> np.ndarray:
     """Return the values of a column in its unit, float64[points]; NaN where a point has none."""
     if column is _LEVEL:
         return np.array([point.level for point in points], float)

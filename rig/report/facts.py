@@ -5,6 +5,7 @@ from typing import Any
 
 from rig.arming.run_facts import About
 from rig.recording.reader import Recording
+from rig.recording.stored import About as StoredAbout
 from rig.report.document import Block, Facts, Section, Table, Text
 from rig.report.keys import key_rows, limit_rows
 from rig.text.console import number
@@ -132,7 +133,7 @@ def files_and_versions(recording: Recording, files: Table) -> Section:
     return Section("Versions and files", [Facts("", facts), files])
 
 
-def _abouts(recording: Recording) -> Sequence[dict[str, Any]]:
+def _abouts(recording: Recording) -> Sequence[StoredAbout]:
     return [part.information.get("about") or {} for part in recording.parts]
 
 

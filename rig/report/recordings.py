@@ -59,7 +59,7 @@ def recording_chapter(path: Path, pictures: Pictures) -> Chapter:
         )
 
 
-def point_table(kind: str, points: Sequence[Point[Any]], caption: str) -> Table:
+def point_table(kind: str, points: Sequence[Point[object]], caption: str) -> Table:
     """Return the table of points that `rig show` prints; where all levels have one unit, it stands in the heading."""
     columns = shown_columns(kind, points)
     rows = point_rows(points, columns)
@@ -71,7 +71,7 @@ def point_table(kind: str, points: Sequence[Point[Any]], caption: str) -> Table:
     return Table(caption, headings, rows, frozenset(i for i, point in enumerate(points) if not point.accepted))
 
 
-def _points(kind: str, points: Sequence[Point[Any]], summary: Mapping[str, Any]) -> list[Block]:
+def _points(kind: str, points: Sequence[Point[object]], summary: Mapping[str, Any]) -> list[Block]:
     if not points:
         return [Text("No point was measured.", "note")]
     table = point_table(kind, points, "Every point of the plan, by its last measurement")
@@ -90,7 +90,7 @@ def _points(kind: str, points: Sequence[Point[Any]], summary: Mapping[str, Any])
     return blocks
 
 
-def _refused(points: Sequence[Point[Any]], summary: Mapping[str, Any]) -> list[Block]:
+def _refused(points: Sequence[Point[object]], summary: Mapping[str, Any]) -> list[Block]:
     blocks: list[Block] = [Text(line) for line in (summary["skipped"], summary["measured_again"]) if line]
     refused = [point for point in points if not point.accepted]
     if refused:

@@ -10,13 +10,13 @@ from rig.show.progress import value_text
 from rig.text.column import Column
 
 
-def points_from(kind: str, tables: Sequence[Mapping[str, Any]]) -> list[Point[Any]]:
+def points_from(kind: str, tables: Sequence[Mapping[str, Any]]) -> list[Point[object]]:
     """Return the points of a summary of a recording as objects."""
     result: type[Any] = CAMPAIGNS[kind].result
     return [point_from({key: value for key, value in one.items() if value is not None}, result) for one in tables]
 
 
-def shown_columns(kind: str, points: Sequence[Point[Any]]) -> list[Column]:
+def shown_columns(kind: str, points: Sequence[Point[object]]) -> list[Column]:
     """Return the columns of a kind, without optional ones that no point has a value for."""
     return [
         column
@@ -25,7 +25,7 @@ def shown_columns(kind: str, points: Sequence[Point[Any]]) -> list[Column]:
     ]
 
 
-def point_rows(points: Sequence[Point[Any]], columns: Sequence[Column]) -> list[tuple[str, ...]]:
+def point_rows(points: Sequence[Point[object]], columns: Sequence[Column]) -> list[tuple[str, ...]]:
     """Return for each point: number counted from 1, level, its unit, the columns, whether it settled, and quality."""
     return [
         (
@@ -40,7 +40,7 @@ def point_rows(points: Sequence[Point[Any]], columns: Sequence[Column]) -> list[
     ]
 
 
-def attempts_refused(point: Point[Any]) -> list[str]:
+def attempts_refused(point: Point[object]) -> list[str]:
     """Return one line for each attempt at a point that was refused before the one that the table shows."""
     return [
         f"{point_name(point.number)}: attempt {number} refused{_where(attempt)}: {attempt.reason}"

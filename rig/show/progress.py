@@ -3,7 +3,7 @@
 import contextlib
 import sys
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.stored_point import value_of
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 LOCK_WORDS = ("searching", "acquiring", "locked", "lost")
 
 
-def value_text(column: "Column", point: Point[Any]) -> str:
+def value_text(column: "Column", point: Point[object]) -> str:
     """Format a quantity of a point without its unit; return a dash if there is no value."""
     value = value_of(point, column.key)
     return number(None if value is None else value + column.counts_from, column.pattern, column.scale)
 
 
-def _in_a_line(column: "Column", point: Point[Any]) -> str:
+def _in_a_line(column: "Column", point: Point[object]) -> str:
     """Format a quantity of a point with its unit. The heading is left out where the unit already identifies the quantity."""
     text = f"{value_text(column, point):>8} {column.unit}".rstrip()
     return text if column.plain else f"{column.heading} {text}"
@@ -40,7 +40,7 @@ class RunProgress:
         self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._finished = 0
 
-    def point(self, point: Point[Any], number_done: int, total: int) -> None:
+    def point(self, point: Point[object], number_done: int, total: int) -> None:
         """Print the line of a point."""
         self._finished = number_done
         of = f"/{total}" if point.number < total else ""  # a changed plan continues the numbering of earlier plans

@@ -20,6 +20,7 @@ from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
+from rig.recording.stored import End, StoredPoint
 from rig.rehearsal.comparison import compared
 from rig.results.files import load, understood
 from rig.results.kinds import KINDS
@@ -112,7 +113,7 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[Any]]) -> list[str]:
+def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[object]]) -> list[str]:
     """Return the names of what ended the run early or spoilt points, by which the documentation explains them."""
     failed = [point for point in points if not point.accepted]
     names = [*(end["reason"] for end in ends[-1:]), *(page for point in failed for page in pages_on(point.reason))]
@@ -150,7 +151,7 @@ def _beside_rehearsal(part: Part) -> dict[str, Any] | None:
     return compared(foreseen, [point_from(table) for table in part.points], part.end).to_dict()
 
 
-def _mode_shape(recording: Recording, points: Sequence[Point[Any]], kind: str) -> dict[str, Any] | None:
+def _mode_shape(recording: Recording, points: Sequence[Point[object]], kind: str) -> dict[str, Any] | None:
     """Return the mode shape at the drive point that a model takes; None for kinds of campaigns that evaluate no damping.
 
     ``others`` are the numbers of points that were evaluated with another one, under an earlier plan.
@@ -170,13 +171,13 @@ def _changes(recording: Recording) -> dict[int, list[str]]:
     return {said.part: changed_keys(before, after) for said, before, after in pairs}
 
 
-def _shown(point: dict[str, Any], kind: str) -> dict[str, Any]:
+def _shown(point: StoredPoint, kind: str) -> dict[str, Any]:
     """Return the stored form of a point without its harmonics. Keys that a failed point lacks are None."""
     expected = dict.fromkeys([*(column.key for column in CAMPAIGNS[kind].columns), *QUALITY])
     return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}
 
 
-def _loop(ends: list[dict[str, Any]], rows: int, rate_hz: float) -> dict[str, Any]:
+def _loop(ends: Sequence[End], rows: int, rate_hz: float) -> dict[str, Any]:
     loops = [end["loop"] for end in ends]
     busy, wall = sum(loop["busy_s"] for loop in loops), sum(loop["wall_s"] for loop in loops)
     samples = sum(loop["samples"] for loop in loops)

@@ -3,7 +3,7 @@
 One bundle holds the complete control state of a run; a copy of it is a checkpoint.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,7 +92,7 @@ ROW_COLUMNS: tuple[dict[str, str], ...] = (
 """Unit and meaning of every recorded column, for the file."""
 
 
-def recorded_row(n_channels: int) -> np.dtype[Any]:
+def recorded_row(n_channels: int) -> np.dtype:
     """Dtype of a recorded row: the inputs (float32, SI units), then the scalars of `ROW`."""
     return np.dtype([("inputs", "f4", (n_channels,)), *((name, ROW[name]) for name in ROW.names or ())])
 

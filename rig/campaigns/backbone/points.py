@@ -75,7 +75,7 @@ class ShortPointResult:
 
 def measure_backbone_point(
     bench: Bench, plan: BackbonePlan, target: Target, rows: Rows, settling: np.void
-) -> Point[ShortPointResult]:
+) -> Point[object]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment.
 
     A point whose fundamental is too far from the wanted phase is kept but not accepted. For a slow-flow point, the rows begin
@@ -95,7 +95,7 @@ def measure_backbone_point(
     return with_settling(replace(point, modal=modal), settling)
 
 
-def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) -> Point[ShortPointResult]:
+def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) -> Point[object]:
     """Evaluate a point from its ramp and the time at the point, whether or not the vibration settled."""
     try:
         flow = recorded_flow(bench, rows, plan.harmonics, plan.plant, other_modes=False)
@@ -161,7 +161,7 @@ def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, no
 
 
 def backbone_of(
-    points: Iterable[Point[Any]],
+    points: Iterable[Point[object]],
     channels: Sequence[Mapping[str, Any]],
     shape: DriveShape,
     phase_lag_target_deg: float,

@@ -106,7 +106,7 @@ def measure_continuous_backbone(
     rows: np.ndarray,
     passages: Sequence[Passage],
     ended: str,
-) -> list[Point[ContinuousBackboneResult]]:
+) -> list[Point[object]]:
     """Evaluate all levels of a way up and a way down; ``ended`` is the reason why the output was brought down, or empty.
 
     A level that was passed on one way only gets the results of that way and is not accepted. A level that was not passed at all
@@ -127,13 +127,13 @@ def _measured(
     targets: Sequence[Target],
     ways: Mapping[str, Way],
     rows: np.ndarray,
-) -> dict[int, Point[ContinuousBackboneResult]]:
+) -> dict[int, Point[object]]:
     """Return the points by number: evaluated from both ways, from one way, or failed."""
     groups: dict[tuple[str, ...], list[Target]] = {}
     for target in targets:
         covered = tuple(name for name in WAYS if ways[name].covers(target.level))
         groups.setdefault(covered, []).append(target)
-    out: dict[int, Point[ContinuousBackboneResult]] = {}
+    out: dict[int, Point[object]] = {}
     for covered, some in groups.items():
         missing = _together({name: ways[name].why for name in WAYS if name not in covered})
         if not covered:
@@ -161,7 +161,7 @@ def _together(reasons: Mapping[str, str]) -> str:
     return "; ".join(f"way {name}: {why}" for name, why in reasons.items())
 
 
-def _failed(plan: ContinuousBackbonePlan, target: Target, reason: str) -> Point[ContinuousBackboneResult]:
+def _failed(plan: ContinuousBackbonePlan, target: Target, reason: str) -> Point[object]:
     return replace(planned_point(plan, target), direction="both", settled=False).refused(reason)
 
 
@@ -172,7 +172,7 @@ def _point(
     together: _Together,
     index: int,
     pieces: Sequence[np.ndarray],
-) -> Point[ContinuousBackboneResult]:
+) -> Point[object]:
     """Evaluate one level, the ``index``-th of those evaluated together: mean of the ways, with standard errors.
 
     ``pieces`` are the rows near the level, one array per way.

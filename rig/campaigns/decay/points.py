@@ -80,7 +80,7 @@ class DecayResult:
     """Number of levels at which the decay could be evaluated."""
 
 
-def measure_decay(bench: Bench, plan: DecayPlan, target: Target, rows: Rows, settling: np.void) -> Point[DecayResult]:
+def measure_decay(bench: Bench, plan: DecayPlan, target: Target, rows: Rows, settling: np.void) -> Point[object]:
     """Evaluate the settled record and the decay of one point; the rows begin with the ramp to it."""
     taken = rows[0 : rows.size]
     first, release = _stretches(taken)

@@ -1,6 +1,6 @@
 """Figure of a dwell: frequency, damping, amplitude and force over the cycles, with the limits of the plan."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from rig.drawing.axes import widen
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 from rig.recording.reader import Recording
+from rig.recording.stored import PlanTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,12 +50,12 @@ def draw(page: "Figure", recording: Recording) -> None:
     heading(page, recording)
 
 
-def _limits(axis: "Axes", values: np.ndarray, plan: dict[str, Any], watched: str) -> None:
+def _limits(axis: "Axes", values: np.ndarray, plan: PlanTable, watched: str) -> None:
     """Draw the alarm and abort limits on the side to which the quantity has changed."""
     if not watched or not np.isfinite(values[0]):
         return
     sign = -1.0 if np.nanmean(values) < values[0] else 1.0
-    for name, colour in (("alarm", REJECTED), ("abort", SECOND)):
-        limit = plan[name].get(watched)
+    for name, table, colour in (("alarm", plan["alarm"], REJECTED), ("abort", plan["abort"], SECOND)):
+        limit = table.get(watched)
         if limit is not None and np.nanmax(np.abs(values / values[0] - 1.0)) > NEAR * limit:
             axis.axhline(values[0] * (1.0 + sign * limit), color=colour, lw=0.9, ls="--", label=f"{name}.{watched}")

@@ -85,7 +85,7 @@ class DwellResult:
     """Changes from the first accepted mean; None if this mean was not accepted."""
 
 
-def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: Rows, settling: np.void) -> Point[DwellResult]:
+def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: Rows, settling: np.void) -> Point[object]:
     """Evaluate frequency, damping and amplitude of one mean over its whole periods, with its quality."""
     cycles = turned_rad(rows) / (2.0 * math.pi) * rows.size / max(1, rows.size - 1)
     length = Length(cycles_in_mean=cycles, seconds_in_mean=rows.size / bench.sample_rate_hz)
@@ -104,9 +104,7 @@ def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: Rows, sett
     return replace(point, modal=modal, result=DwellResult(length=length, held=held))
 
 
-def watch_drift(
-    plan: DwellPlan, known: Sequence[Point[DwellResult]], point: Point[DwellResult]
-) -> tuple[Point[DwellResult], str]:
+def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[object]) -> tuple[Point[object], str]:
     """Add cycles, time and changes to a mean; also return why the test ends, or an empty string.
 
     The changes are relative to the first accepted mean, those of the damping to the first one that was evaluated with the same
@@ -114,9 +112,9 @@ def watch_drift(
     first mean, over all parts of a recording. Failed means count too; the ramp and the settling at the beginning of a part do
     not.
     """
-    cycles = sum(map(_cycles, known)) + 0.5 * _cycles_in_mean(point)
-    seconds = sum(map(_seconds, known)) + 0.5 * _seconds(point)
-    result = replace(point.result or DwellResult(), cycles=cycles, time_s=seconds)
+    cycles = sum(map(_cycles, known)) + 0.5 * _length(point).cycles_in_mean
+    seconds = sum(_length(one).seconds_in_mean for one in known) + 0.5 * _length(point).seconds_in_mean
+    result = replace(_result(point) or DwellResult(), cycles=cycles, time_s=seconds)
     if not point.accepted:
         return replace(point, result=result), ""
     first = next((one for one in known if one.accepted), point)
@@ -138,7 +136,7 @@ def watch_drift(
     return point.warned(*alarms) if alarms else point, f"{abort}, after {cycles:.0f} cycles" if abort else ""
 
 
-def _watched(plan: DwellPlan, point: Point[DwellResult]) -> dict[str, float | None]:
+def _watched(plan: DwellPlan, point: Point[object]) -> dict[str, float | None]:
     """Return the monitored quantities of a mean, keyed as in the limits. Of force and displacement, it is the one not held."""
     modal, vibration = point.modal, point.vibration
     amplitude = None if vibration is None else vibration.force_n if plan.level_unit == "m" else vibration.amplitude_m
@@ -149,22 +147,25 @@ def _watched(plan: DwellPlan, point: Point[DwellResult]) -> dict[str, float | No
     }
 
 
-def _mode_shape(point: Point[DwellResult]) -> float | None:
+def _mode_shape(point: Point[object]) -> float | None:
     return None if point.modal is None else point.modal.drive_mode_shape
 
 
-def _cycles(point: Point[DwellResult]) -> float:
+def _result(point: Point[object]) -> DwellResult | None:
+    return point.result if isinstance(point.result, DwellResult) else None
+
+
+def _length(point: Point[object]) -> Length:
+    """Return the length of a mean; 0 if nothing was recorded."""
+    result = _result(point)
+    return (None if result is None else result.length) or Length(cycles_in_mean=0.0, seconds_in_mean=0.0)
+
+
+def _cycles(point: Point[object]) -> float:
     """Return the cycles that a mean has added: those of its record or, if it failed, those until it failed."""
-    length = None if point.result is None else point.result.length
+    result = _result(point)
+    length = None if result is None else result.length
     return (point.settle_periods or 0.0) if length is None else length.cycles_in_mean
-
-
-def _cycles_in_mean(point: Point[DwellResult]) -> float:
-    return 0.0 if point.result is None or point.result.length is None else point.result.length.cycles_in_mean
-
-
-def _seconds(point: Point[DwellResult]) -> float:
-    return 0.0 if point.result is None or point.result.length is None else point.result.length.seconds_in_mean
 
 
 def _change(first: float | None, now: float | None) -> float | None:

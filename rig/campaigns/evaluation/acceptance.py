@@ -6,7 +6,6 @@ An objection is a line that says why a point is not accepted. It is empty if the
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -118,7 +117,7 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
 
 def settled_point(
     plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: Rows, level: str = ""
-) -> Point[Any]:
+) -> Point[object]:
     """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level.
 
     All campaigns that settle and record at a held lag use this function.
@@ -152,6 +151,6 @@ def settled_point(
     )
 
 
-def with_settling(point: Point[Any], settling: np.void) -> Point[Any]:
+def with_settling(point: Point[object], settling: np.void) -> Point[object]:
     """Add the settling time and the amplitude drift to a point, from the outcome record of its settle segment."""
     return replace(point, settle_periods=float(settling["periods"]), amplitude_drift=float(settling["drift"]))

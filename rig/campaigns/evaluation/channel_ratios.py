@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from rig.campaigns.planning.plant import KnownPlant
 DETUNED = 20.0  # growth of the allowance per relative deviation of the squared frequency
 
 
-def ratios_of(point: Point[Any], drive: int) -> np.ndarray:
+def ratios_of(point: Point[object], drive: int) -> np.ndarray:
     """Fundamentals over the fundamental of channel ``drive``: complex[n_channels], in the ratio of the channels' units."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -28,7 +27,7 @@ def rms_ratios_of(channel_rms: Sequence[float], drive: int) -> np.ndarray:
         return np.asarray(sizes / sizes[drive])
 
 
-def spread_of(bench: Bench, point: Point[Any], drive: int) -> np.ndarray | None:
+def spread_of(bench: Bench, point: Point[object], drive: int) -> np.ndarray | None:
     """Standard errors of the ratios due to noise and the converter's quantisation; None if the drive amplitude is 0."""
     size = np.abs(spectrum_of(point).harmonics[:, 1])
     known = spectrum_of(point).harmonics_std
@@ -62,7 +61,7 @@ def motions_of(bench: Bench) -> list[int]:
     return [index for index, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
 
 
-def softened(bench: Bench, point: Point[Any], drive: int) -> float:
+def softened(bench: Bench, point: Point[object], drive: int) -> float:
     """Factor by which the allowance grows away from resonance, 1 or more."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]
@@ -72,7 +71,7 @@ def softened(bench: Bench, point: Point[Any], drive: int) -> float:
     return 1.0 + min(by_phase, DETUNED * detuned)
 
 
-def resistance_of(bench: Bench, point: Point[Any]) -> float:
+def resistance_of(bench: Bench, point: Point[object]) -> float:
     """Force in phase with the drive point's velocity, divided by that velocity, N s/m."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     velocity = fundamentals[bench.index_of("drive")] / (2j * math.pi * vibration_of(point).frequency_hz)

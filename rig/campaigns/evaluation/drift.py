@@ -13,7 +13,7 @@ def of_the_result(points: Iterable[Point[Result]]) -> list[Point[Result]]:
     return [point for point in points if not point.repeats_first]
 
 
-def drift_of(points: Iterable[Point[Any]]) -> dict[str, Any] | None:
+def drift_of(points: Iterable[Point[object]]) -> dict[str, Any] | None:
     """Return the relative changes from the first point to its repetition, with the numbers of both points.
 
     The changes are those of frequency, damping and amplitude. ``points`` are in the order of the plan. Returns None if the plan
@@ -33,7 +33,7 @@ def drift_of(points: Iterable[Point[Any]]) -> dict[str, Any] | None:
     }
 
 
-def _quantities(point: Point[Any]) -> dict[str, float | None]:
+def _quantities(point: Point[object]) -> dict[str, float | None]:
     out: dict[str, float | None] = {}
     if point.modal is not None:
         out |= {"frequency": point.modal.modal_frequency_hz, "damping": point.modal.damping_ratio}
@@ -42,7 +42,7 @@ def _quantities(point: Point[Any]) -> dict[str, float | None]:
     return out
 
 
-def _same(point: Point[Any], again: Point[Any]) -> bool:
+def _same(point: Point[object], again: Point[object]) -> bool:
     """Whether the plan asks for the same vibration in both points."""
     wanted, found = ((one.level, one.direction, one.repeat, one.asked_phase_lag_deg) for one in (again, point))
     return wanted == found

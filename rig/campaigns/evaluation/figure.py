@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def describe(recording: Recording, test: str) -> str:
     return text + (f", {left_out}" if left_out else "")
 
 
-def refused(points: Sequence[Point[Any]]) -> str:
+def refused(points: Sequence[Point[object]]) -> str:
     """Return how many points were not accepted, with their qualities, such as ``3 not accepted (2 lost-lock, 1 rejected)``."""
     left_out = Counter(str(point.quality) for point in points if not point.accepted)
     if not left_out:
@@ -41,7 +41,7 @@ def refused(points: Sequence[Point[Any]]) -> str:
     return f"{left_out.total()} not accepted ({', '.join(f'{count} {name}' for name, count in left_out.items())})"
 
 
-def why_none(points: Sequence[Point[Any]]) -> str:
+def why_none(points: Sequence[Point[object]]) -> str:
     """Return why no point can be drawn: the reason of the first one that was not accepted."""
     if not points:
         return "no point was measured"

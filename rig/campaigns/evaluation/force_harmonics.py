@@ -1,7 +1,5 @@
 """Whether the harmonics that the harmonics loop controls are in the record what they were wanted to be."""
 
-from typing import Any
-
 import numpy as np
 
 from controller.harmonics.settings import harmonic_ratios
@@ -13,7 +11,9 @@ NEGLIGIBLE_BITS = 0.1  # of the converter: an error that always counts as none
 SIGMAS = 3.0
 
 
-def with_force_harmonics(bench: Bench, plan: Plan, target: Target, point: Point[Any], left_alone: int) -> Point[Any]:
+def with_force_harmonics(
+    bench: Bench, plan: Plan, target: Target, point: Point[object], left_alone: int
+) -> Point[object]:
     """Refuse or warn about a point whose controlled harmonics are off; without the harmonics loop return it as it is.
 
     ``left_alone``: bit h for each harmonic h that the loop left alone; those only warn, and so do points that did not settle.

@@ -22,7 +22,7 @@ def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyRespons
 
 
 def frequency_responses_of(
-    points: Iterable[Point[Any]], channels: Sequence[Mapping[str, Any]], specimen: str
+    points: Iterable[Point[object]], channels: Sequence[Mapping[str, Any]], specimen: str
 ) -> tuple[FrequencyResponse, ...]:
     """Return the accepted points of a recording as one frequency response per level and pass.
 
@@ -54,12 +54,12 @@ def frequency_responses_of(
     return tuple(out)
 
 
-def passes_of(points: Iterable[Point[Any]]) -> list[tuple[str, list[Point[Any]]]]:
+def passes_of(points: Iterable[Point[object]]) -> list[tuple[str, list[Point[object]]]]:
     """Return the name and the accepted points of each level and pass, in the order of measurement.
 
     Raises `IdentificationError` if no point was accepted.
     """
-    passes: dict[tuple[float, str, int, str], list[Point[Any]]] = {}
+    passes: dict[tuple[float, str, int, str], list[Point[object]]] = {}
     for point in of_the_result(points):
         if point.accepted:
             passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)

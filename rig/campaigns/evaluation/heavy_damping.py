@@ -8,15 +8,13 @@ static compliance of the drive point, relative to that of the mode, and the damp
 to the lowest order in z^2 r. A point knows nothing of r, and its standard errors are those of noise alone.
 """
 
-from typing import Any
-
 from rig.campaigns.evaluation.point import Point
 
 TRUSTED = 0.1
 """Damping ratio up to which the shift is below 2 % of the share of the other modes: 0.1 % where that is a twentieth."""
 
 
-def with_heavy_damping(point: Point[Any]) -> Point[Any]:
+def with_heavy_damping(point: Point[object]) -> Point[object]:
     """Warn about a point at phase resonance whose damping ratio is so large that other modes shift frequency and damping."""
     modal = point.modal
     if modal is None or point.lock is None or modal.damping_ratio is None or not modal.damping_ratio > TRUSTED:

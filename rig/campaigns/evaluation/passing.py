@@ -1,7 +1,5 @@
 """Tell whether a recorded point was refused for something that passes: a fault of the device for a while, or a disturbance."""
 
-from typing import Any
-
 import numpy as np
 
 from identification.signals.chunks import unwrapped
@@ -16,7 +14,7 @@ STANDS_OUT = (
 FEWEST_PERIODS = 4
 
 
-def was_refused_in_passing(point: Point[Any], bench: Bench, rows: Rows, faults: int, steady: bool) -> bool:
+def was_refused_in_passing(point: Point[object], bench: Bench, rows: Rows, faults: int, steady: bool) -> bool:
     """Return whether a point was refused, but for something that passes, so that it is worth another attempt.
 
     That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached

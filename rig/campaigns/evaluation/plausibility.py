@@ -20,7 +20,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -60,7 +59,7 @@ FEW = 5  # largest number of such points
 MANY = 100  # largest number of points compared under a lock: more would add nothing
 
 
-def with_plausibility(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> Point[Any]:
+def with_plausibility(bench: Bench, plan: Plan, point: Point[object], before: Sequence[Point[object]]) -> Point[object]:
     """Return the point with ``misfit``, its largest factor, and with a warning or a refusal if the factor is too large.
 
     ``before`` are the earlier points. Points that did not fit or were not accepted are not used as a reference; otherwise a
@@ -69,7 +68,7 @@ def with_plausibility(bench: Bench, plan: Plan, point: Point[Any], before: Seque
     return _judged(bench, point, misfits_of(bench, plan, point, before))
 
 
-def with_plausible_ways(bench: Bench, point: Point[Any], pieces: Sequence[np.ndarray]) -> Point[Any]:
+def with_plausible_ways(bench: Bench, point: Point[object], pieces: Sequence[np.ndarray]) -> Point[object]:
     """Check a point that is the mean of two ways by comparing the rows of both ways. A single way is not judged."""
     if len(pieces) < 2:
         return point
@@ -84,7 +83,7 @@ def with_plausible_ways(bench: Bench, point: Point[Any], pieces: Sequence[np.nda
     return _judged(bench, point, misfits)
 
 
-def start_refusal(bench: Bench, plan: Plan, point: Point[Any]) -> str:
+def start_refusal(bench: Bench, plan: Plan, point: Point[object]) -> str:
     """Return why the vibration at the start voltage does not fit the mode shapes; an empty string unless it is refused."""
     misfits = _of_a_tone(bench, plan, point, ())
     if not any(misfit.refused for misfit in misfits):
@@ -92,7 +91,7 @@ def start_refusal(bench: Bench, plan: Plan, point: Point[Any]) -> str:
     return misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name)
 
 
-def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point[Any]:
+def _judged(bench: Bench, point: Point[object], misfits: Sequence[Misfit]) -> Point[object]:
     if not misfits:
         return point
     worst = max(misfit.factor for misfit in misfits)
@@ -107,12 +106,12 @@ def _judged(bench: Bench, point: Point[Any], misfits: Sequence[Misfit]) -> Point
     return point.refused(text, Quality.IMPLAUSIBLE)
 
 
-def _misfit_of(point: Point[Any]) -> float:
+def _misfit_of(point: Point[object]) -> float:
     """Return the misfit of a point; 1 if there was nothing to compare with."""
     return 1.0 if point.misfit is None else point.misfit
 
 
-def misfits_of(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
+def misfits_of(bench: Bench, plan: Plan, point: Point[object], before: Sequence[Point[object]]) -> list[Misfit]:
     """Return the misfit of each channel from its expectation; an empty list if nothing is known to compare with."""
     usual = [one for one in before if one.accepted and not one.misfit_channels]
     if point.spectrum is not None:
@@ -122,7 +121,7 @@ def misfits_of(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
     return _of_a_band(bench, point, usual)
 
 
-def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
+def _of_a_tone(bench: Bench, plan: Plan, point: Point[object], before: Sequence[Point[object]]) -> list[Misfit]:
     """Compare the fundamentals of the responses, relative to the drive, with the mode shapes and with earlier points."""
     drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
     ratios, spread = ratios_of(point, drive), spread_of(bench, point, drive)
@@ -148,7 +147,7 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[Any], before: Sequence[Poi
 
 
 def _of_the_force(
-    bench: Bench, point: Point[Any], usual: Sequence[Point[Any]], before: Sequence[Point[Any]]
+    bench: Bench, point: Point[object], usual: Sequence[Point[object]], before: Sequence[Point[object]]
 ) -> list[Misfit]:
     """Compare in-phase force over velocity with that of the nearest earlier point.
 
@@ -176,7 +175,7 @@ def _of_the_force(
     return [found]
 
 
-def _against(bench: Bench, point: Point[Any], other: Point[Any]) -> tuple[float, float]:
+def _against(bench: Bench, point: Point[object], other: Point[object]) -> tuple[float, float]:
     """Return the ratio of force over velocity to that of another point, and the factor that the levels do not explain."""
     here, there = resistance_of(bench, point), resistance_of(bench, other)
     if not (here > 0.0 and there > 0.0):
@@ -185,11 +184,11 @@ def _against(bench: Bench, point: Point[Any], other: Point[Any]) -> tuple[float,
     return here / there, max(here / there / allowed, there / here / allowed, 1.0)
 
 
-def _level_of(point: Point[Any]) -> str:
+def _level_of(point: Point[object]) -> str:
     return f"{point.level:.4g} {point.level_unit}"
 
 
-def _of_a_band(bench: Bench, point: Point[Any], before: Sequence[Point[Any]]) -> list[Misfit]:
+def _of_a_band(bench: Bench, point: Point[object], before: Sequence[Point[object]]) -> list[Misfit]:
     """Compare the RMS of force and responses, relative to the drive, with earlier points at the same level."""
     alike = [one.channel_rms for one in before if one.channel_rms is not None and one.level == point.level]
     if point.channel_rms is None or not alike:
@@ -256,15 +255,15 @@ def _swapped(bench: Bench, sizes: np.ndarray, shapes: np.ndarray) -> list[Misfit
     return [Misfit(names[0], float(sizes[one]), float(shapes[one]), WARNED, Seen.SHAPES, swapped_with=names[1])]
 
 
-def _near_the_mode(bench: Bench, point: Point[Any]) -> bool:
+def _near_the_mode(bench: Bench, point: Point[object]) -> bool:
     return abs(math.log(vibration_of(point).frequency_hz / bench.specimen.linear_frequency_hz)) < NEAR
 
 
-def _apart(one: Point[Any], other: Point[Any]) -> float:
+def _apart(one: Point[object], other: Point[object]) -> float:
     """Distance between the levels of two points, as a logarithm."""
     return abs(math.log(one.level / other.level))
 
 
-def _lags_apart(one: Point[Any], other: Point[Any]) -> float:
+def _lags_apart(one: Point[object], other: Point[object]) -> float:
     """Distance between the requested lags of two points, deg."""
     return abs((one.asked_phase_lag_deg or 0.0) - (other.asked_phase_lag_deg or 0.0))

@@ -7,7 +7,7 @@
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, Generic, Literal, TypeVar
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,7 +170,7 @@ class Attempt:
     """Peak of the force's fundamental, N; None if it is not known."""
 
 
-Result = TypeVar("Result")
+Result = TypeVar("Result", covariant=True)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -269,7 +269,7 @@ class Point(Generic[Result]):
         return replace(self, warnings=(*(self.warnings or ()), *texts))
 
 
-def planned_point(plan: Plan, target: Target) -> Point[Any]:
+def planned_point(plan: Plan, target: Target) -> Point[object]:
     """Return a point as the plan asks for it, before anything is measured."""
     return Point(
         number=target.number,
@@ -295,14 +295,14 @@ def point_name(number: int) -> str:
     return f"point {number + 1}"
 
 
-def vibration_of(point: Point[Any]) -> Vibration:
+def vibration_of(point: Point[object]) -> Vibration:
     """Return the vibration of a point that must have one; raise `RecordingError` if it has none."""
     if point.vibration is None:
         raise RecordingError(f"{point_name(point.number)}: holds no vibration")
     return point.vibration
 
 
-def spectrum_of(point: Point[Any]) -> Spectrum:
+def spectrum_of(point: Point[object]) -> Spectrum:
     """Return the harmonics of a point that must have some; raise `RecordingError` if it has none."""
     if point.spectrum is None:
         raise RecordingError(f"{point_name(point.number)}: holds no harmonics")

@@ -28,7 +28,7 @@ def specimen_of(recording: Recording) -> str:
     return str(recording.configuration["bench"]["specimen"]["name"])
 
 
-def recorded_drive_shape(recording: Recording, points: Sequence[Point[Any]]) -> DriveShape:
+def recorded_drive_shape(recording: Recording, points: Sequence[Point[object]]) -> DriveShape:
     """Return the mode shape that a model of these points takes: that of the current plan's ``[plant]``, else the bench's.
 
     Points of a resumed recording may have been evaluated with that of an earlier plan. Their vibrations do not depend on it, so
@@ -42,12 +42,12 @@ def recorded_drive_shape(recording: Recording, points: Sequence[Point[Any]]) -> 
 
 
 @overload
-def points_of(recording: Recording) -> list[Point[Any]]: ...
+def points_of(recording: Recording) -> list[Point[object]]: ...
 @overload
 def points_of(recording: Recording, result: type[Result]) -> list[Point[Result]]: ...
 
 
-def points_of(recording: Recording, result: type[Any] | None = None) -> list[Point[Any]]:
+def points_of(recording: Recording, result: type[object] | None = None) -> list[Any]:
     """Return the last result of each point of the current plan, in the order of the plan.
 
     ``result`` is the class of the results that only this kind of campaign has. Without it, the points hold only what all kinds

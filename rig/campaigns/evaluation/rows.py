@@ -32,7 +32,7 @@ class Spool:
         OSError: on construction and by `add`, if the files cannot be written.
     """
 
-    def __init__(self, dtype: np.dtype[Any], folder: Path | None = None) -> None:
+    def __init__(self, dtype: np.dtype, folder: Path | None = None) -> None:
         self.dtype, self.size = dtype, 0
         self._lock = Lock()  # an evaluation reads while rows are added
         self._files: Mapping[str, FileIO] = {

@@ -13,7 +13,7 @@ while the vibration changes quickly. A factor that the check had too cannot be s
 
 import cmath
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
@@ -48,7 +48,7 @@ class ScaleMisfit(NamedTuple):
 
 
 def scale_misfit(
-    bench: Bench, point: Point[Any], checked: CheckedScale, growth_1_s: float = 0.0, *, at_start: bool = False
+    bench: Bench, point: Point[object], checked: CheckedScale, growth_1_s: float = 0.0, *, at_start: bool = False
 ) -> ScaleMisfit | None:
     """Compare a vibration near resonance with a check; None if it is too far from resonance, not steady, or empty.
 

@@ -1,12 +1,11 @@
 """Summarise in one line what a run has not measured, and what it has measured again."""
 
 from collections.abc import Iterable
-from typing import Any
 
 from rig.campaigns.evaluation.point import Point
 
 
-def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
+def what_was_skipped(points: Iterable[Point[object]], planned: int) -> str:
     """Return the missing points by quality: ``3 of 13 points skipped: not-settled (0.1 N), unreachable (2 N)``.
 
     The text is empty if every point was accepted. ``points`` holds the last result of each number; ``planned`` is the number of
@@ -25,7 +24,7 @@ def what_was_skipped(points: Iterable[Point[Any]], planned: int) -> str:
     return f"{skipped} of {planned} points skipped: {'; '.join(causes)}" if skipped else ""
 
 
-def what_was_measured_again(points: Iterable[Point[Any]]) -> str:
+def what_was_measured_again(points: Iterable[Point[object]]) -> str:
     """Return which points were measured again: ``measured again: points 3, 7; 3 attempts refused``; empty if none was."""
     again = [point for point in points if point.refused_before]
     refused = sum(len(point.refused_before) for point in again)
@@ -34,7 +33,7 @@ def what_was_measured_again(points: Iterable[Point[Any]]) -> str:
     return f"measured again: point{'s' if len(again) > 1 else ''} {names}; {counted} refused" if again else ""
 
 
-def _place(point: Point[Any]) -> str:
+def _place(point: Point[object]) -> str:
     """Return the level of a point, with the frequency or lag if the plan asks for one."""
     where = [f"{point.level:.4g} {point.level_unit}"]
     if point.asked_frequency_hz is not None:

@@ -34,7 +34,7 @@ FORMER = {"alien_force": "nonharmonic_force"}
 """Keys of earlier versions, with their names of today."""
 
 
-def stored(point: Point[Any]) -> dict[str, Any]:
+def stored(point: Point[object]) -> dict[str, Any]:
     """Return the JSON form of a point."""
     return {**_table(point), "accepted": point.accepted}
 
@@ -62,12 +62,12 @@ def _plain(value: Any) -> Any:
 
 
 @overload
-def point_from(table: Mapping[str, Any]) -> Point[Any]: ...
+def point_from(table: Mapping[str, Any]) -> Point[object]: ...
 @overload
 def point_from(table: Mapping[str, Any], result: type[Result]) -> Point[Result]: ...
 
 
-def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Point[Any]:
+def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Point[object]:
     """Return a point from its JSON form.
 
     ``result`` is the class of the results that only its kind of campaign has; if None, the point has no such results. Raises
@@ -75,7 +75,7 @@ def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Poi
     """
     table = {FORMER.get(key, key): value for key, value in table.items()}
     try:
-        point: Point[Any] = _read(Point, {**table, "quality": _quality(table)}, result)
+        point: Point[object] = _read(Point, {**table, "quality": _quality(table)}, result)
     except KeyError as error:
         raise RecordingError(f"a point's {error.args[0]}: is missing") from None
     return point
@@ -174,7 +174,7 @@ def _layout(kind: Any) -> tuple[tuple[Field[Any], type[Any] | None, bool], ...]:
     return tuple(out)
 
 
-def value_of(point: Point[Any], name: str) -> Any:
+def value_of(point: Point[object], name: str) -> Any:
     """Return the value of a named field of a point or of one of its parts; None if the part is missing."""
     return next((getattr(part, name) for part in _parts(point) if name in _own_names(type(part))), None)
 

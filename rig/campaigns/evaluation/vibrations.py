@@ -47,14 +47,14 @@ POLARITY_DEG = 60.0  # a larger phase error does not come from a settling time t
 FEW_BITS = 20.0  # below this, quantisation may change the damping by a percent unless noise dithers it
 
 
-def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> Point[Any]:
+def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> Point[object]:
     """Return a point whose rows contain no vibration that can be evaluated."""
     return replace(planned_point(plan, target), settled=settled).refused(f"cannot be evaluated: {error}")
 
 
 def failed_point(
     plan: Plan, target: Target, outcome: np.void, *, at_start: bool = False, locked: bool = False
-) -> Point[Any]:
+) -> Point[object]:
     """Return a point that was not measured, with the reason: late outputs and lost samples before anything else.
 
     ``at_start``: no lock was gained at the start voltage. ``locked``: a lock had been gained before, so the polarity is right.
@@ -159,7 +159,7 @@ def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
 
 
 def vibration_from(
-    point: Point[Any], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
+    point: Point[object], channels: tuple[Channel, ...], phase_lag_target_deg: float = 90.0
 ) -> PeriodicVibration:
     """Return the vibration of a recorded point as a measurement."""
     vibration, spectrum = vibration_of(point), spectrum_of(point)

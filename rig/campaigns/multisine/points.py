@@ -59,7 +59,7 @@ class MultisineResult:
 
 def measure_multisine_point(
     bench: Bench, plan: MultisinePlan, target: Target, rows: np.ndarray, settling: np.void
-) -> Point[MultisineResult]:
+) -> Point[object]:
     """Evaluate a recorded realisation and its quality."""
     try:
         spectra = spectra_of(bench, plan, {target.realisation or 0: rows})

@@ -40,7 +40,7 @@ class ResponseControlledResult:
 
 def measure_response_controlled_point(
     bench: Bench, plan: ResponseControlledPlan, target: Target, rows: Rows, settling: np.void
-) -> Point[ResponseControlledResult]:
+) -> Point[object]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     rows = rows[within_periods(rows, plan.record_periods)]
     try:

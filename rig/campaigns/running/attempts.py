@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def _reason(entry: np.void, plays: bool) -> str:
     return why_disturbed(faults, course, final=False)
 
 
-def attempt_at(point: Point[Any]) -> Attempt:
+def attempt_at(point: Point[object]) -> Attempt:
     """Return what is kept of a refused point if it is measured again."""
     vibration = point.vibration
     return Attempt(
@@ -83,7 +83,7 @@ def attempt_at(point: Point[Any]) -> Attempt:
     )
 
 
-def after_attempts(point: Point[Any], before: tuple[Attempt, ...]) -> Point[Any]:
+def after_attempts(point: Point[object], before: tuple[Attempt, ...]) -> Point[object]:
     """Return a point with the attempts before it. A point that is refused says how often it was measured."""
     if not before:
         return point

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from rig.tick.layout import DEVICE_SHIFT
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD
 
 
-def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) -> Point[Any]:
+def with_device_remarks(point: Point[object], rows: Rows, counters: Iterable[str]) -> Point[object]:
     """Add to a point its samples that were lost or continued, and a warning for each other flag raised while it was recorded.
 
     ``counters`` are those of the driver. What reached the structure was measured, and judges the point. Besides, a point is not
@@ -43,7 +42,7 @@ def with_device_remarks(point: Point[Any], rows: Rows, counters: Iterable[str]) 
     return out
 
 
-def with_disorder(point: Point[Any], counters: Mapping[str, int]) -> Point[Any]:
+def with_disorder(point: Point[object], counters: Mapping[str, int]) -> Point[object]:
     """Name the order of frames where a point lacks samples and some came too late to be put in their place.
 
     ``counters`` are those of the driver, so far.

@@ -7,7 +7,7 @@ from typing import Any
 
 from rig.campaigns.evaluation.point import Point
 
-Points = list[Point[Any]]
+Points = list[Point[object]]
 
 
 class EvaluationThread:
@@ -21,7 +21,7 @@ class EvaluationThread:
         """Request an evaluation of ``arguments``, which must not be changed any more."""
         self._asked.append(self._thread.submit(step, *arguments))
 
-    def known(self, point: Point[Any]) -> None:
+    def known(self, point: Point[object]) -> None:
         """Queue a point that needs no evaluation, behind those requested before."""
         self.ask(lambda: [point])
 

@@ -278,7 +278,9 @@ class Execution:
         outcomes = self.tick.outcomes[first:end]
         return int(sum(outcomes[name].sum() for name in ("held", "continued", "lost")))
 
-    def _measured(self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any) -> list[Point[Any]]:
+    def _measured(
+        self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any
+    ) -> list[Point[object]]:
         """Evaluate the points in rows that begin with sample ``first``.
 
         ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
@@ -356,7 +358,7 @@ class Execution:
         self.next_segment = found.end_segment
         return True
 
-    def _report(self, point: Point[Any]) -> None:
+    def _report(self, point: Point[object]) -> None:
         """Write and show a point under its number in the recording, which a change of plan does not alter."""
         point = with_plausibility(self.bench, self.plan, with_disorder(point, self.loop.counters), self.known)
         point, refusal = self.scale.applied(point)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class Margin(NamedTuple):
 
 
 def margin_before(
-    bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Point[Any]]
+    bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Point[object]]
 ) -> Margin | None:
     """Return the largest share of the tripped limit that points with levels in ``unit`` had reached.
 
@@ -59,7 +59,7 @@ def _allowed(bench: Bench, reason: EndReason, channel: int) -> tuple[str, float]
     return "", math.inf
 
 
-def _peak(point: Point[Any], channel: int, reason: EndReason) -> float:
+def _peak(point: Point[object], channel: int, reason: EndReason) -> float:
     """Largest instantaneous value of a channel over a period, without its mean: of the signal, or of its displacement."""
     harmonics = spectrum_of(point).harmonics[channel, 1:]
     orders = np.arange(1, harmonics.size + 1)

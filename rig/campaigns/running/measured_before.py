@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
-from typing import Any
 
 from rig.campaigns.evaluation.point import Attempt, Point
 from rig.campaigns.running.attempts import attempt_at
@@ -16,7 +15,7 @@ class MeasuredBefore:
     """Numbers in the plan of the points that were accepted."""
     numbers: Sequence[int] | None = None
     """Number in the recording of every point of the plan; None if it equals the number in the plan."""
-    points: tuple[Point[Any], ...] = ()
+    points: tuple[Point[object], ...] = ()
     """All points of the recording so far."""
     given_up: frozenset[int] = frozenset()
     """Numbers in the plan of the points that were not accepted and are not measured again."""
@@ -25,7 +24,10 @@ class MeasuredBefore:
 
 
 def before_another(
-    numbers: Sequence[int], known: tuple[Point[Any], ...], again: Set[int], attempts: Mapping[int, tuple[Attempt, ...]]
+    numbers: Sequence[int],
+    known: tuple[Point[object], ...],
+    again: Set[int],
+    attempts: Mapping[int, tuple[Attempt, ...]],
 ) -> MeasuredBefore:
     """Return what was measured before the points ``again`` of a plan are measured again in the same run.
 

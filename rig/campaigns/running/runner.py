@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+from pydantic import TypeAdapter
 
 import vibrolock
 from rig.arming.bench_memory import RememberedTrip, memory_of, now, remember
@@ -37,6 +39,7 @@ from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
+from rig.recording.stored import BenchTable, ChannelTable, PlanTable
 from rig.system.stop_signals import ended_in_order, held
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
@@ -65,8 +68,11 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
             facts = _facts(plan, bench, session, options)
             header = Header(
                 kind=plan.kind,
-                configuration={"bench": bench.model_dump(mode="json"), "plan": plan.model_dump(mode="json")},
-                channels=[channel.model_dump(mode="json") for channel in bench.channels],
+                configuration={
+                    "bench": cast(BenchTable, bench.model_dump(mode="json")),
+                    "plan": cast(PlanTable, plan.model_dump(mode="json")),
+                },
+                channels=[cast(ChannelTable, channel.model_dump(mode="json")) for channel in bench.channels],
                 row_dtype=recorded_row(len(bench.channels)),
                 columns=[Column(**column) for column in ROW_COLUMNS],
                 software_version=vibrolock.__version__,
@@ -156,8 +162,7 @@ def _still_rehearsed(recording: Recording, options: RunOptions) -> RunOptions:
     before = recording.parts[-1].information.get("about", {}).get("rehearsal") if recording.parts else None
     if options.rehearsal is not None or not before or "digest" not in before:
         return options
-    known = {one.name: before[one.name] for one in fields(Rehearsed) if one.name in before}
-    return replace(options, rehearsal=Rehearsed(**known))
+    return replace(options, rehearsal=TypeAdapter(Rehearsed).validate_python(before))
 
 
 def _still_checked(recording: Recording, bench: Bench, options: RunOptions) -> RunOptions:

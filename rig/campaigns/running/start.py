@@ -1,7 +1,6 @@
 """The dialogue of a run with its loop about the start: the level rises only once the vibration there was judged."""
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class Start:
         rows = kept.take(max(end - self._samples(), begin), end)
         return rows, due, self._tick.start_late_periods >= self._judgement.longest_periods
 
-    def judge(self, rows: Rows, number: int, last: bool) -> list[Point[Any]]:
+    def judge(self, rows: Rows, number: int, last: bool) -> list[Point[object]]:
         """Let the run go on from the start voltage, or ask for the ramp to 0 V if the vibration is refused.
 
         ``number`` of the judgement, from 1; ``last``: it is the last one. Returns no points.

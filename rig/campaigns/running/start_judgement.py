@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from identification import IdentificationError
 from rig.arming.checked_scale import CheckedScale
@@ -59,7 +58,7 @@ class StartJudgement:
         self.refused = bool(refusal)
         return refusal
 
-    def applied(self, point: Point[Any]) -> tuple[Point[Any], str]:
+    def applied(self, point: Point[object]) -> tuple[Point[object], str]:
         """Judge a point unless the start was judged, and add the warning; also return why the run must end."""
         refusal = ""
         if self.pending and point.accepted and point.spectrum is not None:
@@ -69,7 +68,7 @@ class StartJudgement:
             return point.refused(refusal, Quality.IMPLAUSIBLE), refusal
         return (point.warned(self._warning) if self._warning and point.accepted else point), ""
 
-    def _judged(self, point: Point[Any], growth_1_s: float = 0.0, *, at_start: bool = False) -> str:
+    def _judged(self, point: Point[object], growth_1_s: float = 0.0, *, at_start: bool = False) -> str:
         """Compare with the check, if there is one; keep what is warned of, and return what is refused."""
         if self._checked is None:
             self.pending = False

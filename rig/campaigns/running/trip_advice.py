@@ -1,7 +1,7 @@
 """Likely cause of a trip, judged by what was measured before it, and advice on what to do."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point
@@ -46,7 +46,7 @@ class Trip(NamedTuple):
 class Before(NamedTuple):
     """State of the run before it tripped."""
 
-    points: Sequence[Point[Any]]
+    points: Sequence[Point[object]]
     """Points that were recorded, accepted or not."""
     locked: bool
     """Whether a lock was gained at any time in the run."""

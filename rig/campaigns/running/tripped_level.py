@@ -1,7 +1,7 @@
 """Determine the level at which a run tripped, and refuse plans that ask for this level again."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -87,7 +87,7 @@ def _reached_since(parts: Sequence[Part], at: TrippedAt) -> bool:
     return any(_is_beyond(point, at) for part in parts for point in map(point_from, part.points) if point.accepted)
 
 
-def _is_beyond(point: Point[Any], at: TrippedAt) -> bool:
+def _is_beyond(point: Point[object], at: TrippedAt) -> bool:
     return at.start or (point.level_unit == at.level_unit and point.level >= ALMOST * at.level)
 
 

@@ -1,7 +1,7 @@
 """Figure of a stepped-phase test: responses at constant level, drawn along their branches."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def _panels(page: "Figure") -> tuple["Axes", "Axes", "Axes"]:
     return axes["amplitude"], axes["lag"], axes["force"]
 
 
-def asked_lags(points: Sequence[Point[Any]]) -> list[float]:
+def asked_lags(points: Sequence[Point[object]]) -> list[float]:
     """Return the lags of the displacement that the plan asks for, deg, rising."""
     return sorted({(point.asked_phase_lag_deg or 0.0) + 180.0 for point in points})
 

@@ -46,7 +46,7 @@ class SteppedPhaseResult:
 
 def measure_stepped_phase_point(
     bench: Bench, plan: SteppedPhasePlan, target: Target, rows: Rows, settling: np.void
-) -> Point[SteppedPhaseResult]:
+) -> Point[object]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     lag_deg = target.phase_lag_deg or 0.0
     rows = rows[within_periods(rows, plan.record_periods)]

@@ -50,7 +50,7 @@ class SteppedSineResult:
 
 def measure_stepped_sine_point(
     bench: Bench, plan: SteppedSinePlan, target: Target, rows: Rows, settling: np.void
-) -> Point[SteppedSineResult]:
+) -> Point[object]:
     """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
     rows = rows[within_periods(rows, plan.record_periods)]
     try:

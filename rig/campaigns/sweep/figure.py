@@ -1,9 +1,8 @@
 """Figure of a sweep: voltage, force, response and instantaneous frequency over time."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import ForceDropOut, Transient, force_drop_out, zero_crossings
 from rig.campaigns.evaluation.figure import refused
@@ -50,7 +49,7 @@ def draw(page: "Figure", recording: Recording) -> None:
 def draw_sweep(
     page: "Figure",
     sweep: Transient,
-    samples: NDArray[Any],
+    samples: np.ndarray,
     sample_rate_hz: float,
     *,
     drop_out: ForceDropOut | None = None,
@@ -107,7 +106,7 @@ def _signal(axis: "Axes", values: Float, period: int, rate_hz: float) -> None:
     axis.fill_between(at / rate_hz, lowest, highest, color=MAIN, alpha=0.35, lw=0, label="signal")
 
 
-def _momentary_frequency(axis: "Axes", sweep: Transient, force: NDArray[Any], rate_hz: float) -> None:
+def _momentary_frequency(axis: "Axes", sweep: Transient, force: np.ndarray, rate_hz: float) -> None:
     """Draw the frequency of the voltage, of the force's fundamental, and from the zero crossings of the force.
 
     Zero crossings are left out where harmonics add some or shift them, so that they do not tell a frequency.

@@ -69,9 +69,7 @@ class SweepResult:
     """The held quantity; None with levels in volts."""
 
 
-def measure_sweep(
-    bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void
-) -> Point[SweepResult]:
+def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void) -> Point[object]:
     """Evaluate a recorded sweep: a transient vibration, which does not have to settle."""
     try:
         transient = transient_of(bench, rows)

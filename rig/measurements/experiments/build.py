@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from identification.signals.decimation import LARGEST_FACTOR
 from identification.validation import positive
 from rig.bench.configuration import validated
 from rig.campaigns.evaluation.drift import of_the_result
-from rig.campaigns.evaluation.point import Point, point_name, vibration_of
+from rig.campaigns.evaluation.point import Point, Result, point_name, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.stored_samples import StoredSamples
@@ -125,16 +125,16 @@ def experiments(
                 wanted,
                 f"{_called(recording.path.stem, point)}, realisation {(point.realisation or 0) + 1}",
             )
-            for point in _accepted(recording, MultisineResult)
+            for point in _accepted(recording, points_of(recording, MultisineResult))
         )
-    found = tuple(_records(recording, signals, _accepted(recording), rate_hz, segment_periods))
+    found = tuple(_records(recording, signals, _accepted(recording, points_of(recording)), rate_hz, segment_periods))
     if not found:
         raise IdentificationError(f"{recording.path}: no record without lost samples is long enough to be of use")
     return found
 
 
 def _records(
-    recording: Recording, signals: Signals, points: Sequence[Point[Any]], rate_hz: float, segment_periods: int
+    recording: Recording, signals: Signals, points: Sequence[Point[object]], rate_hz: float, segment_periods: int
 ) -> Iterable[Experiment]:
     """Yield the experiments of a recording that is not a multisine."""
     for point in points:
@@ -204,21 +204,20 @@ def _highest_hz(recording: Recording) -> float:
         return float(plan["highest_hz"])
     if _made_of(recording) == "sweeps":
         return max(float(plan["start_hz"]), float(plan["stop_hz"]))
-    return max(vibration_of(point).frequency_hz for point in _accepted(recording))
+    return max(vibration_of(point).frequency_hz for point in _accepted(recording, points_of(recording)))
 
 
 def _made_of(recording: Recording) -> str | None:
     return CAMPAIGNS[recording.kind].experiments
 
 
-def _accepted(recording: Recording, result: type[Any] | None = None) -> list[Point[Any]]:
+def _accepted(recording: Recording, points: Iterable[Point[Result]]) -> list[Point[Result]]:
     """Return the accepted points of the current plan, without the repetition of the first point."""
-    points = points_of(recording) if result is None else points_of(recording, result)
     found = [point for point in of_the_result(points) if point.accepted]
     if not found:
         raise IdentificationError(f"{recording.path}: points: none of the recording was accepted")
     return found
 
 
-def _called(stem: str, point: Point[Any]) -> str:
+def _called(stem: str, point: Point[object]) -> str:
     return f"{stem}, {point.level:.4g} {point.level_unit}"

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ SHORTEST_PIECE = 20
 
 
 def segment(
-    signals: Signals, point: Point[Any], rows: np.ndarray, *, rate_hz: float, periods: int, name: str
+    signals: Signals, point: Point[object], rows: np.ndarray, *, rate_hz: float, periods: int, name: str
 ) -> Experiment | None:
     """Return the first periods of a settled point, from its longest stretch without lost samples; None if it is too short.
 
