@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from identification import StructuredModel, bound_of
-from identification.structured.bound import Bound
+from identification.models.structured.bound import Bound
 from rig.results.files import load
 from rig.results.structured.kind import IdentifiedStructured
 from vibrolock.arrays import Float

@@ -1,6 +1,6 @@
 """Do the intervals of structured models hold the truth? ``python -m benchmarks.structured_intervals [--seeds 50]``.
 
-The structure of `tests.identification.structured.test_elements`: three modes, of which a modal test knows two, a Jenkins joint
+The structure of `tests/identification/models/structured/test_elements.py`: three modes, two of them known to a modal test, a joint
 and a cubic spring where no sensor is, integrated by another method with steps of 16 us. For each seed of noise three multisines
 are fitted, and 95 % intervals of what has a unit of its own are held against the truth.
 """
@@ -11,9 +11,9 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from identification import StructuredModel, fit_structured
-from identification.structured.laws import Jenkins, PolynomialSpring
-from identification.structured.uncertainty import std_of
-from tests.identification.structured import test_elements as truth
+from identification.models.structured.laws import Jenkins, PolynomialSpring
+from identification.models.structured.uncertainty import std_of
+from tests.identification.models.structured import test_elements as truth
 from vibrolock.arrays import Float
 
 QUANTITIES = (

@@ -67,6 +67,14 @@ if TYPE_CHECKING:
     from identification.decays.backbone import decay_backbone as decay_backbone
     from identification.decays.result import DecayBackbone as DecayBackbone, DecayMode as DecayMode
     from identification.errors import IdentificationError as IdentificationError
+    from identification.exciter_coupling.exciter import Exciter as Exciter, VoltagePath as VoltagePath
+    from identification.exciter_coupling.exciter_fit import identify_exciter as identify_exciter
+    from identification.experiments.errors import PnlssErrors as PnlssErrors
+    from identification.experiments.experiment import Experiment as Experiment
+    from identification.experiments.simulation import Simulation as Simulation
+    from identification.experiments.time_experiments import time_experiments as time_experiments
+    from identification.experiments.time_records import TimeRecord as TimeRecord, TimeRecords as TimeRecords
+    from identification.experiments.time_responses import time_responses as time_responses, time_spectra as time_spectra
     from identification.frequency_responses import (
         FrequencyResponse as FrequencyResponse,
         pack_frequency_responses as pack_frequency_responses,
@@ -74,6 +82,7 @@ if TYPE_CHECKING:
     )
     from identification.hammer.hammer_test import hammer_test as hammer_test
     from identification.hammer.result import HammerTest as HammerTest, Hit as Hit
+    from identification.harmonic_balance.states import PnlssResponse as PnlssResponse, SteadyStates as SteadyStates
     from identification.linear.extrapolation import extrapolated_to_zero as extrapolated_to_zero
     from identification.linear.modal_analysis import ModalAnalysis as ModalAnalysis, linear_modes as linear_modes
     from identification.linear.mode_shapes import ModeShapes as ModeShapes, mac as mac
@@ -107,6 +116,70 @@ if TYPE_CHECKING:
     from identification.mapping.time_data import TimeDataMapping as TimeDataMapping
     from identification.mapping.time_records import map_time_data as map_time_data
     from identification.measurements import PeriodicVibration as PeriodicVibration
+    from identification.models.modal.frequency_response import (
+        frequency_response as frequency_response,
+        steady_predictions as steady_predictions,
+    )
+    from identification.models.modal.properties import (
+        ExtrapolationError as ExtrapolationError,
+        ModalProperties as ModalProperties,
+    )
+    from identification.models.modal.recorded_force import recorded_force_response as recorded_force_response
+    from identification.models.modal.sweep_inputs import VoltageSweep as VoltageSweep
+    from identification.models.modal.sweep_prediction import (
+        SweepPrediction as SweepPrediction,
+        compare_sweep as compare_sweep,
+    )
+    from identification.models.modal.sweeps import predict_sweep as predict_sweep
+    from identification.models.modal.uncertainty import ResponseBand as ResponseBand, response_band as response_band
+    from identification.models.pnlss.best_linear import best_linear_responses as best_linear_responses
+    from identification.models.pnlss.coupled.run import CoupledRun as CoupledRun, pnlss_coupled_run as pnlss_coupled_run
+    from identification.models.pnlss.error_table import ErrorTable as ErrorTable
+    from identification.models.pnlss.errors import (
+        estimated_initial_state as estimated_initial_state,
+        pnlss_errors as pnlss_errors,
+    )
+    from identification.models.pnlss.features import Features as Features
+    from identification.models.pnlss.fitting.fit import fit_pnlss as fit_pnlss
+    from identification.models.pnlss.fitting.result import FitHistory as FitHistory, PnlssFit as PnlssFit
+    from identification.models.pnlss.fitting.settings import FitProgress as FitProgress, FitSettings as FitSettings
+    from identification.models.pnlss.identify import identify_pnlss as identify_pnlss
+    from identification.models.pnlss.linear_model import linear_pnlss as linear_pnlss
+    from identification.models.pnlss.many import (
+        IdentifiedModel as IdentifiedModel,
+        ModelJob as ModelJob,
+        identify_many as identify_many,
+        realisation_combinations as realisation_combinations,
+    )
+    from identification.models.pnlss.model import PnlssModel as PnlssModel
+    from identification.models.pnlss.steady.response import (
+        pnlss_frequency_response as pnlss_frequency_response,
+        pnlss_response as pnlss_response,
+        pnlss_steady_state as pnlss_steady_state,
+    )
+    from identification.models.predictions import Predictions as Predictions
+    from identification.models.simulated_runs import (
+        error_spectra as error_spectra,
+        output_stretch as output_stretch,
+        simulated_run as simulated_run,
+    )
+    from identification.models.structured.bound import Bound as Bound, bound_of as bound_of
+    from identification.models.structured.coupled.run import (
+        CoupledMotion as CoupledMotion,
+        structured_coupled_run as structured_coupled_run,
+    )
+    from identification.models.structured.element_trials import ElementTrial as ElementTrial
+    from identification.models.structured.elements import NonlinearElement as NonlinearElement
+    from identification.models.structured.fit import StructuredFit as StructuredFit, fit_structured as fit_structured
+    from identification.models.structured.further import ElementPlan as ElementPlan
+    from identification.models.structured.model import StructuredModel as StructuredModel
+    from identification.models.structured.steady.backbone import structured_backbone as structured_backbone
+    from identification.models.structured.steady.mode import structured_mode as structured_mode
+    from identification.models.structured.steady.response import (
+        structured_frequency_response as structured_frequency_response,
+        structured_response as structured_response,
+        structured_steady_state as structured_steady_state,
+    )
     from identification.multisine.best_linear_approximation import (
         best_linear_approximation as best_linear_approximation,
         coherence as coherence,
@@ -130,71 +203,18 @@ if TYPE_CHECKING:
     )
     from identification.nonlinear.single_points import single_point_mode as single_point_mode
     from identification.nonlinear.stepped_sine import stepped_sine_mode as stepped_sine_mode
-    from identification.pnlss.best_linear import best_linear_responses as best_linear_responses
-    from identification.pnlss.coupled.run import CoupledRun as CoupledRun, pnlss_coupled_run as pnlss_coupled_run
-    from identification.pnlss.error_table import ErrorTable as ErrorTable
-    from identification.pnlss.errors import (
-        PnlssErrors as PnlssErrors,
-        estimated_initial_state as estimated_initial_state,
-        pnlss_errors as pnlss_errors,
-    )
-    from identification.pnlss.experiment import Experiment as Experiment
-    from identification.pnlss.features import Features as Features
-    from identification.pnlss.fitting.fit import fit_pnlss as fit_pnlss
-    from identification.pnlss.fitting.result import FitHistory as FitHistory, PnlssFit as PnlssFit
-    from identification.pnlss.fitting.settings import FitProgress as FitProgress, FitSettings as FitSettings
-    from identification.pnlss.identify import identify_pnlss as identify_pnlss
-    from identification.pnlss.linear_model import linear_pnlss as linear_pnlss
-    from identification.pnlss.many import (
-        IdentifiedModel as IdentifiedModel,
-        ModelJob as ModelJob,
-        identify_many as identify_many,
-        realisation_combinations as realisation_combinations,
-    )
-    from identification.pnlss.model import PnlssModel as PnlssModel
-    from identification.pnlss.runs import (
-        error_spectra as error_spectra,
-        output_stretch as output_stretch,
-        simulated_run as simulated_run,
-    )
-    from identification.pnlss.simulation import Simulation as Simulation
-    from identification.pnlss.steady.response import (
-        pnlss_frequency_response as pnlss_frequency_response,
-        pnlss_response as pnlss_response,
-        pnlss_steady_state as pnlss_steady_state,
-    )
-    from identification.pnlss.steady.states import PnlssResponse as PnlssResponse, SteadyStates as SteadyStates
     from identification.prediction.comparison import (
         Comparison as Comparison,
         PredictionError as PredictionError,
         compare as compare,
         error_table as error_table,
     )
-    from identification.prediction.exciter import Exciter as Exciter, VoltagePath as VoltagePath
-    from identification.prediction.exciter_fit import identify_exciter as identify_exciter
-    from identification.prediction.frequency_response import (
-        frequency_response as frequency_response,
-        steady_predictions as steady_predictions,
-    )
-    from identification.prediction.predictions import Predictions as Predictions
-    from identification.prediction.properties import (
-        ExtrapolationError as ExtrapolationError,
-        ModalProperties as ModalProperties,
-    )
-    from identification.prediction.recorded_force import recorded_force_response as recorded_force_response
     from identification.prediction.simulated_runs import (
         ErrorSpectra as ErrorSpectra,
         OutputStretch as OutputStretch,
         SimulatedRun as SimulatedRun,
     )
     from identification.prediction.steady_prediction import SteadyPrediction as SteadyPrediction
-    from identification.prediction.sweep_inputs import VoltageSweep as VoltageSweep
-    from identification.prediction.sweep_prediction import (
-        SweepPrediction as SweepPrediction,
-        compare_sweep as compare_sweep,
-    )
-    from identification.prediction.sweeps import predict_sweep as predict_sweep
-    from identification.prediction.uncertainty import ResponseBand as ResponseBand, response_band as response_band
     from identification.response_control.curves import ConstantForceCurve as ConstantForceCurve
     from identification.response_control.force_surface import (
         ForceSurface as ForceSurface,
@@ -213,25 +233,5 @@ if TYPE_CHECKING:
     )
     from identification.slow_flows.short_points import ShortPoint as ShortPoint, short_point as short_point
     from identification.slow_flows.slow_flow import SlowFlow as SlowFlow, slow_flow as slow_flow
-    from identification.structured.bound import Bound as Bound, bound_of as bound_of
-    from identification.structured.coupled.run import (
-        CoupledMotion as CoupledMotion,
-        structured_coupled_run as structured_coupled_run,
-    )
-    from identification.structured.element_trials import ElementTrial as ElementTrial
-    from identification.structured.elements import NonlinearElement as NonlinearElement
-    from identification.structured.fit import StructuredFit as StructuredFit, fit_structured as fit_structured
-    from identification.structured.further import ElementPlan as ElementPlan
-    from identification.structured.model import StructuredModel as StructuredModel
-    from identification.structured.steady.backbone import structured_backbone as structured_backbone
-    from identification.structured.steady.mode import structured_mode as structured_mode
-    from identification.structured.steady.response import (
-        structured_frequency_response as structured_frequency_response,
-        structured_response as structured_response,
-        structured_steady_state as structured_steady_state,
-    )
-    from identification.time_data.experiments import time_experiments as time_experiments
-    from identification.time_data.records import TimeRecord as TimeRecord, TimeRecords as TimeRecords
-    from identification.time_data.responses import time_responses as time_responses, time_spectra as time_spectra
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

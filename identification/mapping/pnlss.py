@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 
 from identification.errors import IdentificationError
 from identification.mapping.base import ChannelMapping, MappingTable, Path, in_si, value_at
-from identification.pnlss.features import Features
-from identification.pnlss.model import PnlssModel
+from identification.models.pnlss.features import Features
+from identification.models.pnlss.model import PnlssModel
 from vibrolock.arrays import Float
 
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from identification.errors import IdentificationError
+from identification.experiments.periodicity import check_periods, period_remark
+from identification.experiments.time_experiments import resampled_periods
+from identification.experiments.time_records import TimeRecord, TimeRecords
 from identification.mapping.base import as_levels, in_si, value_at
 from identification.mapping.sampling import common_rate_hz, instants_at
 from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
 from identification.signals.decimation import EDGE_SAMPLES, decimated
-from identification.time_data.experiments import resampled_periods
-from identification.time_data.periodicity import check_periods, period_remark
-from identification.time_data.records import TimeRecord, TimeRecords
 from vibrolock.arrays import Float
 
 _WHOLE = 0.05

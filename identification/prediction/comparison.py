@@ -9,8 +9,7 @@ import numpy as np
 from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
-from identification.prediction.properties import FLAGGED_BEYOND
-from identification.prediction.steady_prediction import SteadyPrediction, peak_of
+from identification.prediction.steady_prediction import FLAGGED_BEYOND, SteadyPrediction, peak_of
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 

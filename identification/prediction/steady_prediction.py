@@ -11,6 +11,8 @@ from vibrolock.results import Result
 
 _NEAR_THE_TOP = 0.9
 
+FLAGGED_BEYOND = 1.25
+
 
 def peak_of(amplitude: Float, *columns: Float) -> tuple[float, ...]:
     """Return the largest amplitude of a curve, by a parabola through the three highest points, and the other columns there.

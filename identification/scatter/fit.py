@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment, same_channels
-from identification.pnlss.fitting.result import PnlssFit
-from identification.pnlss.fitting.threads import threads
-from identification.pnlss.runs import run_of
+from identification.experiments.experiment import Experiment, same_channels
+from identification.fitting.threads import threads
+from identification.models.pnlss.fitting.result import PnlssFit
+from identification.models.simulated_runs import run_of
+from identification.models.structured.fit import StructuredFit
 from identification.scatter.own_shifts import OwnShift, own_shift
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Effect, Scattered, effects_of, shifted
 from identification.scatter.widths import width_of
-from identification.structured.fit import StructuredFit
 from vibrolock.arrays import Float
 
 Fit = StructuredFit | PnlssFit

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from identification.channels import Channel
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.runs import run_of
-from identification.pnlss.simulators import SimulatedMotion
+from identification.experiments.experiment import Experiment
+from identification.experiments.simulators import SimulatedMotion
+from identification.models.simulated_runs import run_of
 from identification.scatter.own_shifts import own_shift
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Scattered, shifted

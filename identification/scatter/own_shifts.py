@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.runs import run_of
+from identification.experiments.experiment import Experiment
+from identification.models.simulated_runs import run_of
 from identification.scatter.shifts import Effect, Scattered, shifted
 from vibrolock.arrays import Float
 

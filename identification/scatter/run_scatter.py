@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment
-from identification.pnlss.fitting.threads import threads
-from identification.pnlss.runs import run_of
+from identification.experiments.experiment import Experiment
+from identification.fitting.threads import threads
+from identification.models.simulated_runs import run_of
 from identification.scatter.shifts import Effect, Scattered, shifted
 from identification.scatter.widths import Width
 from identification.validation import read_only

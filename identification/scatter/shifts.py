@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.pnlss.experiment import Experiment, excited_band
-from identification.pnlss.model import PnlssModel
-from identification.structured.model import StructuredModel
+from identification.experiments.experiment import Experiment, excited_band
+from identification.models.pnlss.model import PnlssModel
+from identification.models.structured.model import StructuredModel
 from vibrolock.arrays import Complex, Float
 
 Scattered = StructuredModel | PnlssModel

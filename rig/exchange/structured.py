@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from identification import StructuredModel
-from identification.structured.arrays import model_arrays, model_from
-from identification.structured.laws import Damper, Joint, Spring, UserSpring
+from identification.models.structured.arrays import model_arrays, model_from
+from identification.models.structured.laws import Damper, Joint, Spring, UserSpring
 from rig.text.contents import Contents
 
 _POINTS = 201

@@ -6,7 +6,7 @@ for what the others contribute. Shaker, amplifier and stinger are those of `iden
     (1 + Z r) F = g_e V - Z A / s^2,    Z = s^2 m + s c + k + s b / (1 + s tau),    g_e = g / (1 + s tau),    r = 1 / k_s.
 
 The voltage is the number given to a converter that holds it, the inputs pass an AC coupling, as in
-`identification.prediction.exciter.VoltagePath`. Suspension damping c and back-EMF b are told apart by the coil alone, so they
+`identification.VoltagePath`. Suspension damping c and back-EMF b are told apart by the coil alone, so they
 are one parameter here, half of it each.
 
 Every parameter has a prior, wide for what nobody knows; it bounds the directions that the data do not determine. Masses,

@@ -5,7 +5,7 @@ import io
 import json
 from typing import Any
 
-from identification.pnlss.error_table import SAME_LEVEL
+from identification.models.pnlss.error_table import SAME_LEVEL
 from rig.errors import RecordingError
 from rig.reproduce.folder import write_json
 from rig.reproduce.options import Options

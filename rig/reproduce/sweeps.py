@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from identification import Exciter, Experiment
 from identification.channels import find_role
-from identification.pnlss.simulators import SimulatedMotion
+from identification.experiments.simulators import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.reproduce.exciter import exciter_of

@@ -17,8 +17,8 @@ from identification import (
     SteadyPrediction,
     StructuredModel,
 )
-from identification.prediction.uncertainty import band_of_responses
-from identification.structured.uncertainty import drawn
+from identification.models.modal.uncertainty import band_of_responses
+from identification.models.structured.uncertainty import drawn
 from rig.errors import ConfigurationError
 from rig.results.exciter.kind import EXCITER
 from rig.results.files import load_as

@@ -20,11 +20,11 @@ from identification import (
     recorded_force_response,
     zero_crossings,
 )
-from identification.prediction.exciter import Exciter
-from identification.prediction.exciter_fit import identify_exciter
-from identification.prediction.properties import ModalProperties
-from identification.prediction.sweep_prediction import compare_sweep
-from identification.prediction.sweeps import predict_sweep
+from identification.exciter_coupling.exciter import Exciter
+from identification.exciter_coupling.exciter_fit import identify_exciter
+from identification.models.modal.properties import ModalProperties
+from identification.models.modal.sweep_prediction import compare_sweep
+from identification.models.modal.sweeps import predict_sweep
 from rig.campaigns.plans import plan_from
 from rig.measurements import point_rows
 from simulators.virtual_rig import VirtualRig

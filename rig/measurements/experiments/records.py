@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification import decimated
-from identification.pnlss.experiment import Experiment, InitialState
+from identification.experiments.experiment import Experiment, InitialState
 from identification.signals.decimation import EDGE_SAMPLES
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import Exciter
-from identification.prediction.exciter import PARAMETERS
+from identification.exciter_coupling.exciter import PARAMETERS
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

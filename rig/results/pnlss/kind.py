@@ -13,7 +13,7 @@ from identification import (
     PnlssFit,
     PnlssModel,
 )
-from identification.pnlss.user_functions import is_users
+from identification.models.pnlss.user_functions import is_users
 from rig.errors import ConfigurationError
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.results.simulated.model import (

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import Channel, ErrorSpectra, OutputStretch
-    from identification.pnlss.simulators import Simulator
+    from identification.experiments.simulators import Simulator
     from rig.results.simulated.model import SimulatedModel
 
 _FLOOR = 0.1  # of the median residual: smaller values are not shown

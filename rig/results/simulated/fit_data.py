@@ -10,7 +10,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from identification import Experiment, PnlssFit, RunScatter, StructuredFit, fit_with_scatter
-from identification.pnlss.simulators import Simulator
+from identification.experiments.simulators import Simulator
 from identification.validation import one_specimen
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of

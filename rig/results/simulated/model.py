@@ -17,8 +17,9 @@ from identification import (
     output_stretch,
     simulated_run,
 )
+from identification.experiments.simulators import Simulator
 from identification.packing import pack_all, unpack_all
-from identification.pnlss.simulators import Simulator
+from identification.experiments.simulators import Simulator
 from rig.results.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result

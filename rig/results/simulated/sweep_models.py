@@ -15,7 +15,7 @@ from identification import (
     demodulate,
 )
 from identification.channels import MOTION_ORDER, find_role
-from identification.pnlss.simulators import SimulatedMotion
+from identification.experiments.simulators import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.results.simulated.constants import all_inputs, driving
 from rig.results.simulated.driven_models import DrivenModel, coupled_run

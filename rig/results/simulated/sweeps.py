@@ -13,7 +13,7 @@ from identification import (
     compare_sweep,
 )
 from identification.channels import find_role
-from identification.pnlss.errors import estimated_initial_state
+from identification.models.pnlss.errors import estimated_initial_state
 from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import kinds_that_yield

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import cast
 
 from identification import LinearModes, ModalAnalysis, fit_structured
-from identification.structured.start import linear_start
+from identification.models.structured.start import linear_start
 from identification.validation import one_specimen
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
-from identification.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
-from identification.structured.laws import Joint, UserSpring
-from identification.structured.uncertainty import std_of
+from identification.models.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
+from identification.models.structured.laws import Joint, UserSpring
+from identification.models.structured.uncertainty import std_of
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.results.simulated.model import (
     SimulatedModel,

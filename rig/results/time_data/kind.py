@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import TimeRecords
-from identification.time_data.periodicity import period_remark
+from identification.experiments.periodicity import period_remark
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

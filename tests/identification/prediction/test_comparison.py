@@ -14,7 +14,7 @@ from identification import (
     frequency_response,
 )
 from identification.channels import Motion
-from tests.identification.prediction.modes import duffing, mode_with
+from tests.identification.models.modal.modes import duffing, mode_with
 
 Q = np.linspace(0.5e-3, 12e-3, 12)
 

@@ -7,14 +7,14 @@ import pytest
 from scipy.stats import binom
 
 from identification import IdentificationError, NonlinearElement, fit_structured
-from identification.pnlss.fitting.fit import fit_pnlss
+from identification.models.pnlss.fitting.fit import fit_pnlss
+from identification.models.structured.laws import PolynomialDamper, PolynomialSpring
 from identification.scatter.fit import fit_with_scatter
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Effect, effects_of, modes_of, shifted
-from identification.structured.laws import PolynomialDamper, PolynomialSpring
-from tests.identification.pnlss.systems import experiment as run_of_system, nonlinear_system
-from tests.identification.structured.models import beam, linear_modes
-from tests.identification.structured.test_fit import experiment
+from tests.identification.models.pnlss.systems import experiment as run_of_system, nonlinear_system
+from tests.identification.models.structured.models import beam, linear_modes
+from tests.identification.models.structured.test_fit import experiment
 
 WIDTH, NOISE = 0.001, 0.002
 ELEMENT = NonlinearElement(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, structured_backbone
-from identification.structured.laws import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
+from identification.models.structured.laws import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
 from rig.authoring.new_files import new_file
 from rig.authoring.structured_rig import structured_bench
 from rig.bench import load_bench
@@ -17,7 +17,7 @@ from rig.errors import ConfigurationError
 from rig.results.files import save
 from simulators.analysis import phase_resonance_backbone
 from simulators.simulation import Simulation
-from tests.identification.structured.models import beam
+from tests.identification.models.structured.models import beam
 from tests.rig.authoring.test_schemas import of, read
 from tests.simulators.references import UNFILTERED
 

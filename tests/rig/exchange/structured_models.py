@@ -1,7 +1,7 @@
 """A structured model with elements of all laws, for tests of files."""
 
 from identification import Channel, NonlinearElement, StructuredModel
-from identification.structured.laws import (
+from identification.models.structured.laws import (
     Iwan,
     Jenkins,
     MagnetSpring,

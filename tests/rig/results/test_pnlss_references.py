@@ -5,7 +5,7 @@ import pytest
 
 from identification import FrequencyResponse, pnlss_frequency_response
 from rig.results.simulated.steady import Reference, compared
-from tests.identification.pnlss.steady.oscillators import oscillator
+from tests.identification.models.pnlss.steady.oscillators import oscillator
 
 FORCE_N = 5.0
 CHOSEN = "several vibrations were found: the one nearest to the measured amplitude was taken"

@@ -8,7 +8,7 @@ import pytest
 import scipy.io
 
 from rig.results.files import load, save
-from tests.identification.time_data.test_time_data import F0, ZETA, multisines
+from tests.identification.experiments.test_time_data import F0, ZETA, multisines
 
 RATE_HZ, SIZE, SETTLING, PERIODS = 512.0, 512, 6, 2
 A, CUBIC, GAIN = np.array([[1.0 - 0.09, 0.3 * 0.99], [-0.3, 0.99]]), 0.004, 0.1

@@ -1,0 +1,1 @@
+"""Exciters: identification, and simulation of models that an exciter drives."""

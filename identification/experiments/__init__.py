@@ -1,0 +1,1 @@
+"""Experiments, models that simulate them, and time records from elsewhere that become experiments."""

@@ -1,0 +1,1 @@
+"""What fits of all models share: bounded least squares and threads."""

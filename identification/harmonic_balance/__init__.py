@@ -1,0 +1,1 @@
+"""Steady vibrations of any model by harmonic balance and continuation."""

@@ -1,0 +1,119 @@
+"""Solutions of a harmonic balance: one at a given frequency from rest, and all along a band."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.continuation.follow import continued
+from identification.continuation.newton import solved
+from identification.continuation.path import Path, Steps
+from identification.errors import IdentificationError
+from identification.harmonic_balance.driven import DrivenBalance
+from vibrolock.arrays import Float
+
+_FIRST_LEVEL = 0.02
+"""Share of the level at which Newton's method starts from the linear solution."""
+_LEVELS = Steps(first=0.1, largest=0.5)
+_MOST_LEVELS = 300
+_BAND_UNITS = 4.0
+"""Length of a band in units of the path: with the longest step of 0.05 a band takes 80 points, with a resonance many more."""
+
+
+class Followed(NamedTuple):
+    """A path and a note on its end; the note is empty if the path reached the far end of the band."""
+
+    path: Path
+    note: str
+
+
+def sizes(balance: DrivenBalance, frequency_hz: float) -> Float:
+    """Size of each unknown in the linear solution at this frequency, the same for all harmonics."""
+    linear = balance.linear(frequency_hz)
+    states = np.max(np.abs(balance.states(linear)), axis=0)
+    states = np.maximum(states, 1e-9 * np.max(states, initial=1e-300))
+    own = balance.own(linear)
+    if own.size > 2:  # the harmonics of a force, and the two parts of a voltage
+        own = np.concatenate([np.full(own.size - 2, np.linalg.norm(own[:2])), np.full(2, np.linalg.norm(own[-2:]))])
+    return np.concatenate([np.tile(states, balance.basis.size), np.abs(own)])
+
+
+def from_rest(balance: DrivenBalance, frequency_hz: float, largest_use: float = np.inf) -> Float | None:
+    """Return the unknowns of the vibration reached from rest as the level rises; None if the path does not reach the level."""
+    linear, scale = balance.linear(frequency_hz, _FIRST_LEVEL), sizes(balance, frequency_hz)
+    try:
+        path = continued(
+            balance.over_level(frequency_hz),
+            linear,
+            _FIRST_LEVEL,
+            scale=scale,
+            parameter_scale=0.5,
+            lowest=0.5 * _FIRST_LEVEL,
+            highest=1.0,
+            points=_MOST_LEVELS,
+            steps=replace(_LEVELS, kinks=balance.kinks),
+            stop=lambda z, level: beyond(balance, z, largest_use),
+        )
+    except IdentificationError:
+        return None
+    return path.unknowns[-1] if path.ending == "range" and path.parameter[-1] == 1.0 else None
+
+
+def statically_stable(balance: DrivenBalance, z: Float, frequency_hz: float, level: float = 1.0) -> bool:
+    """Return whether a vibration is stable under slow changes: the determinant of its Jacobian has the same sign as at rest."""
+    rest = balance.linear(frequency_hz, _FIRST_LEVEL**2)
+    signs = [
+        np.linalg.slogdet(balance.evaluated(at, frequency_hz, of)[1])[0]
+        for at, of in ((z, level), (rest, _FIRST_LEVEL**2))
+    ]
+    return bool(signs[0] == signs[1])
+
+
+def followed(
+    balance: DrivenBalance, begin_hz: float, end_hz: float, *, points: int, step: float, largest_use: float
+) -> Followed | None:
+    """Follow the response from rest at one end of a band to the other end; return None if no start is found."""
+    start = from_rest(balance, begin_hz, largest_use)
+    if start is None:
+        return None
+    low, high = sorted((begin_hz, end_hz))
+    path = continued(
+        balance.over_frequency(),
+        start,
+        begin_hz,
+        scale=sizes(balance, begin_hz),
+        parameter_scale=(high - low) / _BAND_UNITS,
+        direction=end_hz - begin_hz,
+        lowest=low,
+        highest=high,
+        points=points,
+        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step, kinks=balance.kinks),
+        stop=lambda z, frequency_hz: beyond(balance, z, largest_use),
+    )
+    return Followed(path, _note(path, begin_hz, end_hz))
+
+
+def polished(balance: DrivenBalance, z: Float, frequency_hz: float) -> Float | None:
+    """Return the solution near ``z`` at a frequency; None if there is none."""
+    return solved(balance.over_frequency(), z, frequency_hz, scale=sizes(balance, frequency_hz))
+
+
+def beyond(balance: DrivenBalance, z: Float, largest_use: float) -> str:
+    """Return a message if states are far outside the range of the training data; else an empty text."""
+    use = balance.state_use(z, balance.basis.to_time)
+    return balance.beyond.format(largest_use) if np.any(use > largest_use) else ""
+
+
+def _note(path: Path, begin_hz: float, end_hz: float) -> str:
+    where = f"{path.parameter[-1]:.4g} Hz"
+    if path.ending == "range":
+        reached = path.parameter[-1] == end_hz
+        return "" if reached else f"the response from {begin_hz:.4g} Hz turned back and left the band where it began"
+    why = {
+        "stopped": path.reason,
+        "points": "it has all points that it may have",
+        "closed": "it closed on itself",
+        "step": "no solution was found farther on",
+        "size": "it is too large",
+    }[path.ending]
+    return f"the response from {begin_hz:.4g} Hz ends at {where}: {why}"

@@ -1,0 +1,1 @@
+"""Dynamic models: modal, polynomial state-space (PNLSS) and structured ones."""

@@ -1,0 +1,184 @@
+"""Predicted frequency responses at constant force, from a nonlinear mode."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Literal, get_args
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.linear.modes import LinearModes
+from identification.models.modal.properties import HIGHER_LEVELS, ExtrapolationError, ModalProperties
+from identification.models.modal.steady_states import OneMode, Path, fundamental_motion, range_notes
+from identification.nonlinear.nonlinear_modes import NonlinearMode
+from identification.prediction.steady_prediction import SteadyPrediction
+from identification.validation import positive
+from vibrolock.arrays import Float
+
+HeldForce = Literal["fundamental", "rms", "pure-sine"]
+
+_FARTHEST = 20.0
+
+
+def frequency_response(
+    mode: NonlinearMode,
+    force_n: float,
+    *,
+    force: HeldForce = "fundamental",
+    modes: LinearModes | None = None,
+    residuals: bool = True,
+    allow_extrapolation: bool = False,
+    points: int = 401,
+    lowest_share: float = 0.05,
+) -> SteadyPrediction:
+    """Predict the steady response of a nonlinear mode to a constant force, on all branches.
+
+    Parameters
+    ----------
+    mode
+        The identified nonlinear mode.
+    force_n
+        Held force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``.
+    force
+        Quantity that is constant. ``fundamental``: ``|F_1|`` is held, and the force has the harmonics that the exciter caused
+        when the mode was identified; their power is included in the damping. ``rms``: the RMS of such a force is held; the
+        ratio of fundamental to RMS recorded at phase resonance is interpolated over q, and a note states this. ``pure-sine``:
+        a force without harmonics, with the damping from the total power.
+    modes
+        Linear modes. They provide the responses at their other channels (the shape of the tested mode, scaled by the response
+        of the drive point) and the contribution of the other modes.
+    residuals
+        Whether to add the linear response of the other modes of ``modes`` to the force.
+    allow_extrapolation
+        Whether to predict beyond twice the largest modal amplitude identified.
+    points
+        Number of points on each branch.
+    lowest_share
+        Modal amplitude at both ends of the main branch, over its largest.
+
+    Raises
+    ------
+    IdentificationError
+        If the force is not above zero, the mode lacks properties, or ``points`` is below 20.
+    ExtrapolationError
+        If the response needs more than twice the largest modal amplitude identified.
+    """
+    if force not in get_args(HeldForce):
+        raise IdentificationError(f"force: is '{force}', allowed are {', '.join(get_args(HeldForce))}")
+    if points < 20:
+        raise IdentificationError(f"points: is {points}, needs at least 20")
+    if not 0.0 < lowest_share < 1.0:
+        raise IdentificationError(f"lowest_share: is {lowest_share:g}, allowed is between 0 and 1")
+    level = positive("force_n", force_n, "N")
+    properties = ModalProperties.of(
+        mode,
+        damping="total-power" if force == "pure-sine" else "fundamental",
+        allow_extrapolation=allow_extrapolation,
+    )
+    one = OneMode(properties, _fundamental(mode, level, force))
+    paths, notes = _branches(one, level)
+    if not paths:
+        raise IdentificationError(f"force_n: is {level:g} N, too small for a response that can be told from rest")
+    if force == "rms":
+        notes.append(
+            "the force's harmonics per fundamental are those recorded at phase resonance, off resonance as well"
+        )
+    s = [_parameters(one, path, points | 1, lowest_share) for path in paths]  # odd: the largest q is among them
+    q, sign = np.concatenate([path.at(each) for path, each in zip(paths, s, strict=True)], axis=1)
+    omega = one.omega(q, sign)
+    folds = np.concatenate([_folds(one, path, each) for path, each in zip(paths, s, strict=True)], axis=0)
+    channels, motion = fundamental_motion(mode, properties, q, omega, one.fundamental_n(q), modes, residuals)
+    return SteadyPrediction(
+        force_n=level,
+        force=force,
+        channels=channels,
+        frequency_hz=omega / (2.0 * np.pi),
+        modal_amplitude=q,
+        fundamental_n=one.fundamental_n(q),
+        displacement_m=motion,
+        stable=one.stable(q, omega),
+        branch=np.repeat(np.arange(len(paths)), [each.size for each in s]),
+        range_use=properties.range_use(q),
+        fold_frequency_hz=folds[:, 1] / (2.0 * np.pi),
+        fold_amplitude_m=properties.drive_shape(folds[:, 0]) * folds[:, 0],
+        fold_modal_amplitude=folds[:, 0],
+        notes=(*notes, *range_notes(properties, q)),
+    )
+
+
+def steady_predictions(
+    mode: NonlinearMode,
+    forces_n: Sequence[float],
+    *,
+    force: HeldForce = "fundamental",
+    modes: LinearModes | None = None,
+    residuals: bool = True,
+    allow_extrapolation: bool = False,
+) -> tuple[SteadyPrediction, ...]:
+    """Predict the `frequency_response` at several forces; the message of an error names the force."""
+    return tuple(
+        frequency_response(
+            mode, force_n, force=force, modes=modes, residuals=residuals, allow_extrapolation=allow_extrapolation
+        )
+        for force_n in forces_n
+    )
+
+
+def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callable[[Float], Float]:
+    """Return the function that gives the amplitude (peak) of the fundamental force at a modal amplitude q."""
+    if force != "rms":
+        return partial(np.full_like, fill_value=level)
+    share = np.abs(mode.force_harmonics[:, 1]) / np.linalg.norm(mode.force_harmonics[:, 1:], axis=1)
+    q = np.where(np.isfinite(mode.modal_amplitude), mode.modal_amplitude, mode.amplitude_m * mode.apparent_mass_kg**0.5)
+    known = np.isfinite(share) & np.isfinite(q)
+    if not np.any(known) or mode.force_harmonics.shape[1] < 3:
+        raise IdentificationError("force: 'rms' needs a mode with recorded force harmonics; 'fundamental' does not")
+    order = np.argsort(q[known], kind="stable")
+    q, share = q[known][order], share[known][order]
+    return lambda at: np.asarray(np.sqrt(2.0) * level * np.interp(at, q, share))
+
+
+def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
+    """Return the branches of solutions; raise `ExtrapolationError` if a branch from the identified range exceeds the limit."""
+    largest = one.properties.q_range[1]
+    limit = min(one.properties.highest_q, _FARTHEST * largest)
+    paths, opened = one.paths(limit)
+    if opened is not None and (opened <= largest or not paths):
+        advice = "measure higher levels" if one.properties.allow_extrapolation else HIGHER_LEVELS
+        raise ExtrapolationError(
+            f"force_n: {level:g} N drives the mode beyond {limit / largest:g} times the largest modal amplitude "
+            f"identified ({largest:g} kg^1/2 m); {advice}"
+        )
+    notes = []
+    invented = [path.lowest for path in paths if path.lowest > largest] + ([] if opened is None else [opened])
+    if invented:
+        notes.append(
+            f"detached branches that the extrapolation alone has, from q = {min(invented):g} on, were left out"
+        )
+        paths = [path for path in paths if path.lowest <= largest]
+    if detached := sum(path.closed for path in paths):
+        notes.append(f"{detached} detached branch{'es' if detached > 1 else ''}: reached by a large disturbance only")
+    return paths, notes
+
+
+def _parameters(one: OneMode, path: Path, points: int, lowest_share: float) -> Float:
+    """Return the path parameters of the points of a branch, without those at which there is no frequency."""
+    first = 0.0 if path.closed else float(np.arcsin(lowest_share))
+    s = np.linspace(first, 2.0 * np.pi if path.closed else np.pi - first, points)
+    return np.asarray(s[np.isfinite(one.omega(*path.at(s)))])
+
+
+def _folds(one: OneMode, path: Path, s: Float) -> Float:
+    """float[n_folds, 2]: q and W where the determinant of the slow flow changes sign along a branch."""
+    from scipy.optimize import brentq
+
+    def determinant(at: float) -> float:
+        q, sign = path.at(np.array([at]))
+        return float(one.jacobian(q, one.omega(q, sign))[1][0])
+
+    q, sign = path.at(s)
+    values = one.jacobian(q, one.omega(q, sign))[1]
+    changes = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    roots = np.array([brentq(determinant, s[k], s[k + 1], xtol=1e-12) for k in changes])
+    q, sign = path.at(roots)
+    return np.column_stack([q, one.omega(q, sign)]) if roots.size else np.zeros((0, 2))

@@ -1,0 +1,168 @@
+"""Levenberg-Marquardt fit of all parameters of a nonlinear state-space model to experiments, in the time domain.
+
+Cost and its gradient as in Paduart et al., Automatica 46, 2010, Section 4.3 (weighted squared simulation errors,
+sensitivities by recursion); the damping after Marquardt, J. SIAM 11, 1963.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.experiments.experiment import Experiment, excited_band
+from identification.models.pnlss.fitting.checks import check_data, check_memory, check_resumed
+from identification.models.pnlss.fitting.initial_states import fitted_initial_state
+from identification.models.pnlss.fitting.levenberg_marquardt import Iterates, iterate
+from identification.models.pnlss.fitting.parameters import Parameters
+from identification.models.pnlss.fitting.problem import Problem, Scales, scales_of
+from identification.models.pnlss.fitting.result import PnlssFit
+from identification.models.pnlss.fitting.settings import FitProgress, FitSettings
+from identification.models.pnlss.model import PnlssModel
+from vibrolock.arrays import Float
+
+_HOPELESS = 1e3
+"""A start is refused if its outputs exceed this multiple of the measured ones."""
+
+
+def fit_pnlss(
+    start: PnlssModel,
+    experiments: Sequence[Experiment],
+    *,
+    validation: Sequence[Experiment] = (),
+    settings: FitSettings | None = None,
+    progress: Callable[[FitProgress], None] | None = None,
+    resume: PnlssFit | None = None,
+) -> PnlssFit:
+    """Fit all coefficients of ``start``, the weights in its features, and estimated initial states.
+
+    Parameters
+    ----------
+    start
+        Initial model, usually a linear model `with_features`. Its simulation must stay bounded.
+    experiments
+        Training data.
+    validation
+        Data on which the iterate is chosen; never part of the fit.
+    settings
+        `FitSettings`; None for the defaults.
+    progress
+        Called after each iteration.
+    resume
+        An earlier fit of the same start, experiments and settings, which continues as if it had never stopped. A fit that
+        had ended continues with more iterations, or another tolerance or patience.
+
+    Returns
+    -------
+    PnlssFit
+        The fit; after Ctrl-C, the fit reached so far, marked ``interrupted``.
+
+    Raises
+    ------
+    IdentificationError
+        If data and model do not match, the data cannot determine the parameters, or the simulated start is unbounded.
+    """
+    settings = FitSettings() if settings is None else settings
+    estimated = sum(e.initial_state == "estimated" for e in experiments)
+    parameters = Parameters(start, estimated)
+    check_data(start, experiments, validation, parameters.count, settings.by_frequency)
+    check_memory(parameters, [*experiments, *validation], settings.by_frequency)
+    if resume is not None:
+        check_resumed(start, resume, estimated, bool(validation))
+    scales = scales_of(experiments, _state_scale(start, experiments) if resume is None else resume.state_scale)
+    parameters = Parameters(scales.model(start if resume is None else resume.last), estimated)
+    problem = Problem(parameters, scales, experiments, validation, settings)
+    iterates = _begin(problem) if resume is None else _resumed(problem, scales, resume)
+    ending = iterate(problem, iterates, progress)
+
+    def physical(vector: Float) -> tuple[PnlssModel, Float]:
+        begins = parameters.initial_states(vector) * scales.states
+        return _trained(scales.physical(parameters.model(vector)), experiments, begins), begins
+
+    (model, begins), (last, last_begins) = physical(iterates.best), physical(iterates.vector)
+    return PnlssFit(
+        model=model,
+        last=last,
+        linear=_linear_part(start) if resume is None else resume.linear,
+        history=iterates.history,
+        chosen=iterates.history.best,
+        initial_states=begins,
+        last_initial_states=last_begins,
+        state_scale=scales.states,
+        settings=settings,
+        stopped=ending.reason,
+        limited=ending.limited,
+        interrupted=ending.interrupted,
+    )
+
+
+def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
+    """RMS of each state of the simulated start; raises `IdentificationError` if it is unbounded or far too large."""
+    total, samples = np.zeros(start.states), 0
+    for index, experiment in enumerate(experiments):
+        run = start.simulate(experiment.inputs)
+        what = f"experiments[{index}]{f' ({experiment.name})' if experiment.name else ''}"
+        if run.unbounded_at is not None:
+            raise IdentificationError(
+                f"start: leaves all bounds at sample {run.unbounded_at} of {what}; needs a model that is stable there"
+            )
+        largest, measured = (float(np.max(np.abs(y))) for y in (run.outputs, experiment.outputs))
+        if not largest <= _HOPELESS * max(measured, 1e-300):
+            raise IdentificationError(
+                f"start: its outputs reach {largest / max(measured, 1e-300):.3g} times those of {what}; needs a model "
+                "that is stable and in the units of the channels"
+            )
+        total += np.sum(run.states**2, axis=1)
+        samples += run.states.shape[1]
+    rms = np.sqrt(total / samples)
+    return np.where(rms > 0.0, rms, np.max(rms) if np.any(rms > 0.0) else 1.0)
+
+
+def _begin(problem: Problem) -> Iterates:
+    """Return iterates at the start, with initial states estimated from the first samples."""
+    parameters = problem.parameters
+    rest = np.zeros((parameters.estimated, parameters.start.states))
+    system = parameters.system(parameters.vector(parameters.start, rest))
+    begins = [fitted_initial_state(system, r, problem.weights) for r in problem.training if r.place is not None]
+    vector = parameters.vector(parameters.start, np.array(begins).reshape(rest.shape))
+    return Iterates.begin(problem, vector)
+
+
+def _resumed(problem: Problem, scales: Scales, resume: PnlssFit) -> Iterates:
+    """Return the iterates at which an earlier fit stopped."""
+    pairs = ((resume.last, resume.last_initial_states), (resume.model, resume.initial_states))
+    last, best = (problem.parameters.vector(scales.model(m), begins / scales.states) for m, begins in pairs)
+    return Iterates.resumed(last, best, resume.history)
+
+
+def _trained(model: PnlssModel, experiments: Sequence[Experiment], begins: Float) -> PnlssModel:
+    """Return the model with the range, band and names of its training data."""
+    states, place = np.zeros(model.states), 0
+    free = replace(model, state_range=np.full(model.states, np.nan))
+    for experiment in experiments:
+        begin = None
+        if experiment.initial_state == "estimated":
+            begin, place = begins[place], place + 1
+        run = free.simulate(experiment.inputs, initial_state=begin)
+        states = np.fmax(states, np.max(np.abs(run.states), axis=1))
+    return replace(
+        model,
+        state_range=states,
+        input_range=np.max([np.max(np.abs(e.inputs), axis=1) for e in experiments], axis=0),
+        excited_hz=excited_band(experiments) or model.excited_hz,
+        training=tuple(e.name or f"experiment {index + 1}" for index, e in enumerate(experiments)),
+        specimen=model.specimen or experiments[0].specimen,
+    )
+
+
+def _linear_part(start: PnlssModel) -> PnlssModel | None:
+    if np.any(start.e) or np.any(start.f):
+        return None
+    return PnlssModel.linear(
+        start.linear_part,
+        sample_rate_hz=start.sample_rate_hz,
+        inputs=start.inputs,
+        outputs=start.outputs,
+        specimen=start.specimen,
+        notes=start.notes,
+    )

@@ -1,0 +1,180 @@
+"""Result of a fit: the chosen model, the last iterate, and the history of errors."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.models.pnlss.fitting.settings import FitSettings
+from identification.models.pnlss.model import PnlssModel
+from identification.validation import read_only
+from vibrolock.arrays import Float
+from vibrolock.results import Result
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FitHistory:
+    """Errors over the iterations, the start first.
+
+    Parameters
+    ----------
+    training_error, validation_error
+        float[n], relative RMS errors over all outputs; validation NaN without data, inf for an unbounded run.
+    damping
+        float[n], damping of the step to each iterate; the first is that of the settings.
+    seconds
+        float[n], time since the fit began.
+    """
+
+    training_error: Float
+    validation_error: Float
+    damping: Float
+    seconds: Float
+
+    def __post_init__(self) -> None:
+        for name in ("training_error", "validation_error", "damping", "seconds"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations after the start."""
+        return int(self.training_error.size) - 1
+
+    @property
+    def validated(self) -> bool:
+        """Whether there is validation data."""
+        return not bool(np.all(np.isnan(self.validation_error)))
+
+    @property
+    def judged(self) -> Float:
+        """float[n], the error that chooses the iterate: of the validation data, or of the training data without such."""
+        errors = self.validation_error if self.validated else self.training_error
+        return np.where(np.isnan(errors), np.inf, errors)
+
+    @property
+    def best(self) -> int:
+        """Iteration with the smallest error `judged`."""
+        return int(np.argmin(self.judged))
+
+    def since_gain(self, share: float) -> int:
+        """Number of iterations since the error `judged` was last lowered by ``share`` of what it was before."""
+        mark, at = self.judged[0], 0
+        for iteration, error in enumerate(self.judged):
+            if error < mark * (1.0 - share):
+                mark, at = error, iteration
+        return self.iterations - at
+
+    def gained(self, iterations: int) -> float:
+        """Share by which the last ``iterations`` lowered the smallest error `judged`; NaN if no run before was bounded."""
+        before = float(np.min(self.judged[: max(self.judged.size - iterations, 1)]))
+        return 1.0 - float(np.min(self.judged)) / before if 0.0 < before < np.inf else float(np.nan)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PnlssFit(Result):
+    """A fitted model.
+
+    Parameters
+    ----------
+    model
+        The best iterate: on validation data if given, else on training data.
+    last
+        The last iterate, from which a resumed fit continues.
+    linear
+        The linear model with which the fit began; None if it began with a nonlinear one.
+    history
+        Errors over the iterations.
+    chosen
+        Number of the iteration that gave ``model``.
+    initial_states, last_initial_states
+        float[n_estimated, n_states], initial states of ``model`` and ``last`` in the experiments with an estimated initial
+        state, in their order.
+    state_scale
+        float[n_states], RMS of the states in the start: their unit in the fit.
+    settings
+        Settings of the fit, as given.
+    stopped
+        Why the fit ended, in one line.
+    limited
+        Whether it ended because the settings allow no further iteration, while the last ones still lowered the error.
+    interrupted
+        Whether the fit was interrupted. The result so far is complete, and ``resume`` continues from it.
+    """
+
+    model: PnlssModel
+    last: PnlssModel
+    linear: PnlssModel | None
+    history: FitHistory
+    chosen: int
+    initial_states: Float
+    last_initial_states: Float
+    state_scale: Float
+    settings: FitSettings
+    stopped: str
+    limited: bool = False
+    interrupted: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("initial_states", "last_initial_states", "state_scale"):
+            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
+
+    @property
+    def training_error(self) -> float:
+        """Relative RMS error of ``model`` on the training data."""
+        return float(self.history.training_error[self.chosen])
+
+    @property
+    def validation_error(self) -> float:
+        """Relative RMS error of ``model`` on the validation data; NaN without."""
+        return float(self.history.validation_error[self.chosen])
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Return arrays by name, and the JSON-able attributes that go with them."""
+        arrays: dict[str, NDArray[Any]] = {f"history/{name}": value for name, value in vars(self.history).items()}
+        arrays |= {name: getattr(self, name) for name in ("initial_states", "last_initial_states", "state_scale")}
+        attributes: dict[str, Any] = {"chosen": self.chosen, "stopped": self.stopped}
+        attributes |= {"limited": self.limited, "interrupted": self.interrupted}
+        attributes["settings"] = {
+            key: [list(v) if isinstance(v, tuple) else v for v in value] if isinstance(value, tuple) else value
+            for key, value in asdict(self.settings).items()
+        }
+        for name in ("model", "last", "linear"):
+            model: PnlssModel | None = getattr(self, name)
+            inside, of_model = ({}, None) if model is None else model.to_arrays()
+            arrays |= {f"{name}/{key}": value for key, value in inside.items()}
+            attributes[name] = of_model
+        return arrays, attributes
+
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, attributes: Mapping[str, Any]) -> "PnlssFit":
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing or unknown."""
+        try:
+            models: dict[str, Any] = {}
+            for name in ("model", "last", "linear"):
+                inside = {k.removeprefix(f"{name}/"): v for k, v in arrays.items() if k.startswith(f"{name}/")}
+                of_model = attributes[name]
+                models[name] = None if of_model is None else PnlssModel.from_arrays(inside, of_model)
+            parts = {k.removeprefix("history/"): v for k, v in arrays.items() if k.startswith("history/")}
+            given = dict(attributes["settings"])
+            given.pop("every", None)  # of files from before Hessians were always of all samples
+            given["line_weights"] = tuple(tuple(row) for row in given["line_weights"])
+            given["band_hz"] = None if given["band_hz"] is None else tuple(given["band_hz"])
+            return cls(
+                **models,
+                history=FitHistory(**parts),
+                settings=FitSettings(**given),
+                chosen=int(attributes["chosen"]),
+                stopped=str(attributes["stopped"]),
+                limited=bool(attributes.get("limited", False)),  # not in files of earlier versions
+                interrupted=bool(attributes["interrupted"]),
+                initial_states=arrays["initial_states"],
+                last_initial_states=arrays["last_initial_states"],
+                state_scale=arrays["state_scale"],
+            )
+        except (KeyError, TypeError) as error:
+            raise IdentificationError(f"PNLSS fit: {error} is missing or unknown") from None

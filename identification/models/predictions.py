@@ -1,0 +1,103 @@
+"""Predictions of one model together with their references."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+from identification.frequency_responses import FrequencyResponse
+from identification.models.modal.sweep_prediction import SweepPrediction
+from identification.models.modal.uncertainty import ResponseBand
+from identification.packing import pack_all, unpack_all
+from identification.prediction.comparison import PredictionError
+from identification.prediction.simulated_runs import SimulatedRun
+from identification.prediction.steady_prediction import SteadyPrediction
+from identification.signals.transients import Transient
+from vibrolock.results import Result
+
+_PARTS: dict[str, type] = {
+    "steady": SteadyPrediction,
+    "steady_references": FrequencyResponse,
+    "steady_errors": PredictionError,
+    "steady_bands": ResponseBand,
+    "sweeps": SweepPrediction,
+    "sweep_references": Transient,
+    "sweep_errors": PredictionError,
+    "runs": SimulatedRun,
+}
+_LATER = ("runs",)
+"""Parts that files of earlier versions do not have."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Predictions(Result):
+    """Predicted steady responses and sweeps; references and errors are None where there is no reference.
+
+    Parameters
+    ----------
+    steady, steady_references, steady_errors
+        Predicted frequency responses, with the measured one and the errors for each.
+    steady_bands
+        Uncertainty bands of the frequency responses, None if unknown; empty if all are unknown.
+    sweeps, sweep_references, sweep_errors
+        Predicted sweeps, with the recorded one and the errors for each.
+    runs
+        Simulations of recorded experiments by a nonlinear state-space model.
+    specimen
+        Name of what was tested.
+    notes
+        Remarks on the predictions, one line each.
+
+    Raises
+    ------
+    IdentificationError
+        If there are not as many references or errors as predictions.
+    """
+
+    steady: tuple[SteadyPrediction, ...] = ()
+    steady_references: tuple[FrequencyResponse | None, ...] = ()
+    steady_errors: tuple[PredictionError | None, ...] = ()
+    steady_bands: tuple[ResponseBand | None, ...] = ()
+    sweeps: tuple[SweepPrediction, ...] = ()
+    sweep_references: tuple[Transient | None, ...] = ()
+    sweep_errors: tuple[PredictionError | None, ...] = ()
+    runs: tuple[SimulatedRun, ...] = ()
+    specimen: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.steady_bands:
+            object.__setattr__(self, "steady_bands", (None,) * len(self.steady))
+        if len(self.steady_bands) != len(self.steady):
+            raise IdentificationError(f"steady: {len(self.steady)} predictions, {len(self.steady_bands)} bands")
+        for kind, counts in (
+            ("steady", (len(self.steady), len(self.steady_references), len(self.steady_errors))),
+            ("sweeps", (len(self.sweeps), len(self.sweep_references), len(self.sweep_errors))),
+        ):
+            if len(set(counts)) > 1:
+                raise IdentificationError(
+                    f"{kind}: {counts[0]} predictions, {counts[1]} references, {counts[2]} errors"
+                )
+
+    @property
+    def errors(self) -> tuple[PredictionError, ...]:
+        """Errors of all comparisons, steady responses first."""
+        return tuple(error for error in (*self.steady_errors, *self.sweep_errors) if error is not None)
+
+    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Return arrays by name, and the JSON-able attributes that go with them."""
+        arrays: dict[str, NDArray[Any]] = {}
+        attributes: dict[str, Any] = {"specimen": self.specimen, "notes": list(self.notes)}
+        for name in _PARTS:
+            inside, of_parts = pack_all(name, getattr(self, name))
+            arrays, attributes = arrays | inside, attributes | of_parts
+        return arrays, attributes
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Predictions":
+        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
+        present = {name: kind for name, kind in _PARTS.items() if name in attributes or name not in _LATER}
+        parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in present.items()}
+        return cls(**parts, specimen=str(attributes.get("specimen", "")), notes=tuple(attributes.get("notes", ())))

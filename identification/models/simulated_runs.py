@@ -1,0 +1,138 @@
+"""Experiments as a model simulates them: errors, their spectra, and a stretch of time. For any model that can be simulated."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.experiments.checks import check_not_zero
+from identification.experiments.experiment import Experiment
+from identification.experiments.simulators import SimulatedMotion, Simulator, simulated
+from identification.models.pnlss.errors import estimated_initial_state
+from identification.models.pnlss.model import PnlssModel
+from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
+from vibrolock.arrays import Float
+
+
+def simulated_run(
+    model: Simulator, experiment: Experiment, *, initial_state: Float | None = None, use: str = "test"
+) -> SimulatedRun:
+    """Simulate an experiment from rest or from ``initial_state``, which is estimated if the experiment requires it.
+
+    Raises `IdentificationError` if channels or sample rates of model and experiment differ, or an output is zero where it
+    counts.
+    """
+    check_channels(model, experiment)
+    check_not_zero(experiment, f"experiment '{experiment.name}'")
+    run = run_of(model, experiment, initial_state)
+    measured = experiment.counted_outputs
+    size = np.linalg.norm(measured, axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.linalg.norm(run.outputs[:, experiment.counted_from :] - measured, axis=1) / size
+    at = run.unbounded_at
+    counted = run.outputs[:, experiment.counted_from :] if at is None else np.full(measured.shape, np.nan)
+    return SimulatedRun(
+        name=experiment.name,
+        level=experiment.level,
+        outputs=tuple(channel.name for channel in experiment.output_channels),
+        error=error if at is None else np.full(error.size, np.inf),
+        range_use=run.range_use,
+        unbounded_at_s=None if at is None else at / experiment.sample_rate_hz,
+        use=use,
+        rms=np.sqrt(np.mean(counted**2, axis=1)),
+        peak=np.max(np.abs(counted), axis=1),
+    )
+
+
+def error_spectra(model: Simulator, linear: Simulator | None, experiment: Experiment) -> ErrorSpectra:
+    """Return amplitudes by line of a periodic experiment: measurement, noise, model, errors of the model and its linear start.
+
+    Raises `IdentificationError` for an experiment that is not periodic.
+    """
+    period = experiment.period_samples
+    if not period:
+        raise IdentificationError(f"experiment '{experiment.name}': is not periodic and has no lines")
+
+    def lines(values: Float) -> Float:
+        mean = values.reshape(values.shape[0], -1, period).mean(axis=1)
+        return np.abs(np.fft.rfft(mean, axis=1))[:, 1 : (period + 1) // 2] * (2.0 / period)
+
+    def output(one: Simulator | None) -> Float:
+        run = None if one is None else run_of(one, experiment)
+        if run is None or run.unbounded_at is not None:
+            return np.full(experiment.counted_outputs.shape, np.nan)
+        return run.outputs[:, experiment.counted_from :]
+
+    measured, simulated = lines(experiment.counted_outputs), output(model)
+    return ErrorSpectra(
+        name=experiment.name,
+        outputs=tuple(channel.name for channel in experiment.output_channels),
+        frequency_hz=np.arange(1, measured.shape[1] + 1) * experiment.sample_rate_hz / period,
+        measured=measured,
+        linear_error=lines(output(linear) - experiment.counted_outputs),
+        error=lines(simulated - experiment.counted_outputs),
+        model=lines(simulated),
+        noise=np.full(measured.shape, np.nan) if experiment.output_noise is None else experiment.output_noise,
+    )
+
+
+def output_stretch(
+    model: Simulator, experiment: Experiment, *, samples: int = 400, initial_state: Float | None = None
+) -> OutputStretch:
+    """Return at most ``samples`` samples around the largest measured value of the first output, and the model's outputs there.
+
+    The run begins from rest or from ``initial_state``, which is estimated if the experiment requires it. Raises
+    `IdentificationError` if channels or sample rates of model and experiment differ.
+    """
+    check_channels(model, experiment)
+    run = run_of(model, experiment, initial_state)
+    largest = experiment.counted_from + int(np.argmax(np.abs(experiment.counted_outputs[0])))
+    last = experiment.outputs.shape[1]
+    first = max(min(largest - samples // 2, last - samples), experiment.counted_from)
+    stop = min(first + samples, last)
+    simulated = np.where(np.isfinite(run.outputs), run.outputs, np.nan)
+    if run.unbounded_at is not None:
+        simulated[:, run.unbounded_at :] = np.nan
+    return OutputStretch(
+        name=experiment.name,
+        outputs=tuple(channel.name for channel in experiment.output_channels),
+        time_s=np.arange(first, stop) / experiment.sample_rate_hz,
+        measured=experiment.outputs[:, first:stop],
+        simulated=simulated[:, first:stop],
+    )
+
+
+def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None = None) -> SimulatedMotion:
+    """Return the run under the inputs of an experiment, which begins as the experiment and the model require.
+
+    Raises `IdentificationError` if channels or sample rates differ, or the model cannot begin as the experiment does.
+    """
+    check_channels(model, experiment)
+    estimated = initial_state is None and experiment.initial_state == "estimated"
+    if isinstance(model, PnlssModel):
+        state = estimated_initial_state(model, experiment) if estimated else initial_state
+        return model.simulate(experiment.inputs, initial_state=state)
+    if estimated or initial_state is not None:
+        raise IdentificationError(
+            f"experiment '{experiment.name}': does not begin at rest, as a {type(model).__name__} does"
+        )
+    return simulated(model, experiment)
+
+
+def check_channels(model: Simulator, experiment: Experiment) -> None:
+    """Raise `IdentificationError` unless the experiment has the model's channels and rate."""
+    for what, mine, theirs in (
+        ("inputs", model.inputs, experiment.input_channels),
+        ("outputs", model.outputs, experiment.output_channels),
+    ):
+        names: Sequence[str] = [channel.name for channel in mine]
+        others = [channel.name for channel in theirs]
+        if names != others:
+            raise IdentificationError(
+                f"experiment '{experiment.name}': {what} are {', '.join(others)}, the model's {', '.join(names)}"
+            )
+    if abs(model.sample_rate_hz / experiment.sample_rate_hz - 1.0) > 1e-9:
+        raise IdentificationError(
+            f"experiment '{experiment.name}': sampled at {experiment.sample_rate_hz:g} Hz, the model at "
+            f"{model.sample_rate_hz:g} Hz"
+        )

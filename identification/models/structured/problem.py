@@ -1,0 +1,128 @@
+"""The least-squares problem of a structured model in the time domain: residuals of experiments, and what a modal test says."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from identification.errors import IdentificationError
+from identification.experiments.experiment import Experiment
+from identification.fitting.levenberg_marquardt import minimum, triangle_of
+from identification.fitting.threads import threads
+from identification.models.structured.leading import Lead
+from identification.models.structured.modal_test import ModalTest
+from identification.models.structured.model import StructuredModel
+from identification.models.structured.parameters import Parameters
+from vibrolock.arrays import Float
+
+_EVALUATIONS = 100
+"""Simulations with derivatives at most."""
+
+
+class Problem:
+    """Least-squares problem that is kept as small as its parameters.
+
+    With the QR decomposition ``[J r] = Q T`` of derivatives J and residuals r, the columns of the triangle T have the norms and
+    scalar products of the samples, and give the same steps.
+    """
+
+    def __init__(
+        self,
+        parameters: Parameters,
+        experiments: Sequence[Experiment],
+        leads: Sequence[Lead | None],
+        test: ModalTest,
+        misfit: float,
+    ) -> None:
+        self.parameters, self.experiments, self.stopped = parameters, experiments, ""
+        self._test, self._misfit = test, misfit
+        self.leads = leads
+        outputs = np.concatenate([experiment.counted_outputs for experiment in experiments], axis=1)
+        self.count = outputs.size
+        self._scale = np.sqrt(np.mean(outputs**2, axis=1))
+        for channel, size in zip(experiments[0].output_channels, self._scale, strict=True):
+            if not size > 0.0:
+                raise IdentificationError(
+                    f"output '{channel.name}': is zero throughout the training data; leave it out"
+                )
+        self._left: dict[bytes, float] = {}
+        """Sums of squares of the samples at all vectors that were asked for."""
+
+    def error(self, vector: Float) -> float:
+        """RMS of the residual over that of the outputs."""
+        if vector.tobytes() not in self._left:
+            self._cost(vector)
+        return float(np.sqrt(self._left[vector.tobytes()] / self.count))
+
+    def triangle(self, vector: Float) -> Float:
+        """float[P + 1, P + 1]: triangle of derivatives and residuals of experiments and of what is expected."""
+        parts, tested = self._rows(self._of_one, vector)
+        return triangle_of(np.concatenate([*parts, self._misfit * tested]))
+
+    def covariance(self, vector: Float) -> Float:
+        """float[P, P]: covariance of the numbers, as if the residual of each experiment were white, with a size of its own.
+
+        The estimate of White (Econometrica 48, 1980, 817) with one variance for each experiment; and what the steps of the
+        simulation move, to first order, as one error that all numbers share. Errors of outputs fall with the square of the
+        step, so that a run with half of it tells them (Richardson).
+        """
+        parts, tested = self._rows(self._with_finer, vector)
+        tested = self._misfit * np.insert(tested, -1, 0.0, axis=1)
+        rows = np.concatenate([*parts, tested])
+        inverse = np.linalg.pinv(rows[:, :-2].T @ rows[:, :-2])
+        freedom = max(1.0 - vector.size / self.count, 0.5)
+        told = self.error(vector) * tested[:, :-2]
+        middle = told.T @ told
+        for part, one in zip(parts, self.experiments, strict=True):
+            variance = float(part[:, -1] @ part[:, -1]) / one.counted_outputs.size
+            middle = middle + variance * part[:, :-2].T @ part[:, :-2]
+        of_steps = inverse @ (rows[:, :-2].T @ rows[:, -2])
+        return np.asarray(inverse @ middle @ inverse / freedom) + np.outer(of_steps, of_steps)
+
+    def _rows(self, of_one: Callable[..., Float], vector: Float) -> tuple[list[Float], Float]:
+        """Return what ``of_one`` gives for each experiment, and the rows of the modal test."""
+        model = self.parameters.model(vector)
+        with threads() as count, ThreadPoolExecutor(count) as pool:
+            parts = pool.map(partial(of_one, model), self.experiments, self.leads)
+            tested = self._test.rows(vector)  # meanwhile: compiled runs leave the interpreter free
+            return list(parts), tested
+
+    def _with_finer(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> Float:
+        """float[P + 2, P + 2]: as `_of_one`, with the errors that the steps make of the outputs before the residuals."""
+        finer = None if lead is None else replace(lead, steps=2 * lead.steps)
+        fine = self.parameters.outputs(
+            model.with_steps(2 * model.steps), experiment.inputs, experiment.counted_from, finer
+        )
+        return self._of_one(model, experiment, lead, fine)
+
+    def _of_one(
+        self, model: StructuredModel, experiment: Experiment, lead: Lead | None, fine: Float | None = None
+    ) -> Float:
+        """Return the triangle of one experiment."""
+        weight = np.sqrt(experiment.weight) / self._scale
+        found, derivatives = self.parameters.derivatives(model, experiment.inputs, experiment.counted_from, lead)
+        of_steps = [] if fine is None else [4.0 / 3.0 * (found - fine)[..., None]]
+        residual = (found - experiment.counted_outputs.T)[..., None]
+        both = np.concatenate([derivatives, *of_steps, residual], axis=2) * weight[:, None]
+        return triangle_of(both.reshape(-1, both.shape[2]))
+
+    def _cost(self, vector: Float) -> float:
+        """Return the sum of squares."""
+        model = self.parameters.model(vector)
+        with threads() as count, ThreadPoolExecutor(count) as pool:
+            left = sum(pool.map(partial(self._left_of_one, model), self.experiments, self.leads))
+        self._left[vector.tobytes()] = left
+        return left + float(np.sum((self._misfit * self._test.left(vector)) ** 2))
+
+    def _left_of_one(self, model: StructuredModel, experiment: Experiment, lead: Lead | None) -> float:
+        weight = np.sqrt(experiment.weight) / self._scale
+        found = self.parameters.outputs(model, experiment.inputs, experiment.counted_from, lead)
+        return float(np.sum(((found - experiment.counted_outputs.T) * weight) ** 2))
+
+    def solve(self, vector: Float, tolerance: float) -> tuple[Float, int]:
+        """Return the vector of least squares, and the number of simulations with derivatives that it took."""
+        found = minimum(self.triangle, self._cost, vector, self.parameters.bounds(vector), tolerance, _EVALUATIONS)
+        self.stopped = found.stopped
+        return found.vector, found.evaluations

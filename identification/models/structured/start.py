@@ -1,0 +1,245 @@
+"""Initial values of a structured model: modes from a modal test, and a linear regression for the nonlinear element."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from identification.channels import find_name
+from identification.errors import IdentificationError
+from identification.experiments.experiment import Experiment
+from identification.fitting.levenberg_marquardt import triangle_of
+from identification.linear.modes import LinearModes
+from identification.models.structured.elements import NonlinearElement
+from identification.models.structured.kernels import slide_along
+from identification.models.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, Law, Spring
+from identification.models.structured.modal_motion import LOWEST, modal_spectra
+from identification.models.structured.model import StructuredModel
+from vibrolock.arrays import Complex, Float
+
+HIGHEST = 6.0
+"""Highest line of the regression, relative to the frequency of the mode."""
+_POSITIONS = np.linspace(-1.0, 1.0, 21)
+"""Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
+_RESIDUAL_DAMPING = 0.02
+_LEAST_STIFFNESS, _LEAST_DAMPING = 0.25, 0.2
+"""What the initial element leaves of stiffness and damping of its mode."""
+_TINY = 1e-6
+"""Initial value (N) of a positive number that the regression finds to be zero."""
+_HIGHEST_RESIDUAL, _OF_STEPS = 0.6, 0.35
+"""Highest frequency of the residual's mode, relative to the sample rate and to the rate of the steps. Modes far above the band
+may have none. A lower mode with the same static receptance has a larger mass, and an exciter is simulated more easily with it.
+"""
+
+
+def linear_start(modes: LinearModes, experiment: Experiment, steps: int) -> StructuredModel:
+    """Return the linear model with the channels of ``experiment``.
+
+    The residual of the modes above the band becomes one more mode, at the frequency that `LinearModes` gives for it,
+    unless the steps are too long for that.
+    Raises `IdentificationError` if an output is not among the channels of the modes.
+    """
+    rows = [find_name(modes.channels, channel.name) for channel in experiment.output_channels]
+    drive = modes.drive_row
+    shapes, upper = np.real(np.asarray(modes.shapes)), np.real(np.asarray(modes.upper))
+    frequency, damping = np.asarray(modes.frequency_hz), np.asarray(modes.damping_ratio)
+    inputs, outputs = shapes[drive], shapes[rows]
+    if upper[drive] > 0.0:  # receptance upper = b c / w^2
+        upper_hz = min(float(modes.upper_hz), min(_HIGHEST_RESIDUAL, _OF_STEPS * steps) * experiment.sample_rate_hz)
+        omega = 2.0 * np.pi * upper_hz
+        at_drive = omega * np.sqrt(upper[drive])
+        frequency, damping = np.append(frequency, upper_hz), np.append(damping, _RESIDUAL_DAMPING)
+        inputs = np.append(inputs, at_drive)
+        outputs = np.column_stack([outputs, upper[rows] * omega**2 / at_drive])
+    return StructuredModel(
+        frequency_hz=frequency,
+        damping_ratio=damping,
+        input_shapes=inputs[:, None],
+        output_shapes=outputs,
+        direct=np.zeros((len(rows), 1)),
+        elements=(),
+        sample_rate_hz=experiment.sample_rate_hz,
+        inputs=experiment.input_channels,
+        outputs=experiment.output_channels,
+        steps=steps,
+        specimen=modes.specimen or experiment.specimen,
+    )
+
+
+def with_element(
+    linear: StructuredModel,
+    experiments: Sequence[Experiment],
+    measured_modes: int,
+    laws: Sequence[Law],
+    reach: float,
+) -> StructuredModel:
+    """Add an element along the mode that moves most: what is left of its equation of motion, by linear least squares.
+
+    The modal coordinates of the periodic experiments come from their spectra. Sensors of acceleration do not show the mean
+    position. A shift of it changes the coefficients of a polynomial, not the forces, so that the lines do not determine it.
+    Static balance does: without a mean input the mean of mode and element is zero. Numbers in which a law is not linear are
+    tried (`Law.tried`); the combination with the least residual is taken. Mean positions in balance beyond the largest RMS are
+    not found. Raises `IdentificationError` if no experiment is periodic.
+    """
+    periodic = [experiment for experiment in experiments if experiment.period_samples]
+    if not periodic:
+        raise IdentificationError("experiments: none is periodic, needs one at least for the initial values")
+    coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
+    sizes = [np.sqrt(np.mean(np.abs(q) ** 2, axis=1)) for q, _, _ in coordinates]
+    mode = int(np.argmax(np.max(sizes, axis=0)))
+    shape = float(linear.input_shapes[mode, 0])
+    times = [
+        np.fft.irfft(q[mode], e.period_samples) * e.period_samples
+        for (q, _, _), e in zip(coordinates, periodic, strict=True)
+    ]
+    scale = float(np.max(np.abs(np.concatenate(times)))) * abs(shape)
+    parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
+    places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
+    found = [
+        _regression(parts, list(tried), places, linear.omega[mode])
+        for tried in product(*(law.candidates() for law in laws))
+    ]
+    best = min(found, key=lambda one: one.residual)
+    direction = np.zeros(len(linear.omega))
+    direction[mode] = shape
+    element = NonlinearElement(
+        direction=direction,
+        scale_m=scale,
+        laws=tuple(started(law, numbers, scale) for law, numbers in zip(best.laws, best.numbers, strict=True)),
+        reach=reach,
+    )
+    return replace(softened(linear, [mode], [best.stiffness], [best.damping]), elements=(element,))
+
+
+def softened(
+    model: StructuredModel, modes: Sequence[int], stiffness: Sequence[float] | Float, damping: Sequence[float] | Float
+) -> StructuredModel:
+    """Return the model with changes of squared frequencies and of twice damping ratio times frequency (rad/s), limited."""
+    omega, rate = model.omega.copy(), model.damping_ratio * model.omega
+    for mode, softer, less in zip(modes, stiffness, damping, strict=True):
+        omega[mode] = np.sqrt(max(omega[mode] ** 2 + softer, _LEAST_STIFFNESS * omega[mode] ** 2))
+        rate[mode] = max(rate[mode] + 0.5 * less, _LEAST_DAMPING * rate[mode])
+    return replace(model, frequency_hz=omega / (2.0 * np.pi), damping_ratio=rate / omega)
+
+
+def started(law: Law, numbers: Float, scale: float) -> Law:
+    """Return a law with the linear numbers that the regression found in J or J s."""
+    if not law.linear:
+        return law
+    found = numbers / (scale**2 if isinstance(law, Damper) else scale)
+    least = {POSITIVE: _TINY, FROM_ZERO: 0.0}.get(law.free[law.linear], -np.inf)
+    found = np.maximum(found, least)  # the bounds of the regression hold up to rounding
+    value = getattr(law, law.linear)
+    return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})
+
+
+def _root(function: Callable[[float], float], places: Float) -> float:
+    """Return the root nearest to zero between two of the places; without a change of sign the place of the least value."""
+    from scipy.optimize import brentq  # only on use: it takes long to load
+
+    values = np.array([function(float(place)) for place in places])
+    crossings = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
+    if not crossings.size:
+        return float(places[np.argmin(np.abs(values))])
+    middles = 0.5 * (places[crossings] + places[crossings + 1])
+    at = crossings[np.argmin(np.abs(middles))]
+    return float(brentq(function, places[at], places[at + 1], rtol=1e-6))
+
+
+class _Equation:
+    """The equation of motion of one mode in one experiment, line by line."""
+
+    def __init__(
+        self,
+        linear: StructuredModel,
+        mode: int,
+        spectra: tuple[Complex, Complex, Float],
+        q: Float,
+        phi: float,
+    ) -> None:
+        coordinates, inputs, omega = spectra
+        own = linear.omega[mode]
+        self.lines = (omega > LOWEST * own) & (omega < HIGHEST * own)
+        dynamic = own**2 - omega**2 + 2j * linear.damping_ratio[mode] * own * omega
+        left = linear.input_shapes[mode] @ inputs - dynamic * coordinates[mode]
+        self.left, self.phi, self.q = left[self.lines], phi, q
+        self.rate = np.fft.irfft(1j * omega * coordinates[mode], q.size) * q.size
+        self._joints: dict[Law, Complex] = {}
+        self.own = self._spectra([self.q, self.rate])
+
+    def columns(self, law: Law, position: float) -> Complex:
+        """Spectra of the forces of a law for each of its linear numbers at 1, per x: the mean, and the lines.
+
+        A joint's do not depend on the position.
+        """
+        if law not in self._joints:
+            found = self._spectra(self._forces(law, position))
+            if not isinstance(law, Joint):
+                return found
+            self._joints[law] = found
+        return self._joints[law]
+
+    def _spectra(self, signals: list[Float]) -> Complex:
+        kept = np.append(0, np.flatnonzero(self.lines))
+        return np.asarray(np.fft.rfft(signals, axis=1)[:, kept] / self.q.size)
+
+    def _forces(self, law: Law, position: float) -> list[Float]:
+        x = self.phi * (self.q + position)
+        if isinstance(law, Spring):
+            return [one.force(x) for one in law.basis()]
+        if isinstance(law, Damper):
+            return [one.damping(x) * self.phi * self.rate for one in law.basis()]
+        found = [np.zeros_like(x) for _ in law.basis()]
+        for one, out in zip(cast(list[Joint], law.basis()), found, strict=True):
+            slide_along(np.ascontiguousarray(one.sliders().T), x, out)
+        return found
+
+
+class _Found(NamedTuple):
+    laws: list[Law]
+    numbers: list[Float]
+    """Linear numbers of each law, J."""
+    stiffness: float
+    """Change of the squared frequency."""
+    damping: float
+    """Change of twice the damping ratio times the frequency, rad/s."""
+    residual: float
+
+
+def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omega: float) -> _Found:
+    """Return the numbers in which ``laws`` are linear, at the mean position of static balance."""
+    from scipy.optimize import lsq_linear  # only on use: it takes long to load
+
+    linear = [law for law in laws if law.linear]
+    sizes = [np.size(getattr(law, law.linear)) for law in linear]
+    ways = [law.free[law.linear] for law in linear]
+    least = np.repeat([0.0 if way in (POSITIVE, FROM_ZERO) else -np.inf for way in ways], sizes)
+    bounds = np.append(least, [-np.inf, -np.inf]), np.full(least.size + 2, np.inf)
+    left = np.concatenate([part.left for part in parts])
+
+    def solved(position: float) -> tuple[Float, float, Float]:
+        """Return the numbers, what they leave, and the mean forces in the first experiment."""
+        forces = [
+            part.phi * np.concatenate([part.own[:0], *(part.columns(law, position) for law in linear)])
+            for part in parts
+        ]
+        rows = [np.concatenate([of, part.own])[:, 1:].T for part, of in zip(parts, forces, strict=True)]
+        columns = np.concatenate(rows)
+        both = np.column_stack([columns, left])
+        triangle = triangle_of(np.concatenate([both.real, both.imag]))  # the same norms, in few rows
+        a, y = triangle[:, :-1], triangle[:, -1]
+        scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
+        numbers = lsq_linear(a / scale, y, bounds=bounds, method="bvls").x / scale
+        return numbers, float(np.linalg.norm(a @ numbers - y)), forces[0][:, 0].real
+
+    def unbalanced(position: float) -> float:
+        numbers, _, means = solved(position)
+        return float(means @ numbers[:-2] + (omega**2 + numbers[-2]) * position)
+
+    still = not any(isinstance(law, Spring) for law in linear)
+    numbers, residual, _ = solved(0.0 if still else _root(unbalanced, places))
+    split = iter(np.split(numbers[:-2], np.cumsum(sizes)[:-1]))
+    found = [next(split) if law.linear else np.zeros(0) for law in laws]
+    return _Found(laws, found, float(numbers[-2]), float(numbers[-1]), residual)

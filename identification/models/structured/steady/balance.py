@@ -1,0 +1,164 @@
+"""Harmonic balance of the equation of motion of a structured model.
+
+``(w^2 D^2 + 2 Z W w D + W^2) Q + sum_e phi_e T^+ F_e(T phi_e . Q, w T D phi_e . Q) = B (U + S)``
+
+with the Fourier coefficients Q of the modal coordinates, the angular frequency w and the derivative D of a Fourier series by
+its phase. Forces of elements are evaluated over the phase (alternating frequency and time: Cameron and Griffin, J. Appl. Mech.
+56, 1989). The frequencies are those of the model, not those of its time steps (`StructuredModel`).
+
+Stability is that of a disturbance ``p(t) exp(s t)`` with periodic p (Hill): ``s^2 + s (2 w D + C) + J`` is singular there, with
+the Jacobian J and the damping C. Its multipliers over a period are ``exp(2 pi s / w)``.
+"""
+
+import numpy as np
+
+from identification.harmonic_balance.basis import Basis, complex_product
+from identification.harmonic_balance.driven import DrivenBalance, Period
+from identification.harmonic_balance.drives import Drive
+from identification.harmonic_balance.stability import by_centroid, distinct
+from identification.models.structured.model import StructuredModel
+from identification.models.structured.steady.kernels import along_period
+from vibrolock.arrays import Complex, Float
+
+
+class StructuredBalance(DrivenBalance):
+    """Equations of a driven structured model; its states are the modal coordinates.
+
+    ``support``: whether the support acts on the mean displacement. What its low-pass lets through of the fundamental always
+    acts: it does work, which the damping found by a fit offsets. The multipliers do not include the memory of the filter.
+    """
+
+    beyond = "elements are beyond {:g} times their range"
+
+    def __init__(self, model: StructuredModel, drive: Drive, basis: Basis, support: bool = True) -> None:
+        modes, self.ranges = len(model.omega), len(model.elements)
+        super().__init__(model, modes, drive, basis)
+        self.model, self.order, self._system = model, 2 * modes, model.system
+        self.kinks = len(self._system.tables.sliders) > 0
+        self._range = np.array([element.largest or element.reach for element in model.elements])
+        self._mean_supported = float(support)
+        self._turning = basis.turned(0.0)[1]
+        self._to_rate = basis.to_time @ self._turning
+        shape = (self.ranges, basis.samples)
+        self._room = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
+
+    def like(self, model: StructuredModel) -> "StructuredBalance":
+        """Return the same equations of another model."""
+        return StructuredBalance(model, self.drive, self.basis, self._mean_supported > 0.0)
+
+    def angle(self, frequency_hz: float) -> float:
+        """Phase advance of a period, rad."""
+        return 2.0 * np.pi
+
+    def along(self, states: Float, inputs: Float, frequency_hz: float) -> Period:
+        """Evaluate the model: the residual is the sum of all modal forces."""
+        model, basis, n, size = self.model, self.basis, self.n_states, self.basis.size
+        w, d, phi, b = 2.0 * np.pi * frequency_hz, self._turning, self._system.phi, model.input_shapes
+        force, damping, by = self._elements(states, w)
+        back = basis.to_coefficients
+        twice, drag = d @ d, 2.0 * model.damping_ratio * model.omega
+        residual = w**2 * twice @ states + w * (d @ states) * drag + states * model.omega**2
+        residual += back @ force.T @ phi - inputs @ b.T
+        by_w = 2.0 * w * twice @ states + (d @ states) * drag
+        by_w += back @ (damping.T * (self._to_rate @ states @ phi.T)) @ phi
+
+        residual_by = np.zeros((size, n, size, n + b.shape[1]))
+        linear = residual_by[..., :n]
+        linear += np.einsum("epq,ei,ej->piqj", back @ by, phi, phi, optimize=True)
+        for i in range(n):
+            linear[:, i, :, i] += w**2 * twice + w * drag[i] * d + model.omega[i] ** 2 * np.eye(size)
+        for p in range(size):
+            residual_by[p, :, p, n:] = -b
+        if model.support_n_m > 0.0:
+            reaction, reaction_by, reaction_by_w = self._support(states @ b[:, 0], w)
+            residual += reaction[:, None] * b[:, 0]
+            linear += np.einsum("pq,i,j->piqj", reaction_by, b[:, 0], b[:, 0])
+            by_w += reaction_by_w[:, None] * b[:, 0]
+
+        outputs, outputs_by, outputs_by_w = self._outputs(states, inputs, w)
+        to_hz = 2.0 * np.pi
+        return Period(outputs, residual, outputs_by, residual_by, to_hz * outputs_by_w, to_hz * by_w)
+
+    def _elements(self, states: Float, w: float) -> tuple[Float, Float, Float]:
+        """Forces and damping of the elements, and derivatives of the forces, as `along_period`."""
+        along = states @ self._system.phi.T
+        x, rate = (np.ascontiguousarray((to @ along).T) for to in (self.basis.to_time, w * self._to_rate))
+        along_period(self._system, x, rate, self.basis.to_time, w * self._to_rate, *self._room)
+        return self._room
+
+    def _support(self, displacement: Float, w: float) -> tuple[Float, Float, Float]:
+        """Coefficients of the support's reaction to the displacement of the first input, and derivatives by it and by w."""
+        model, basis = self.model, self.basis
+        h, corner = np.arange(1, basis.harmonics + 1), 2.0 * np.pi * model.support_corner_hz
+        low_pass, slope = np.zeros((2, basis.size, basis.size))
+        low_pass[0, 0] = self._mean_supported
+        stage = np.asarray(1.0 / (1.0 + 1j * h * w / corner), dtype=np.complex128)
+        for k, (factor, by_w) in enumerate(
+            zip(complex_product(stage**2), complex_product(-2j * h / corner * stage**3), strict=True)
+        ):
+            here = slice(2 * k + 1, 2 * k + 3)
+            low_pass[here, here], slope[here, here] = factor, by_w
+        most = model.support_largest_n
+        bounded = np.tanh(model.support_n_m / most * (basis.to_time @ low_pass @ displacement))
+        stiffness = (basis.to_coefficients * (model.support_n_m * (1.0 - bounded**2))) @ basis.to_time
+        return basis.to_coefficients @ (most * bounded), stiffness @ low_pass, stiffness @ slope @ displacement
+
+    def _outputs(self, states: Float, inputs: Float, w: float) -> tuple[Float, Float, Float]:
+        """Coefficients of the outputs, and derivatives by those of (x, u) and by w."""
+        model, n = self.model, self.n_states
+        by = np.zeros((self.basis.size, len(self.outputs), self.basis.size, n + len(self.inputs)))
+        by_w = np.zeros((self.basis.size, len(self.outputs)))
+        for row, order in enumerate(model.motions):
+            turned = np.linalg.matrix_power(w * self._turning, int(order))
+            by[:, row, :, :n] = turned[..., None] * model.output_shapes[row]
+            by_w[:, row] = order / w * (turned @ states @ model.output_shapes[row])
+        for p in range(self.basis.size):
+            by[p, :, p, n:] = model.direct
+        variables = np.concatenate([states, inputs], axis=1)
+        return np.tensordot(by, variables, axes=2), by, by_w
+
+    def _at_rest(self, frequency_hz: float) -> Period:
+        size = self.basis.size
+        return self.along(np.zeros((size, self.n_states)), np.zeros((size, len(self.inputs))), frequency_hz)
+
+    def linear_response(self, frequency_hz: float, row: int) -> tuple[Complex, Complex]:
+        """Return modal coordinates and outputs of small vibrations."""
+        at, n, count = self._at_rest(frequency_hz), self.n_states, self.state_unknowns
+        pushed = -at.residual_by[:, :, 1, n + row].ravel()
+        states = np.linalg.solve(at.residual_by[..., :n].reshape(count, count), pushed).reshape(-1, n)
+        outputs = np.tensordot(at.outputs_by[..., :n], states, axes=2) + at.outputs_by[:, :, 1, n + row]
+        return states[1] - 1j * states[2], outputs[1] - 1j * outputs[2]
+
+    def static(self, inputs: Float) -> Float:
+        """Return the displacement under small constant forces."""
+        by = self._at_rest(1.0).residual_by[0, :, 0]
+        return np.asarray(np.linalg.solve(by[:, : self.n_states], -by[:, self.n_states :] @ inputs))
+
+    def multipliers(self, z: Float, frequency_hz: float, level: float = 1.0) -> Complex:
+        """complex[2 n_modes]: multipliers over a period."""
+        states, n, count, w = self.states(z), self.n_states, self.state_unknowns, 2.0 * np.pi * frequency_hz
+        stiffness = self.along(states, self.inputs_of(z, level), frequency_hz).residual_by[..., :n]
+        damping = self._elements(states, w)[1]
+        parts = np.array([(self.basis.to_coefficients * row) @ self.basis.to_time for row in damping])
+        drag = np.zeros((self.basis.size, n, self.basis.size, n))
+        if len(parts):
+            drag += np.einsum("epq,ei,ej->piqj", parts, self._system.phi, self._system.phi, optimize=True)
+        for i in range(n):
+            own = 2.0 * self.model.damping_ratio[i] * self.model.omega[i]
+            drag[:, i, :, i] += own * np.eye(self.basis.size) + 2.0 * w * self._turning
+        first = np.zeros((2 * count, 2 * count))
+        first[:count, count:] = np.eye(count)
+        first[count:, :count] = -stiffness.reshape(count, count) / w**2
+        first[count:, count:] = -drag.reshape(count, count) / w
+        values, vectors = np.linalg.eig(first)
+        order = by_centroid(vectors[:count].reshape(self.basis.size, n, -1), self.basis)
+        return distinct(np.exp(2.0 * np.pi * values[order]), self.order, 1.0)
+
+    def state_use(self, z: Float, to_time: Float) -> Float:
+        """float[n_elements]: largest displacement of each element over that in training, or its reach if that is unknown."""
+        x = np.abs(to_time @ self.states(z) @ self._system.phi.T)
+        return np.asarray(np.max(x, axis=0, initial=0.0) / self._range)
+
+    def input_use(self, inputs: Float, to_time: Float) -> Float:
+        """NaN: a structured model does not know the range of its inputs."""
+        return np.full(inputs.shape[1], np.nan)

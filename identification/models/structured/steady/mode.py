@@ -1,0 +1,189 @@
+"""The nonlinear mode of a structured model: frequency and damping over amplitude, with the errors of the fit."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from identification.channels import find_role
+from identification.errors import IdentificationError
+from identification.exciter_coupling.exciter import Exciter
+from identification.harmonic_balance.setting_up import Held
+from identification.harmonic_balance.states import motion_rows
+from identification.models.structured.fit import StructuredFit
+from identification.models.structured.model import StructuredModel
+from identification.models.structured.steady.backbone import Resonances, resonances
+from identification.models.structured.steady.response import balance_of, resonance_hz
+from identification.models.structured.uncertainty import std_of
+from identification.nonlinear.nonlinear_modes import NonlinearMode
+from identification.nonlinear.properties import States, properties
+from vibrolock.arrays import Float
+
+_POINTS = 25
+"""Largest number of points; they are spread over the backbone."""
+_TRIES = 12
+"""Doublings of the force until an element moves as far as in the training data."""
+_REACHED = 0.8
+"""Share of the training range below which a backbone that ends for another reason counts as cut off."""
+_CORRECTIONS, _EXACT = 8, 1e-9
+
+
+def structured_mode(
+    found: StructuredFit | StructuredModel,
+    force_n: float | None = None,
+    *,
+    force: Held = "pure-sine",
+    exciter: Exciter | None = None,
+    support: bool = True,
+    near_hz: float | None = None,
+    harmonics: int = 7,
+    samples: int | None = None,
+) -> NonlinearMode:
+    """Compute modal frequency and damping ratio of a structured model over the amplitude, as `nonlinear_mode` measures them.
+
+    The points are those of `structured_backbone`. The damping ratio is that of the active power of the force's fundamental; the
+    modal amplitude refers to the small vibrations (`StructuredModel.linearised`).
+
+    Standard errors are those of frequency and damping at the same amplitude, from the covariance of the fit, to first order
+    (`uncertainty`). They are NaN for a model without its fit, and contain neither the misfit of the
+    laws nor that of the modes.
+
+    Parameters
+    ----------
+    found
+        A fit, or a model alone.
+    force_n
+        Largest force, N; by default that at which an element moves as far as in the training data.
+    force, exciter, near_hz, harmonics, samples
+        As in `structured_backbone`.
+    support
+        Whether the model's static support acts, as it does in a measured backbone.
+
+    Raises
+    ------
+    IdentificationError
+        If ``force_n`` is needed because the model does not know its training data, and as `structured_backbone` does.
+    """
+    model = found.model if isinstance(found, StructuredFit) else found
+    row = find_role(model.outputs, "drive")
+
+    def backbone(force_n: float, largest_use: float) -> Resonances:
+        balance = balance_of(model, force_n, force, exciter, support, harmonics, samples)
+        return resonances(model, balance, near_hz, largest_use)
+
+    path = _within_training(model, backbone, row, near_hz) if force_n is None else backbone(force_n, np.inf)
+    if force_n is not None and path.reason:
+        raise IdentificationError(f"force_n: the backbone ends at {path.level[-1] * force_n:.3g} N ({path.reason})")
+    path = path.some(np.unique(np.linspace(0, len(path.level) - 1, _POINTS).round().astype(int)))
+    states = path.states()
+    shape, linear = _tested(model, row, near_hz)
+    of_motions = motion_rows(model.outputs)
+    displacement = states.states @ model.output_shapes[of_motions].T
+    values: dict[str, Any] = properties(
+        States(
+            frequency_hz=path.frequency_hz,
+            force=states.force_n,
+            drive_m=displacement[..., 0],
+            drift=np.zeros(states.count, dtype=np.complex128),
+            deflection_m=displacement[:, 1],
+            inverse=None,
+            drive_shape=shape,
+            linear_shape=linear[of_motions],
+            linear_columns=tuple(range(len(of_motions))),
+        )
+    )
+    relative = np.full((2, states.count), np.nan)
+    if isinstance(found, StructuredFit):
+        relative = std_of(found, lambda other: _at_amplitudes(path, other, row, near_hz))
+    return NonlinearMode(
+        **values,
+        modal_frequency_std_hz=relative[0] * values["modal_frequency_hz"],
+        damping_ratio_std=relative[1] * values["damping_ratio"],
+        damping_ratio_total_power_std=relative[1] * values["damping_ratio"],
+        frequency_hz=path.frequency_hz,
+        fit_residual=np.full(states.count, np.nan),
+        force_harmonics=states.force_n,
+        response_harmonics_m=displacement[..., 0],
+        source="structured model",
+        specimen=model.specimen,
+        notes=(
+            *_notes(isinstance(found, StructuredFit), force, support and model.support_n_m > 0.0),
+            *([f"the backbone ends early ({path.reason})"] if float(path.use()[-1]) < _REACHED and path.reason else []),
+        ),
+        drive_mode_shape=shape,
+        drive_mode_shape_source="small vibrations of the structured model",
+    )
+
+
+def _tested(model: StructuredModel, row: int, near_hz: float | None) -> tuple[float, Float]:
+    """Return the shape at the drive point and float[n_outputs] of the mode of small vibrations that is followed."""
+    at_rest = model.linearised()
+    mode = int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz(model, near_hz))))
+    shapes = at_rest.output_shapes[:, mode]
+    return float(abs(shapes[row])), shapes
+
+
+def _within_training(
+    model: StructuredModel, backbone: Callable[[float, float], Resonances], row: int, near_hz: float | None
+) -> Resonances:
+    """Return the part of the backbone on which no element moves further than in the training data."""
+    if not model.elements or not all(element.largest for element in model.elements):
+        raise IdentificationError("force_n: is missing; the model does not know the range of its training data")
+    at_rest = model.linearised()
+    mode = int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz(model, near_hz))))
+    shape = abs(at_rest.output_shapes[row, mode])
+    least = min(float(e.largest or 1.0) * e.scale_m / np.linalg.norm(e.direction) for e in model.elements)
+    force_n = float(2.0 * at_rest.damping_ratio[mode] * at_rest.omega[mode] ** 2 * least / shape)
+    for _ in range(_TRIES):
+        path = backbone(force_n, 1.0)
+        if path.reason:
+            inside = np.flatnonzero(path.use() <= 1.0)
+            if inside.size > 1:
+                return path.some(inside)
+            force_n /= 8.0
+            continue
+        force_n *= 2.0
+    raise IdentificationError(
+        f"force_n: is missing; up to {force_n:.3g} N no element moves as far as in the training data"
+    )
+
+
+def _at_amplitudes(path: Resonances, model: StructuredModel, row: int, near_hz: float | None) -> Float:
+    """float[2, n]: logarithms of frequency and damping ratio of another model, near a path, at the same amplitudes."""
+    balance = path.like(model)
+    shape, out = _tested(model, row, near_hz)[0], np.empty((2, len(path.level)))
+    resonance = balance.equations
+    for k in range(len(path.level)):
+        v = np.append(path.unknowns[k], path.level[k])
+        target = float(path.equations.amplitude_row @ path.unknowns[k])
+        scale = np.maximum(np.abs(v), 1e-3 * np.max(np.abs(v)))
+        for _ in range(_CORRECTIONS):
+            residual, by_z, by_level = resonance(v[:-1], float(v[-1]))
+            matrix = np.zeros((v.size, v.size))
+            matrix[:-1, :-1], matrix[:-1, -1] = by_z, by_level
+            matrix[-1, :-1] = resonance.amplitude_row
+            change = np.linalg.solve(matrix, -np.append(residual, resonance.amplitude_row @ v[:-1] - target))
+            v = v + change
+            if np.max(np.abs(change / scale)) < _EXACT:
+                break
+        else:
+            raise IdentificationError(f"covariance: no vibration was found at the amplitude of point {k + 1}")
+        at_hz = float(v[-2])
+        inputs = balance.balance.inputs_of(v[:-2], float(v[-1]))
+        out[0, k] = np.log(at_hz)
+        out[1, k] = np.log(np.hypot(inputs[1, 0], inputs[2, 0]) * shape**2 / at_hz**2)
+    return out
+
+
+def _notes(fitted: bool, force: str, supported: bool) -> tuple[str, ...]:
+    notes = [
+        "computed from a structured model" + (", not measured" if fitted else "; without its fit errors are unknown")
+    ]
+    if fitted:
+        notes.append("standard errors are those of the fit's numbers alone, as if its residual were white")
+    if force == "pure-sine":
+        notes.append(
+            "held: a force without harmonics"
+            + (", with the static force of the exciter's suspension" if supported else "")
+        )
+    return tuple(notes)

@@ -1,1 +1,0 @@
-"""Time records measured by others: what they hold, and the experiments and frequency responses that come of them."""

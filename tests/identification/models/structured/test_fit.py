@@ -1,0 +1,171 @@
+"""Fits of structured models: known models come back, from many starts, with errors that hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import Channel, IdentificationError
+from identification.experiments.experiment import Experiment
+from identification.models.structured.elements import NonlinearElement
+from identification.models.structured.fit import fit_structured
+from identification.models.structured.laws import PolynomialDamper, PolynomialSpring
+from identification.models.structured.parameters import Parameters
+from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, linear_modes, multisine
+
+LAWS = (PolynomialSpring((3.0, 1.5, 0.5, 0.2)), PolynomialDamper((0.4,)))
+ELEMENT = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, laws=LAWS)
+TRUE = beam(elements=(ELEMENT,), support_n_m=0.0)
+
+
+def experiment(model=TRUE, rms_n=2.0, seed=1, noise=0.0) -> Experiment:
+    """A steady period after another one."""
+    inputs = np.tile(multisine(rms_n, seed), 8)
+    inputs, outputs = inputs[:, -4000:], model.simulate(inputs).outputs[:, -4000:]
+    scatter = np.random.default_rng(100 + seed).standard_normal(outputs.shape)
+    outputs = outputs + noise * np.std(outputs, axis=1, keepdims=True) * scatter
+    return Experiment(
+        inputs=inputs,
+        outputs=outputs,
+        sample_rate_hz=RATE_HZ,
+        input_channels=(FORCE,),
+        output_channels=OUTPUTS,
+        counted_from=2000,
+        period_samples=2000,
+    )
+
+
+def law_at(model, z):
+    """Force of the whole spring in the direction of the element at the first mode's displacement, N."""
+    element = model.elements[0]
+    x = z / element.scale_m
+    return element.laws[0].force(x) * element.direction[0]
+
+
+def test_a_known_model_comes_back():
+    found = fit_structured(linear_modes(TRUE, 1), [experiment()], support=False)
+    assert found.training_error < 1e-4
+    np.testing.assert_allclose(found.model.frequency_hz, TRUE.frequency_hz, rtol=5e-4)
+    np.testing.assert_allclose(found.model.damping_ratio, TRUE.damping_ratio, rtol=2e-2)
+    np.testing.assert_allclose(found.model.output_shapes, TRUE.output_shapes, rtol=1e-2, atol=2e-2)
+    # scale and direction are one freedom: the force on the first mode per its displacement is not
+    z = np.linspace(-1e-3, 1e-3, 9)
+    ratio = found.model.elements[0].direction[0] / ELEMENT.direction[0]
+    np.testing.assert_allclose(law_at(found.model, ratio * z), law_at(TRUE, z), rtol=1e-2, atol=2e-3)
+    fresh = multisine(3.0, 9, 8000)
+    outputs, true = (model.simulate(fresh).outputs for model in (found.model, TRUE))
+    assert np.linalg.norm(outputs - true) < 1e-3 * np.linalg.norm(true)
+
+
+def test_the_static_force_that_no_sensor_shows_is_found():
+    true = replace(TRUE, support_n_m=1500.0)
+    data = [experiment(true, rms_n=rms) for rms in (1.0, 3.0)]
+    data = [replace(one, outputs=true.simulate_experiment(one).outputs) for one in data]
+    found = fit_structured(linear_modes(true, 1), data)
+    assert found.model.support_n_m == pytest.approx(1500.0, rel=0.05)
+    without = fit_structured(linear_modes(true, 1), data, support=False)
+    assert found.training_error < 0.2 * without.training_error
+
+
+@pytest.mark.slow
+def test_most_fits_from_modes_that_are_somewhat_wrong_end_at_the_same_minimum():
+    rng = np.random.default_rng(4)
+    modes, data = linear_modes(TRUE, 1), [experiment(noise=0.01)]
+    best = fit_structured(modes, data, support=False).training_error
+    ends = []
+    for _ in range(20):
+        start = replace(
+            modes,
+            frequency_hz=modes.frequency_hz * (1.0 + 2e-4 * rng.standard_normal(1)),
+            damping_ratio=modes.damping_ratio * np.exp(0.1 * rng.standard_normal(1)),
+            shapes=modes.shapes * (1.0 + 5e-3 * rng.standard_normal(modes.shapes.shape)),
+            upper=modes.upper * (1.0 + 0.1 * rng.standard_normal(modes.upper.shape)),
+        )
+        ends.append(fit_structured(start, data, support=False).training_error)
+    assert np.sum(np.abs(np.array(ends) / best - 1.0) < 0.01) >= 17, ends
+
+
+@pytest.mark.slow
+def test_standard_errors_hold_white_noise():
+    modes, data = linear_modes(TRUE, 1), [experiment(noise=0.02, seed=seed) for seed in range(1, 21)]
+    inside = []
+    for one in data:
+        found = fit_structured(modes, [one], support=False)
+        std = np.sqrt(np.diag(found.covariance))
+        of = {name: number for number, name in enumerate(found.names)}
+        for name, truth in (
+            ("frequency 1", np.log(25.0)),
+            ("damping 1", np.log(0.01)),
+            ("shape 1 at force", 0.9),
+            ("shape 1 at tip", 1.4),
+        ):
+            inside.append(abs(found.values[of[name]] - truth) <= 1.96 * std[of[name]])
+    assert 0.88 <= np.mean(inside) <= 1.0
+
+
+def test_errors_of_the_steps_are_in_the_covariance():
+    """Data of short steps, without noise, fitted with long ones: the standard errors are the errors, which the steps make."""
+    found = fit_structured(linear_modes(TRUE, 1), [experiment(TRUE.with_steps(40))], support=False, steps=4)
+    std, of = np.sqrt(np.diag(found.covariance)), {name: number for number, name in enumerate(found.names)}
+    for name, truth in (("damping 1", np.log(0.01)), ("shape 1 at force", 0.9), ("shape 1 at tip", 1.4)):
+        assert abs(found.values[of[name]] - truth) == pytest.approx(std[of[name]], rel=0.1), name
+
+
+def test_steps_make_damping_appear_larger():
+    """Midpoint steps of length h multiply rates of decay by ``sin(w h)/(w h)``; a fit makes up for it."""
+    linear = beam(elements=(), support_n_m=0.0)
+    data = [experiment(linear.with_steps(40))]
+    laws = (PolynomialSpring((0.0,)),)
+    found = fit_structured(linear_modes(linear, 1), data, laws=laws, support=False, steps=4)
+    expected, number = (linear.omega[0] / (4.0 * RATE_HZ)) ** 2 / 6.0, found.names.index("damping 1")
+    assert found.values[number] - np.log(0.01) == pytest.approx(expected, rel=0.05)
+    assert np.sqrt(found.covariance[number, number]) == pytest.approx(expected, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "message"),
+    [
+        (
+            {"input_channels": (Channel("volts", "monitor", "V"),)},
+            {},
+            r"inputs: are volts \(monitor\), needs one force",
+        ),
+        ({"initial_state": "estimated"}, {}, r"experiments\[0\].initial_state: is 'estimated', allowed is zero"),
+        ({"period_samples": 0}, {}, r"experiments: none is periodic, needs one at least"),
+        ({}, {"laws": ()}, r"laws: is empty, needs one at least"),
+        ({}, {"steps": 0}, r"steps: is 0, allowed is 1 or above"),
+        ({}, {"reach": 0.0}, r"reach: is 0, must be finite and above zero"),
+        (
+            {"output_channels": (OUTPUTS[0], Channel("tail", "response", "m/s"), OUTPUTS[2])},
+            {},
+            r"no channel 'tail'|tail",
+        ),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_in_a_line(change, options, message):
+    with pytest.raises(IdentificationError, match=message):
+        fit_structured(linear_modes(TRUE, 1), [replace(experiment(), **change)], **options)
+
+
+def test_an_output_that_is_zero_is_refused():
+    silent = replace(experiment(), outputs=experiment().outputs * [[1.0], [0.0], [1.0]])
+    with pytest.raises(IdentificationError, match=r"output 'tip': is zero throughout the training data; leave it out"):
+        fit_structured(linear_modes(TRUE, 1), [silent])
+
+
+def test_the_motion_before_the_counted_samples_does_not_matter_and_the_minimum_is_one():
+    """Led by the measured motion, a simulation begins in the steady state, as a long run from rest does."""
+    data = [experiment(noise=0.002, seed=1), experiment(noise=0.002, seed=2, rms_n=1.0)]
+    found = fit_structured(linear_modes(TRUE, 1), data, support=False)
+    parameters = Parameters(found.start, (0,), False)
+    scale = np.sqrt(np.mean(np.concatenate([one.counted_outputs for one in data], axis=1) ** 2, axis=1))
+    rows, residuals = [], []
+    for one in data:
+        inputs = np.tile(one.inputs, 4)
+        outputs, derivatives = parameters.derivatives(found.model, inputs, inputs.shape[1] - 2000)
+        rows.append((derivatives / scale[:, None]).reshape(-1, found.values.size))
+        residuals.append(((outputs - one.counted_outputs.T) / scale).ravel())
+    jacobian, residual = np.concatenate(rows), np.concatenate(residuals)
+    assert found.training_error == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-2)
+    cosines = jacobian.T @ residual / (np.linalg.norm(jacobian, axis=0) * np.linalg.norm(residual))
+    assert np.max(np.abs(cosines)) < 0.05
