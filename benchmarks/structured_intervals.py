@@ -1,6 +1,6 @@
 """Do the intervals of structured models hold the truth? ``python -m benchmarks.structured_intervals [--seeds 50]``.
 
-The structure of `tests/identification/models/structured/test_elements.py`: three modes, two of them known to a modal test, a joint
+The structure of `tests/identification/models/structured/test_elements.py`: three modes, two known to a modal test, a joint
 and a cubic spring where no sensor is, integrated by another method with steps of 16 us. For each seed of noise three multisines
 are fitted, and 95 % intervals of what has a unit of its own are held against the truth.
 """
