@@ -24,7 +24,7 @@ from vibrolock.arrays import Float
 
 HUNDRED, LEVELS, DECAYS = 100.0, 40, 12.0
 """Largest force over the training level, levels of the bound, and length of a run in time constants of the slowest mode."""
-FOLLOWING = 10
+PLAUSIBILITY = 10
 """Runs of a chain in which every force follows the velocity of the run before."""
 
 
@@ -99,9 +99,9 @@ class Trial:
             for name, force in shapes(self.model, self.samples, rng).items()
         }
         found["following"] = []
-        if seed % FOLLOWING == 0:
+        if seed % PLAUSIBILITY == 0:
             level, force = int(rng.integers(LEVELS)), rng.standard_normal(self.samples)
-            for _ in range(FOLLOWING):
+            for _ in range(PLAUSIBILITY):
                 one, velocity = self.held(force, level)
                 found["following"].append(one)
                 force = np.sign(velocity) + (velocity == 0.0)

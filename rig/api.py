@@ -22,7 +22,7 @@ from rig.arming.run_options import Progress, RunOptions, Silent
 from rig.bench import Bench, load_bench
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.runner import resume_run, run_plan
 from rig.measurements import Estimator, backbone, force_surface, frequency_responses, response_matrices, spectra, sweeps
 from rig.measurements.experiments import experiments
 from rig.measurements.experiments.periods import Periods
@@ -194,10 +194,10 @@ def run(
     elif not isinstance(bench, Bench):
         bench = load_bench(bench)
     if output is not None:
-        return Run(carry_out(plan, bench, Path(output), options))
+        return Run(run_plan(plan, bench, Path(output), options))
     folder = Path(mkdtemp(prefix="vibrolock-"))
     try:
-        return Run(carry_out(plan, bench, folder / "run.h5", options), folder)
+        return Run(run_plan(plan, bench, folder / "run.h5", options), folder)
     except BaseException:
         rmtree(folder, ignore_errors=True)
         raise
@@ -240,7 +240,7 @@ def resume(
     )
     source = "" if plan is None or isinstance(plan, Plan) else plan
     change = plan if plan is None or isinstance(plan, Plan) else load_plan(plan)
-    recording = take_up(
+    recording = resume_run(
         Path(output), options, change=change, source=source, retry_tripped=retry_tripped, trust_code=trust_code
     )
     return Run(recording)

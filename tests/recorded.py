@@ -20,7 +20,7 @@ from rig.arming.run_options import RunOptions
 from rig.bench import Bench, load_bench
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import bench_of, load_plan, plan_from
-from rig.campaigns.running.runner import carry_out
+from rig.campaigns.running.runner import run_plan
 from rig.recording.reader import Recording
 from tests.sharing import made_once
 
@@ -67,7 +67,7 @@ def changed(plan: Plan | str | Path, **changes: Any) -> Plan:
 
 
 def _make(path: Path, plan: Plan, bench: Bench, seed: int) -> None:
-    carry_out(plan, bench, path, RunOptions(seed=seed)).close()
+    run_plan(plan, bench, path, RunOptions(seed=seed)).close()
     path.chmod(0o444)
 
 

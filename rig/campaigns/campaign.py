@@ -27,7 +27,7 @@ class Campaign:
     drawn."""
     figure_in: tuple[float, float] = (9.0, 6.4)
     """Width and height of the page of its figure, inches."""
-    in_one_go: bool = False
+    batched: bool = False
     """Whether several points are measured together; then ``measure`` is ``(bench, plan, targets, rows, passages, ended) ->
     points``."""
     watch: Callable[[Any, Sequence[Point[object]], Point[object]], tuple[Point[object], str]] | None = None

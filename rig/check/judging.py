@@ -43,22 +43,22 @@ def best_assignment(cost: Float) -> tuple[int, ...] | None:
 LATE_SAMPLES = 0.25
 
 
-def latency_findings(bench: Bench, responses: Responses, lead_fraction: float) -> list[Finding]:
+def latency_findings(bench: Bench, responses: Responses, delay_fraction: float) -> list[Finding]:
     """Measure the delay of each loopback beyond the latency that the driver reports, from its phase slope over the band.
 
-    ``lead_fraction`` is the fraction of a sample by which the rows' outputs and inputs are not aligned.
+    ``delay_fraction`` is the fraction of a sample by which the rows' outputs and inputs are not aligned.
     """
     rows = [i for i, channel in enumerate(bench.channels) if channel.loopback]
     if not rows:
         text = "no channel is declared with loopback = true"
         return [Finding("latency", "", "not tested", text=text)]
-    return [_slope(bench, responses, row, lead_fraction) for row in rows]
+    return [_slope(bench, responses, row, delay_fraction) for row in rows]
 
 
-def _slope(bench: Bench, responses: Responses, row: int, lead_fraction: float) -> Finding:
+def _slope(bench: Bench, responses: Responses, row: int, delay_fraction: float) -> Finding:
     value, omega = responses.per_volt[row], 2.0 * math.pi * responses.frequency_hz / bench.sample_rate_hz
     phase = np.unwrap(np.angle(value))
-    late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - lead_fraction
+    late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - delay_fraction
     bad = abs(late) > LATE_SAMPLES
     text = "more than the driver says: its queue or filter delay, or this channel's skew_samples" if bad else ""
     name = bench.channels[row].name

@@ -202,7 +202,7 @@ def identify(
     from rig.results.simulated.options import DataOptions
     from rig.results.structured.options import StructuredOptions
     from rig.show.progress import FitLines
-    from rig.system.stop_signals import insisting
+    from rig.system.stop_signals import escalating
 
     keep_existing([*files, *(validation or ())], output, overwrite or resume)
     request = Request(
@@ -246,7 +246,7 @@ def identify(
             scatter=scatter,
         ),
     )
-    with insisting() as signals:
+    with escalating() as signals:
         lines = FitLines(signals.check)
         try:
             found = identify_model(files, request, progress=lines)

@@ -37,7 +37,7 @@ def run(
     """Carry out a plan and record it."""
     from rig.bench import load_bench
     from rig.campaigns.plans import bench_of, load_plan
-    from rig.campaigns.running.runner import carry_out
+    from rig.campaigns.running.runner import run_plan
 
     loaded = load_plan(plan)
     chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
@@ -48,7 +48,7 @@ def run(
 
         options = replace(options, check=checked_scale(check, chosen))
     options = _with_rehearsal(options, rehearsal, override_rehearsal)
-    _carry(loaded.kind, options, lambda watched: carry_out(loaded, chosen, output, watched), json)
+    _carry(loaded.kind, options, lambda watched: run_plan(loaded, chosen, output, watched), json)
 
 
 @with_run_options(of_a_further_part)
@@ -69,7 +69,7 @@ def resume(
 ) -> None:
     """Finish a run that was interrupted, by its plan or a changed one; points that were accepted stay."""
     from rig.campaigns.plans import load_plan
-    from rig.campaigns.running.runner import take_up
+    from rig.campaigns.running.runner import resume_run
     from rig.recording.reader import Recording
 
     with Recording(output) as recording:
@@ -79,7 +79,7 @@ def resume(
     _carry(
         kind,
         options,
-        lambda watched: take_up(
+        lambda watched: resume_run(
             output, watched, change=change, source=plan or "", retry_tripped=retry_tripped, trust_code=trust_code
         ),
         json,

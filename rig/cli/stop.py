@@ -23,7 +23,7 @@ def stop(
     from rig.errors import RecordingError
     from rig.live.place import base_folder, runs
     from rig.live.reader import left_behind, run_into
-    from rig.monitor.coming_down import ComingDown
+    from rig.monitor.shutdown_monitor import ShutdownMonitor
     from vibrolock.printable import printable
 
     base_folder()  # says what is wrong with it
@@ -38,7 +38,7 @@ def stop(
     if not folders:
         raise RecordingError("no run is under way" if file is None else f"{file}: no run into this file is under way")
     cause = f"stopped by `rig stop` (process {os.getpid()})"
-    left = [ComingDown(folder, cause, timeout) for folder in folders]
+    left = [ShutdownMonitor(folder, cause, timeout) for folder in folders]
     failed = False
     while left:
         for one in list(left):

@@ -1,4 +1,4 @@
-"""The campaign's side: publishes a run, waits for nobody, and never lets what it publishes harm the run.
+"""Publish a run in shared memory without blocking it; errors never reach the run.
 
 Facts and lines are files that only grow. Frame and traces are memory of a fixed size, reserved at the start, so that writing to
 it cannot fail: the frame carries a checksum by which a reader knows that it has read a whole one; a bin counts once the number
@@ -19,7 +19,7 @@ import numpy as np
 from rig.live.binning import put_bin
 from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
 from rig.live.place import FRAME_FILE, LINES, STOP, TRACES, new_folder, remove
-from rig.live.stopping import heeding
+from rig.live.stopping import stopping_on_request
 from rig.live.time_left import time_left_s
 from rig.loop.loop import RunningLoop
 from rig.recording.jsontext import encode
@@ -31,7 +31,7 @@ LATENESS_S = 1.0
 
 
 class Live(Protocol):
-    """Takes what is to be seen of a run."""
+    """Consumer of the state of a run."""
 
     def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         """Take telemetry rows, with the loop as it is after them and the number of points that are over."""
@@ -46,12 +46,12 @@ class Live(Protocol):
     def another_part(self) -> bool:
         """Say that one more part is going to be started; return whether it may be: not once a stop was requested."""
 
-    def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
+    def stopping_on_request(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Let requests to stop reach ``stop`` while the rig is driven."""
 
 
 class Unpublished:
-    """Takes all and shows nothing."""
+    """Ignores everything: the run is not published."""
 
     def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         """Do nothing."""
@@ -66,7 +66,7 @@ class Unpublished:
         """Return True: nobody could request a stop."""
         return True
 
-    def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
+    def stopping_on_request(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Do nothing."""
         return nullcontext()
 
@@ -154,9 +154,9 @@ class Publisher:
         """Whether a request was left."""
         return (self.folder / STOP).exists()
 
-    def heeding(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
+    def stopping_on_request(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
         """Look for requests to stop, in a thread of its own."""
-        return heeding(self.folder, stop)
+        return stopping_on_request(self.folder, stop)
 
     def close(self) -> None:
         """Remove the folder. Readers keep what they have open."""

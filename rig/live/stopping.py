@@ -15,8 +15,8 @@ from rig.errors import RecordingError
 from rig.live.place import STOP
 from vibrolock.printable import printable
 
-LOOK_S = 0.05
-LONGEST = 300
+POLL_S = 0.05
+LARGEST_CAUSE_BYTES = 300
 
 
 def request_stop(folder: Path, cause: str) -> None:
@@ -29,7 +29,7 @@ def request_stop(folder: Path, cause: str) -> None:
     try:
         descriptor = os.open(written, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with suppress(OSError):  # an empty file is a request as well
-            os.write(descriptor, cause.encode()[:LONGEST])
+            os.write(descriptor, cause.encode()[:LARGEST_CAUSE_BYTES])
         os.close(descriptor)
         with suppress(FileExistsError):
             os.link(written, path)  # it appears with its text
@@ -39,7 +39,7 @@ def request_stop(folder: Path, cause: str) -> None:
 
 
 @contextmanager
-def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
+def stopping_on_request(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
     """Look for a request while the rig is driven, in a thread of its own; ``stop`` gets its cause, once.
 
     One that was left before is heeded before anything else is done.
@@ -50,7 +50,7 @@ def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
         over.set()
 
     def look() -> None:
-        while not over.wait(LOOK_S):
+        while not over.wait(POLL_S):
             if path.exists():
                 stop(_cause(path))
                 return
@@ -66,7 +66,7 @@ def heeding(folder: Path, stop: Callable[[str], None]) -> Iterator[None]:
 
 def _cause(path: Path) -> str:
     try:
-        text = path.read_bytes()[:LONGEST].decode(errors="replace")
+        text = path.read_bytes()[:LARGEST_CAUSE_BYTES].decode(errors="replace")
     except OSError:
         text = ""
     return printable(text.strip()) or "stopped by request"

@@ -81,7 +81,7 @@ class RunningLoop(Protocol):
     def release_start(self) -> None:
         """Let the start segment of a tick with ``start_judged`` end at its time. Returns at once; any thread may call it."""
 
-    def go_on_starting(self, judgements: int) -> None:
+    def continue_start(self, judgements: int) -> None:
         """Let the start segment go on after so many judgements (`Tick.start_judgements`). Returns at once, as above."""
 
     def bring_down(self) -> None:
@@ -166,7 +166,7 @@ class Loop(DrivenLoop):
         """Let the start segment end at its time."""
         self.tick.release_start()
 
-    def go_on_starting(self, judgements: int) -> None:
+    def continue_start(self, judgements: int) -> None:
         """Do nothing: this loop goes on by itself."""
 
     @property

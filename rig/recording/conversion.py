@@ -10,7 +10,7 @@ import numpy as np
 from rig.errors import RecordingError
 from rig.recording.hdf5_recording import opened_recording, read_recording, taken_over, write_recording
 from rig.recording.header import SCHEMA, Column, Header, packed
-from rig.recording.journal import JournalWriter, journal_path, set_aside
+from rig.recording.journal import JournalWriter, damaged_path, journal_path
 from rig.recording.journal_contents import JournalContents
 from rig.recording.layout import new_file, open_file
 from rig.recording.parts import Part
@@ -53,7 +53,7 @@ def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] 
             with new_file(output, kept=f"the journal {journal} is kept") as (file, fits):
                 write_recording(file, header, parts, lambda: _each((fits, check)), unverified)
         if contents.damaged:
-            return journal.rename(set_aside(journal))
+            return journal.rename(damaged_path(journal))
         journal.unlink()
         return None
 

@@ -61,7 +61,7 @@ VERIFIED = "verified"
 FIRST_WITH_DIGEST = 3
 """Schema from which on every HDF5 file has a digest."""
 
-_PATIENCE_S, _SLOWEST_BYTES_S = 60.0, 5e6
+_TIMEOUT_S, _SLOWEST_BYTES_S = 60.0, 5e6
 _SETTLED_S = 2.0
 
 _known: dict[tuple[Path, int, int, int, int, int], str] = {}
@@ -93,7 +93,7 @@ def integrity_of(path: Path) -> str:
 def _read_by_child(path: Path, size: int) -> str:
     try:
         answer = json.loads(
-            ask_child("rig.recording.whole_read", str(path), timeout_s=_PATIENCE_S + size / _SLOWEST_BYTES_S)
+            ask_child("rig.recording.whole_read", str(path), timeout_s=_TIMEOUT_S + size / _SLOWEST_BYTES_S)
         )
     except ChildFailed as error:
         raise RecordingError(f"{path}: damaged: the HDF5 library {error} over it") from error

@@ -38,7 +38,7 @@ def check_journal(path: Path) -> None:
         raise RecordingError(f"{path}: not a journal of this program; move it away, or choose another name")
 
 
-def set_aside(path: Path) -> Path:
+def damaged_path(path: Path) -> Path:
     """Return a free path beside ``path`` under which the damaged journal can be kept."""
     candidates = (path.with_name(f"{path.name}.damaged{n}") for n in ("", *(f"-{k}" for k in range(2, 1000))))
     return next(candidate for candidate in candidates if not candidate.exists())
@@ -122,7 +122,7 @@ class JournalWriter:
         self.n_rows = sum(part.n_rows for part in contents.parts)
         self.n_points = sum(len(part.points) for part in contents.parts)
         if not contents.tail.torn:
-            shutil.copyfile(self.path, set_aside(self.path))
+            shutil.copyfile(self.path, damaged_path(self.path))
         self._part_number = contents.last_part
         self._blocks.cut(contents.size, contents.n_blocks)
         self._synchronise()

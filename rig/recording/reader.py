@@ -16,7 +16,7 @@ from rig.recording.journal_blocks import EMPTY
 from rig.recording.journal_contents import JournalContents
 from rig.recording.parts import Part
 from rig.recording.stored import ChannelTable, Configuration, PlanTable, StoredPoint
-from rig.recording.told_values import check_told
+from rig.recording.stored_value_checks import check_stored_values
 from vibrolock.results import Result
 
 
@@ -48,7 +48,7 @@ class Recording(Result):
         with ExitStack() as stack:
             self._header, self.parts = self._open(stack, journal if _holds_anything(journal) else None)
             for number, part in enumerate(self.parts, 1):
-                check_told(part, f"{self.path}: part {number}")
+                check_stored_values(part, f"{self.path}: part {number}")
             self._stack = stack.pop_all()
 
     def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:

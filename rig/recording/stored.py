@@ -1,7 +1,7 @@
 """JSON objects of a recording as typed dictionaries, in journals and HDF5 files (``docs/reference/file-format.md``).
 
 Files of earlier versions lack some keys, files of later versions may have more. What is used of them is checked where a file is
-opened (`rig.recording.told_values`) and where points are read (`rig.campaigns.evaluation.stored_point`).
+opened (`rig.recording.stored_value_checks`) and where points are read (`rig.campaigns.evaluation.stored_point`).
 """
 
 from collections.abc import Mapping

@@ -186,9 +186,9 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
     notes = _Notebook()
     execution, samples = _part(plan, bench, seed, notes, None)
     for number in count(1):
-        if not execution.worth_another:
+        if not execution.to_repeat:
             break
-        before = execution.before_another(notes.points)
+        before = execution.measured_before_repeat(notes.points)
         execution, more = _part(plan, bench, seed + number * FURTHER_PART, notes, before)
         samples += more
     return _trial(bench, execution, samples, notes)

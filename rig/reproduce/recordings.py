@@ -10,7 +10,7 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.runner import resume_run, run_plan
 from rig.errors import RigError
 from rig.measurements.experiments import experiments
 from rig.recording.journal import journal_path
@@ -80,9 +80,9 @@ def _make(plan: Plan, bench: Bench, path: Path, seed: int, *, quiet: bool = Fals
     watcher: Progress = Silent() if quiet else shown
     try:
         if path.exists() or journal_path(path).exists():  # tripped levels may be tried again, as these rigs are virtual
-            recording = take_up(path, RunOptions(progress=watcher), retry_tripped=True)
+            recording = resume_run(path, RunOptions(progress=watcher), retry_tripped=True)
         else:
-            recording = carry_out(plan, bench, path, RunOptions(seed=seed, progress=watcher))
+            recording = run_plan(plan, bench, path, RunOptions(seed=seed, progress=watcher))
     finally:
         if not quiet:
             shown.close()

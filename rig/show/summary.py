@@ -9,7 +9,7 @@ from rig.campaigns.evaluation.device_faults import pages_on
 from rig.campaigns.evaluation.drift import drift_of
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
-from rig.campaigns.evaluation.skipped import what_was_measured_again, what_was_skipped
+from rig.campaigns.evaluation.skipped import repeats_summary, skipped_summary
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
@@ -97,10 +97,10 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
         "seed": recording.seed,
         "complete": recording.complete,
         "points_planned": len(plan.targets()),
-        "skipped": what_was_skipped(points, len(plan.targets())),
+        "skipped": skipped_summary(points, len(plan.targets())),
         "drive_mode_shape": _mode_shape(recording, points, plan.kind),
         "points": [_shown(point, plan.kind) for point in recording.latest.values()],
-        "measured_again": what_was_measured_again(points),
+        "measured_again": repeats_summary(points),
         "drift": drift_of(points),
         "messages": _messages(ends, points),
         "former_points": [_shown(point, plan.kind) for point in recording.former.values()],

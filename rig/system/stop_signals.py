@@ -1,8 +1,8 @@
 """Signals of the operating system while a run is under way: Ctrl-C, SIGTERM, a closed terminal (SIGHUP) and SIGQUIT.
 
-While the rig is driven, a signal makes it ramp down (`asking`). While nothing is driven and files are written, a signal ends
-the program by an exception, so that incomplete files are removed (`ended_in_order`). Where an exception could do harm, or get
-lost in a library, it is raised afterwards (`held`).
+While the rig is driven, a signal makes it ramp down (`stopping_on_signals`). While nothing is driven and files are written, a
+signal ends the program by an exception, so that incomplete files are removed (`ended_in_order`). Where an exception could do
+harm, or get lost in a library, it is raised afterwards (`deferred`).
 
 Outside the main thread, where Python delivers no signals, these functions have no effect. If the program was started to ignore
 a closed terminal (``nohup``), the signal stays ignored.
@@ -63,7 +63,7 @@ def _handling(handler: _Handler, names: tuple[str, ...]) -> Iterator[None]:
 
 
 @contextmanager
-def asking(request_stop: Callable[[str], None]) -> Iterator[None]:
+def stopping_on_signals(request_stop: Callable[[str], None]) -> Iterator[None]:
     """Let signals only request a ramp-down while the rig is driven; ``request_stop`` gets a text naming the signal."""
 
     def ask(number: int, frame: FrameType | None) -> None:
@@ -84,7 +84,7 @@ def ended_in_order() -> Iterator[None]:
         yield
 
 
-class Held:
+class DeferredSignals:
     """The last signal that arrived and may still have to be acted on."""
 
     def __init__(self) -> None:
@@ -104,18 +104,18 @@ class Held:
 
 
 @contextmanager
-def held() -> Iterator[Held]:
+def deferred() -> Iterator[DeferredSignals]:
     """Act on no signal until ``check`` is called; a signal after the last call is raised when the context ends."""
-    signals = Held()
+    signals = DeferredSignals()
     with _handling(signals.note, ("SIGINT", *_ENDING)):
         yield signals
     signals.check()
 
 
 @contextmanager
-def insisting() -> Iterator[Held]:
+def escalating() -> Iterator[DeferredSignals]:
     """Let Ctrl-C raise at once, and again at ``check`` if a library has swallowed the exception."""
-    signals = Held()
+    signals = DeferredSignals()
 
     def insist(number: int, frame: FrameType | None) -> None:
         signals.note(number, frame)

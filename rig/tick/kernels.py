@@ -18,19 +18,19 @@ from controller.period import add_sample
 from controller.primitives import TWO_PI, advance_phase, size
 from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
-from rig.tick.measure import pass_over, take_in
+from rig.tick.measure import bridge_lost_sample, read_inputs
 from rig.tick.periods import close_period
-from rig.tick.safety.following import begin_to_follow, contradicts_exciter, forget_output, permitted_level
 from rig.tick.safety.kernels import (
     NON_FINITE_OUTPUT,
     PLANT_CONTRADICTED,
     permitted_amplitude,
-    permitted_turn,
+    permitted_command_phase,
     release,
     shut_down,
     watch_frequency,
 )
 from rig.tick.safety.layout import ARMED, RAMPING
+from rig.tick.safety.response_plausibility import contradicts_exciter, permitted_level, reset_output, set_reference
 from rig.tick.sequencer.kernels import advance, is_ramp
 from rig.tick.sequencer.layout import LOOP_DRIVE, RELEASE, SILENT, TONE, WAVEFORM
 from vibrolock.compiled import Record, inner_kernel, kernel
@@ -42,13 +42,13 @@ UNREACHED = (
 
 
 @kernel
-def phase_on_output(history: np.ndarray, seen: int, lead_fraction: float, dt: float) -> float:
+def phase_on_output(history: np.ndarray, seen: int, delay_fraction: float, dt: float) -> float:
     """Return the oscillator phase at the output when this sample's inputs were measured, in [0, 2 pi).
 
     ``seen`` is the index in the ring of the last whole output sample that affects the inputs.
     """
     before = seen - 1 if seen > 0 else history.size - 1
-    theta = history[seen].theta - lead_fraction * dt * history[before].omega
+    theta = history[seen].theta - delay_fraction * dt * history[before].omega
     return float(theta + TWO_PI if theta < 0.0 else theta)
 
 
@@ -105,13 +105,13 @@ def judge_by_exciter(t: TickArrays, seen: Record) -> None:
 
     ``seen`` is the entry of the history with that output.
     """
-    loop, guard, following, vibration = t.loop[0], t.guard[0], t.following[0], t.control[0].vibration
+    loop, guard, plausibility, vibration = t.loop[0], t.guard[0], t.plausibility[0], t.control[0].vibration
     if guard.mode != ARMED or loop.drive in (WAVEFORM, SILENT):
         return
     sent = complex(seen.amplitude_v * math.cos(seen.turn), seen.amplitude_v * math.sin(seen.turn))
     gain = t.law[0].detector.gain
-    if contradicts_exciter(t.expected[0], following, sent, vibration.force, vibration.drive, gain, loop.dt_s):
-        ratio = size(following.needed) / max(size(following.late_sent), SMALLEST_V)
+    if contradicts_exciter(t.expected[0], plausibility, sent, vibration.force, vibration.drive, gain, loop.dt_s):
+        ratio = size(plausibility.needed) / max(size(plausibility.late_sent), SMALLEST_V)
         shut_down(guard, PLANT_CONTRADICTED, -1, ratio, loop.sample, False)
 
 
@@ -125,12 +125,12 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
     if segment.drive == TONE and loop.drive == LOOP_DRIVE:
         progress.omega = control.frequency.omega  # from where the tone's ramp goes to its own frequency
     if loop.drive == SILENT and segment.drive != SILENT:
-        forget_output(t.following[0])
+        reset_output(t.plausibility[0])
     loop.drive = segment.drive
     if t.law[0].harmonics.highest > 0:
         want_harmonics(control.harmonics, segment.harmonics)
     if segment.amplitude_law != amplitude.law:
-        begin_to_follow(t.expected[0], t.following[0], amplitude.output.amplitude_v, 0.0, 0.0)
+        set_reference(t.expected[0], t.plausibility[0], amplitude.output.amplitude_v, 0.0, 0.0)
         measure_rms(t, segment.amplitude_law)
         progress.level = take_over(t.law[0].amplitude, amplitude, control.vibration, segment.amplitude_law)
         progress.kept_level = 0.0
@@ -183,7 +183,7 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
     before, turn = guard.amplitude_v, amplitude.output.turn
     permitted = permitted_amplitude(guard, limits, allowed, t.loop[0].sample)
     if running:
-        turn = permitted_turn(limits, turn, amplitude.demanded_turn, before, permitted)
+        turn = permitted_command_phase(limits, turn, amplitude.demanded_turn, before, permitted)
     see_output(amplitude, demanded, permitted, turn)
     return permitted
 
@@ -243,9 +243,9 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
     law, control, loop, guard, progress = t.law[0], t.control[0], t.loop[0], t.guard[0], t.progress[0]
     vibration, frequency, amplitude = control.vibration, control.frequency, control.amplitude
     slot = loop.sample % t.history.size
-    shown = slot - loop.lead_whole if slot >= loop.lead_whole else slot - loop.lead_whole + t.history.size
+    shown = slot - loop.delay_whole if slot >= loop.delay_whole else slot - loop.delay_whole + t.history.size
     seen = t.history[shown]
-    theta_in = phase_on_output(t.history, shown, loop.lead_fraction, loop.dt_s)
+    theta_in = phase_on_output(t.history, shown, loop.delay_fraction, loop.dt_s)
     row.theta_rad = theta_in
     row.frequency_hz = seen.omega / TWO_PI
     row.output_v = seen.output_v
@@ -257,10 +257,10 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
 
     cos_theta, sin_theta = math.cos(theta_in), math.sin(theta_in)
     if lost:
-        flags = pass_over(t, readings, cos_theta, sin_theta)
+        flags = bridge_lost_sample(t, readings, cos_theta, sin_theta)
     else:
         loop.lost = max(loop.lost - 1, 0)  # losses with single good samples in between are a gap as well
-        flags = take_in(t, volts, readings)
+        flags = read_inputs(t, volts, readings)
     if not lost or law.detector.kind != ADAPTIVE:
         phasor = complex(cos_theta, sin_theta)
         detect(law.detector, control.detector, vibration, loop.force, loop.drive_motion, phasor, frequency.omega)
@@ -285,7 +285,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         choose_frequency(t)
         by_loop = loop.drive == LOOP_DRIVE
         demanded = demand(law.amplitude, amplitude, vibration, progress.level, progress.lag, frequency.omega, by_loop)
-        allowed = demanded if amplitude.law == VOLTAGE else permitted_level(t.following[0], demanded)
+        allowed = demanded if amplitude.law == VOLTAGE else permitted_level(t.plausibility[0], demanded)
     permitted = permit_output(t, demanded, allowed, running)
     follow_harmonics(t, permitted, running)
     output = oscillate(t, permitted, amplitude.output.turn)

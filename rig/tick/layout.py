@@ -12,8 +12,8 @@ from rig.daq import LOST
 LOOP = np.dtype(
     [
         ("sample", "i8"),
-        ("lead_whole", "i8"),
-        ("lead_fraction", "f8"),
+        ("delay_whole", "i8"),
+        ("delay_fraction", "f8"),
         ("queue_whole", "i8"),
         ("dt_s", "f8"),
         ("force_channel", "i8"),
@@ -115,7 +115,7 @@ class TickArrays(NamedTuple):
     control: np.ndarray
     guard: np.ndarray
     watches: np.ndarray
-    following: np.ndarray
+    plausibility: np.ndarray
     settling: np.ndarray
     progress: np.ndarray
     outcomes: np.ndarray

@@ -6,7 +6,7 @@ import numpy as np
 
 from controller.primitives import track
 from rig.tick.layout import SENSOR_AT_RANGE, TickArrays
-from rig.tick.safety.kernels import SENSOR_OVERLOAD, carry_motion, watch_gap, watch_input, watch_motion
+from rig.tick.safety.kernels import SENSOR_OVERLOAD, check_gap, extrapolate_motion, watch_input, watch_motion
 from rig.tick.safety.layout import ARMED
 from rig.tick.sequencer.layout import WAVEFORM
 from vibrolock.compiled import kernel
@@ -31,7 +31,7 @@ def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tupl
 
 
 @kernel
-def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
+def read_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
     """Check and convert every input channel; return the telemetry flags of the inputs."""
     loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]
     armed = guard.mode == ARMED
@@ -71,7 +71,7 @@ def take_in(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
 
 
 @kernel
-def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
+def bridge_lost_sample(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: float) -> int:
     """Bridge a lost sample: read nothing, extrapolate the motion, and trip if the gap is long.
 
     The known fundamentals replace force and drive. Thereby the detector's ripple continues; if it were frozen at an arbitrary
@@ -87,10 +87,10 @@ def pass_over(t: TickArrays, readings: np.ndarray, cos_theta: float, sin_theta: 
         if t.inputs[index].watch_displacement == 1:
             watch = t.watches[index]
             # The mean oscillates a little with the vibration; a frozen mean would be integrated to displacement for seconds.
-            watch.mean += mean_gain * carry_motion(limits, watch, cos_step, sin_step, omega)
+            watch.mean += mean_gain * extrapolate_motion(limits, watch, cos_step, sin_step, omega)
     force, drive = vibration.force, vibration.drive
     loop.force = force.real * cos_theta - force.imag * sin_theta
     t.watches[loop.force_channel].mean += mean_gain * loop.force
     loop.drive_motion = drive.real * cos_theta - drive.imag * sin_theta
-    watch_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
+    check_gap(t.guard[0], limits, loop.lost, loop.sample, dt)
     return 0

@@ -8,33 +8,33 @@ from controller.lock import LOCKED, next_lock_state
 from controller.period import end_period
 from controller.primitives import size
 from rig.tick.layout import TickArrays
-from rig.tick.safety.following import follow_level, see_frequency, silent_side
 from rig.tick.safety.keeping import begin_level, foretold_level, gain_has_changed, is_far_above
 from rig.tick.safety.kernels import GAIN_CHANGED, LEVEL_NOT_FOLLOWED, OVER_LEVEL, SENSOR_STUCK, shut_down
 from rig.tick.safety.layout import ARMED
+from rig.tick.safety.response_plausibility import check_held_level, see_frequency, silent_side
 from rig.tick.sequencer.judgement import judge_period
 from rig.tick.sequencer.layout import LOOP_DRIVE, RECORD, SILENT, TONE, WAVEFORM
 from vibrolock.compiled import kernel
 
 
 @kernel
-def judge_following(t: TickArrays) -> None:
+def judge_response(t: TickArrays) -> None:
     """Trip if a law raises the output and the held quantity does not follow, or if force or motion shows no signal."""
-    loop, control, guard, following = t.loop[0], t.control[0], t.guard[0], t.following[0]
+    loop, control, guard, plausibility = t.loop[0], t.control[0], t.guard[0], t.plausibility[0]
     law, lock = control.amplitude.law, control.lock
     force, response = control.period.force_n, control.period.drive_m_s2
-    see_frequency(t.expected[0], following, control.frequency.omega)
+    see_frequency(t.expected[0], plausibility, control.frequency.omega)
     if guard.mode != ARMED:
         return
     if loop.drive == LOOP_DRIVE and t.progress[0].unlocked == 1:
-        side = silent_side(t.expected[0], following, force, response)
+        side = silent_side(t.expected[0], plausibility, force, response)
         if side > 0:
             channel = loop.force_channel if side == 1 else loop.drive_channel
             shut_down(guard, SENSOR_STUCK, channel, force if side == 1 else response, loop.sample, False)
     if law == VOLTAGE:
         return
     slipping, tone = lock.state == LOCKED and lock.far_periods > 0, loop.drive == TONE
-    if follow_level(t.expected[0], following, control.period, t.progress[0].level, law, slipping, tone):
+    if check_held_level(t.expected[0], plausibility, control.period, t.progress[0].level, law, slipping, tone):
         channel = loop.drive_channel if law == RESPONSE else loop.force_channel
         value = response if law == RESPONSE else control.period.held
         shut_down(guard, LEVEL_NOT_FOLLOWED, channel, value, loop.sample, False)
@@ -43,10 +43,10 @@ def judge_following(t: TickArrays) -> None:
 @kernel
 def judge_keeping(t: TickArrays) -> None:
     """Trip if a level is far exceeded under a phase lock, or if it takes another output than before."""
-    loop, control, guard, following = t.loop[0], t.control[0], t.guard[0], t.following[0]
+    loop, control, guard, plausibility = t.loop[0], t.control[0], t.guard[0], t.plausibility[0]
     if guard.mode != ARMED or loop.drive != LOOP_DRIVE:
         return
-    kept, period, law, lag = following.kept, control.period, control.amplitude.law, t.progress[0].lag
+    kept, period, law, lag = plausibility.kept, control.period, control.amplitude.law, t.progress[0].lag
     locked, volts = control.lock.state == LOCKED, law == VOLTAGE
     level = period.output_v if volts else t.progress[0].level
     channel = loop.drive_channel if volts or law == RESPONSE else loop.force_channel
@@ -57,7 +57,7 @@ def judge_keeping(t: TickArrays) -> None:
         shut_down(guard, OVER_LEVEL, channel, value, loop.sample, False)
     if volts:
         return
-    needed_v = size(following.needed) if following.told == 1 else 0.0
+    needed_v = size(plausibility.needed) if plausibility.told == 1 else 0.0
     if gain_has_changed(kept, period.held, period.output_v, needed_v, locked, loop.held == 1):
         shut_down(guard, GAIN_CHANGED, channel, kept.factor, loop.sample, False)
 
@@ -101,5 +101,5 @@ def close_period(t: TickArrays) -> None:
     wanted = t.progress[0].level if amplitude.law != VOLTAGE else 0.0
     distortion = end_harmonics(t)
     judge_period(t.settling[0], t.rule[0], period, wanted, locked, open_loop or amplitude.law == RESPONSE, distortion)
-    judge_following(t)
+    judge_response(t)
     judge_keeping(t)

@@ -12,9 +12,9 @@ from rig.bench import Bench
 from rig.errors import ConfigurationError
 from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
 from rig.tick.safety.expected import expected_record
-from rig.tick.safety.following import FOLLOWING, see_frequency
 from rig.tick.safety.kernels import is_over
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
+from rig.tick.safety.response_plausibility import PLAUSIBILITY, see_frequency
 from rig.tick.sequencer.judgement import SETTLING
 from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
@@ -27,8 +27,8 @@ SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bit
 class Tick:
     """The control state of a run.
 
-    ``lead_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the device's
-    latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
+    ``loop_delay_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the
+    device's latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is known,
     the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. ``per_volt``:
     force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts. A record that is
     refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the output at 0 V. With
@@ -44,7 +44,7 @@ class Tick:
         amplitude_law: AmplitudeLaw,
         settle: SettleRule,
         segments: Sequence[Segment],
-        lead_samples: float,
+        loop_delay_samples: float,
         *,
         waveforms: np.ndarray | None = None,
         exciter: PlantModel | None = None,
@@ -55,13 +55,13 @@ class Tick:
     ) -> None:
         shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
         try:
-            _check_harmonics(law, bench, segments, lead_samples)
+            _check_harmonics(law, bench, segments, loop_delay_samples)
             law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, shape)
         except ValueError as error:
             raise ConfigurationError(f"controller.{error}") from None
-        if lead_samples < 1.0:
+        if loop_delay_samples < 1.0:
             raise ConfigurationError(
-                f"lead_samples = {lead_samples:g}: an output shows at the next sample at the earliest"
+                f"loop_delay_samples = {loop_delay_samples:g}: an output shows at the next sample at the earliest"
             )
         lag_rad = float(law_record["frequency"]["target_lag_rad"][0])
         table, outcomes = segment_table(
@@ -79,9 +79,9 @@ class Tick:
             law_record["harmonics"]["high_pass_rad_s"] = 2.0 * math.pi * controlled.high_pass_hz
             law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"] / law.harmonics.highest
         loop = np.zeros(1, LOOP)
-        loop["lead_whole"] = math.floor(lead_samples)
-        loop["lead_fraction"] = lead_samples - math.floor(lead_samples)
-        loop["queue_whole"] = math.floor(lead_samples)
+        loop["delay_whole"] = math.floor(loop_delay_samples)
+        loop["delay_fraction"] = loop_delay_samples - math.floor(loop_delay_samples)
+        loop["queue_whole"] = math.floor(loop_delay_samples)
         loop["dt_s"] = 1.0 / bench.sample_rate_hz
         loop["force_channel"], loop["drive_channel"] = force, drive
         loop["skew_samples"] = bench.channels[force].skew_samples - bench.channels[drive].skew_samples
@@ -99,9 +99,9 @@ class Tick:
         progress["retries"], progress["point"] = retries, -1
         progress["held_back"] = int(start_judged and any(one.kind is SegmentKind.START for one in segments))
         expected = expected_record(bench, smallest[force], smallest[drive], exciter, per_volt)
-        following = np.zeros(1, FOLLOWING)
-        following["reference_v"] = expected["floor_v"]
-        see_frequency(expected[0], following[0], omega)
+        plausibility = np.zeros(1, PLAUSIBILITY)
+        plausibility["reference_v"] = expected["floor_v"]
+        see_frequency(expected[0], plausibility[0], omega)
         self.bench = bench
         self.arrays = TickArrays(
             law=law_record,
@@ -115,11 +115,11 @@ class Tick:
             control=control,
             guard=guard_record(armed),
             watches=watch_records(len(bench.channels)),
-            following=following,
+            plausibility=plausibility,
             settling=np.zeros(1, SETTLING),
             progress=progress,
             outcomes=outcomes,
-            history=_history(int(loop["lead_whole"][0]) + 2, omega, 1.0 / bench.sample_rate_hz),
+            history=_history(int(loop["delay_whole"][0]) + 2, omega, 1.0 / bench.sample_rate_hz),
         )
 
     @property
@@ -150,7 +150,7 @@ class Tick:
     @property
     def over(self) -> bool:
         """Whether the output is off for good and the device's queue holds no more output of the run."""
-        return is_over(self.arrays.guard[0], int(self.arrays.loop["lead_whole"][0]))
+        return is_over(self.arrays.guard[0], int(self.arrays.loop["delay_whole"][0]))
 
     def request_stop(self) -> None:
         """Request a ramp to 0 V at frozen frequency, which ends the plan."""
@@ -246,8 +246,8 @@ def _history(size: int, omega: float, dt: float) -> np.ndarray:
     return out
 
 
-def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment], lead_samples: float) -> None:
+def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment], loop_delay_samples: float) -> None:
     """Raise ValueError if the harmonics loop cannot follow the highest frequency of the run."""
     if law.harmonics is None:
         return
-    law.harmonics.check_frequency(bench.sample_rate_hz, highest_frequency_hz(law, segments), lead_samples)
+    law.harmonics.check_frequency(bench.sample_rate_hz, highest_frequency_hz(law, segments), loop_delay_samples)

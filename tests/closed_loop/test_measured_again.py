@@ -14,7 +14,7 @@ from rig.arming.run_options import RunOptions, Silent
 from rig.campaigns.evaluation.point import Quality
 from rig.campaigns.evaluation.recorded import point_rows, points_of
 from rig.campaigns.plans import load_plan
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.runner import resume_run, run_plan
 from rig.emulator.emulated import emulated
 from rig.loop.loop import Loop
 from rig.loop.session import open_session
@@ -191,8 +191,8 @@ def test_a_stopped_run_with_repeated_points_is_resumed_to_all_of_them(tmp_path):
 
     plan, output = backbone_with(levels_v=(0.3, 0.5, 0.8, 1.0)), tmp_path / "stopped.h5"
     with pytest.raises(KeyboardInterrupt):
-        carry_out(plan, late_bench(LATE), output, RunOptions(progress=StopAfter(2)))
-    with take_up(output) as recording:
+        run_plan(plan, late_bench(LATE), output, RunOptions(progress=StopAfter(2)))
+    with resume_run(output) as recording:
         assert recording.complete
         points = points_of(recording)
         assert len(recording.parts) >= 2
@@ -279,7 +279,7 @@ def test_a_knock_that_only_the_evaluation_sees_is_measured_again_after_the_last_
     knock(monkeypatch, 2, 2.0, 0.01)
     plan = plan_of("friction-beam", levels_m=(5e-5, 6e-5), start_v=0.05, record_periods=200)
     bench = bench_with({"block": 5}, "friction-beam")
-    with carry_out(plan, bench, tmp_path / "knocked.h5", RunOptions(progress=UntilAgain())) as recording:
+    with run_plan(plan, bench, tmp_path / "knocked.h5", RunOptions(progress=UntilAgain())) as recording:
         first, second = points_of(recording)
         assert recording.complete
         assert len(recording.parts) == 2
@@ -327,13 +327,13 @@ def test_a_device_that_has_latched_meanwhile_is_left_alone(monkeypatch, tmp_path
     monkeypatch.setattr("rig.campaigns.running.runner.open_session", open_latched)
     plan = load_plan("magnet-beam/backbone-short")
     options = RunOptions(progress=Heard())
-    with carry_out(plan, late_bench(LATE), tmp_path / "latched.h5", options) as recording:
+    with run_plan(plan, late_bench(LATE), tmp_path / "latched.h5", options) as recording:
         assert len(recording.parts) == 1
         assert not recording.complete
     assert len(sessions) == 2
     assert any("nothing is measured again: the emergency stop has latched" in text for text in remarks)
     monkeypatch.undo()
-    with take_up(tmp_path / "latched.h5") as recording:
+    with resume_run(tmp_path / "latched.h5") as recording:
         assert recording.complete
 
 

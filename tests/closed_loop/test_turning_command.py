@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 from controller import AmplitudeLaw
 from rig.drivers import make_daq
 from rig.loop.loop import Loop
-from rig.tick.safety.kernels import permitted_amplitude, permitted_turn
+from rig.tick.safety.kernels import permitted_amplitude, permitted_command_phase
 from rig.tick.safety.limits import guard_record, limits_record
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
@@ -33,7 +33,7 @@ def test_a_demand_is_followed_no_faster_than_the_limit_and_reached(start_v, end_
         before = guard["amplitude_v"] * np.exp(1j * turn)
         last_v = float(guard["amplitude_v"])
         amplitude = permitted_amplitude(guard, limits, end_v, sample)
-        turned = permitted_turn(limits, turn, demanded, last_v, amplitude)
+        turned = permitted_command_phase(limits, turn, demanded, last_v, amplitude)
         assert abs(amplitude * np.exp(1j * turned) - before) <= allowed * (1 + 1e-9) + 1e-13
         if abs(way) < 3.1 and last_v * amplitude > 0.0 and turned != demanded:
             assert (turned - turn) * way >= 0.0  # the shorter way round

@@ -15,9 +15,9 @@ from controller import AmplitudeLaw
 from rig.campaigns.plans import bench_of, load_plan, shipped_plans
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
-from rig.tick.safety.following import ASTRAY_PERIODS
 from rig.tick.safety.keeping import CHANGED_PERIODS, FAR
 from rig.tick.safety.layout import EndReason
+from rig.tick.safety.response_plausibility import OUT_OF_BAND_PERIODS
 from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with
 
@@ -31,7 +31,7 @@ class SoundRun(NamedTuple):
     held: bool
     noise: float
     reason: EndReason
-    astray_periods: int
+    out_of_band_periods: int
     unlike_periods: float
     highest: float = 0.0
     """Largest ratio of what is held to its level, under a lock."""
@@ -63,7 +63,7 @@ def sound_run(name: str, seed: int, noise: float) -> SoundRun:
         loop = Loop(daq, settings.build(daq.latency_samples))
         for _ in loop.run():
             pass
-    seen = loop.tick.arrays.following[0]
+    seen = loop.tick.arrays.plausibility[0]
     return SoundRun(
         name,
         plan.amplitude_law is not AmplitudeLaw.VOLTAGE,
@@ -81,7 +81,7 @@ def table_of(runs: Iterable[SoundRun]) -> list[str]:
     runs = list(runs)
     out = [
         "| plans | noise | runs | tripped or ended early | most periods astray, of "
-        f"{ASTRAY_PERIODS} | most periods against the known plant, of 1 | largest ratio to the level, of {FAR:g} | "
+        f"{OUT_OF_BAND_PERIODS} | most periods against the known plant, of 1 | largest ratio to the level, of {FAR:g} | "
         f"most periods with a changed gain, of {CHANGED_PERIODS} |",
         "|---|---|---|---|---|---|---|---|",
     ]
@@ -90,7 +90,7 @@ def table_of(runs: Iterable[SoundRun]) -> list[str]:
         ended = sum(run.reason is not EndReason.COMPLETED for run in some)
         out.append(
             f"| {'a level is held' if held else 'all others'} | {noise:g} × | {len(some)} | {ended} | "
-            f"{max(run.astray_periods for run in some)} | {max(run.unlike_periods for run in some):.2f} | "
+            f"{max(run.out_of_band_periods for run in some)} | {max(run.unlike_periods for run in some):.2f} | "
             f"{max(run.highest for run in some):.2f} | {max(run.changed_periods for run in some)} |"
         )
     return out

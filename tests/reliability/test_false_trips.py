@@ -2,9 +2,9 @@
 
 import pytest
 
-from rig.tick.safety.following import ASTRAY_PERIODS
 from rig.tick.safety.keeping import CHANGED_PERIODS, FAR
 from rig.tick.safety.layout import EndReason
+from rig.tick.safety.response_plausibility import OUT_OF_BAND_PERIODS
 from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run, table_of
 
 
@@ -12,7 +12,7 @@ from tests.reliability.false_trips import SoundRun, held_level_plans, sound_run,
 def test_a_sound_rig_with_ten_times_the_noise_never_comes_near_a_trip(plan):
     run = sound_run(plan, 7, 10.0)
     assert run.reason is EndReason.COMPLETED
-    assert run.astray_periods <= ASTRAY_PERIODS // 2
+    assert run.out_of_band_periods <= OUT_OF_BAND_PERIODS // 2
     assert run.unlike_periods < 0.5
     assert run.highest < FAR  # the paper's gains hunt on the friction beam with such noise
     assert run.changed_periods <= CHANGED_PERIODS // 2
@@ -20,5 +20,5 @@ def test_a_sound_rig_with_ten_times_the_noise_never_comes_near_a_trip(plan):
 
 def test_a_run_that_ended_early_is_counted():
     sound = SoundRun("a/b", True, 1.0, EndReason.COMPLETED, 2, 0.0)
-    tripped = sound._replace(reason=EndReason.LEVEL_NOT_FOLLOWED, astray_periods=10)
+    tripped = sound._replace(reason=EndReason.LEVEL_NOT_FOLLOWED, out_of_band_periods=10)
     assert table_of([sound, tripped])[-1] == "| a level is held | 1 × | 2 | 1 | 10 | 0.00 | 0.00 | 0 |"

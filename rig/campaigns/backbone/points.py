@@ -26,7 +26,7 @@ from rig.campaigns.evaluation.acceptance import (
     std_objection,
     with_settling,
 )
-from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.lost_samples import lost_objection, lost_rows
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
@@ -167,7 +167,7 @@ def backbone_of(
     phase_lag_target_deg: float,
 ) -> Backbone:
     """Return the accepted points of a recording as a backbone; raise `IdentificationError` if no point was accepted."""
-    accepted = [point for point in of_the_result(points) if point.accepted]
+    accepted = [point for point in without_repetition(points) if point.accepted]
     if not accepted:
         raise IdentificationError("points: none of the recording was accepted")
     kinds = channels_from(channels)

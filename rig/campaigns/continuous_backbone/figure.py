@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, OneWay
-from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_none
+from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_nothing_is_drawn
 from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.drawing.axes import log_axis, widen
@@ -170,7 +170,7 @@ def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[t
     """Yield for each repeat: measured points by rising amplitude, the amplitude scale, and whether it is the first repeat."""
     measured = [point for point in points if point.vibration is not None]
     if not measured:
-        say_why_empty(axis, why_none(points))
+        say_why_empty(axis, why_nothing_is_drawn(points))
         return
     unit = engineering(np.array([vibration_of(point).amplitude_m for point in measured]))[1]
     axis.set(xlabel=f"displacement amplitude, {unit}", ylabel=label)

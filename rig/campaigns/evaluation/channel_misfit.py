@@ -13,7 +13,7 @@ ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channe
 ALIKE_DEG = 15.0  # the same for turns: within this of their mean
 
 
-class Seen(Enum):
+class Reference(Enum):
     """Source of an expectation."""
 
     SHAPES = "by the mode shapes"
@@ -33,7 +33,7 @@ class Misfit(NamedTuple):
     """Expected ratio, above 0."""
     factor: float
     """Factor between the seen and the expected ratio beyond the allowance, 1 or more."""
-    by: Seen
+    by: Reference
     """Source of the expected ratio."""
     at: str = ""
     """Level of the single point used for the comparison; empty if several points were used."""
@@ -45,7 +45,7 @@ class Misfit(NamedTuple):
     @property
     def trusted(self) -> float:
         """Factor from which the point is warned of."""
-        return WARNED if self.by is Seen.SHAPES or self.turn_deg is not None else CHANGED
+        return WARNED if self.by is Reference.SHAPES or self.turn_deg is not None else CHANGED
 
     @property
     def warned(self) -> bool:
@@ -112,7 +112,7 @@ def _turn(turn_deg: float) -> str:
 def _what_was_seen(misfit: Misfit) -> str:
     if misfit.turn_deg is not None:
         return f"channel {misfit.channel} stands {_turn(misfit.turn_deg)} the drive channel, expected 0"
-    if misfit.by is Seen.NOT_TRUSTED:
+    if misfit.by is Reference.NOT_TRUSTED:
         return f"channel {misfit.channel}: force over velocity at the drive point is like that at {misfit.at},"
     if misfit.at:
         return (

@@ -27,7 +27,7 @@ def rms_ratios_of(channel_rms: Sequence[float], drive: int) -> np.ndarray:
         return np.asarray(sizes / sizes[drive])
 
 
-def spread_of(bench: Bench, point: Point[object], drive: int) -> np.ndarray | None:
+def ratio_std(bench: Bench, point: Point[object], drive: int) -> np.ndarray | None:
     """Standard errors of the ratios due to noise and the converter's quantisation; None if the drive amplitude is 0."""
     size = np.abs(spectrum_of(point).harmonics[:, 1])
     known = spectrum_of(point).harmonics_std
@@ -61,7 +61,7 @@ def motions_of(bench: Bench) -> list[int]:
     return [index for index, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
 
 
-def softened(bench: Bench, point: Point[object], drive: int) -> float:
+def allowance_growth(bench: Bench, point: Point[object], drive: int) -> float:
     """Factor by which the allowance grows away from resonance, 1 or more."""
     fundamentals = spectrum_of(point).harmonics[:, 1]
     force, velocity = fundamentals[bench.index_of("force")], -1j * fundamentals[drive]

@@ -8,7 +8,7 @@ from rig.campaigns.evaluation.point import Point
 Result = TypeVar("Result")
 
 
-def of_the_result(points: Iterable[Point[Result]]) -> list[Point[Result]]:
+def without_repetition(points: Iterable[Point[Result]]) -> list[Point[Result]]:
     """Return the points without the repetition of the first point."""
     return [point for point in points if not point.repeats_first]
 
@@ -22,7 +22,7 @@ def drift_of(points: Iterable[Point[object]]) -> dict[str, Any] | None:
     """
     known = list(points)
     again = next((point for point in known if point.repeats_first), None)
-    first = None if again is None else next((p for p in of_the_result(known) if _same(p, again)), None)
+    first = None if again is None else next((p for p in without_repetition(known) if _same(p, again)), None)
     if first is None or again is None or not (first.accepted and again.accepted):
         return None
     before, now = _quantities(first), _quantities(again)

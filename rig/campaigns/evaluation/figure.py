@@ -41,7 +41,7 @@ def refused(points: Sequence[Point[object]]) -> str:
     return f"{left_out.total()} not accepted ({', '.join(f'{count} {name}' for name, count in left_out.items())})"
 
 
-def why_none(points: Sequence[Point[object]]) -> str:
+def why_nothing_is_drawn(points: Sequence[Point[object]]) -> str:
     """Return why no point can be drawn: the reason of the first one that was not accepted."""
     if not points:
         return "no point was measured"
@@ -63,7 +63,7 @@ def draw_failure(page: "Figure", recording: Recording) -> None:
     axes = grid(page, 1, 2 if phase else 1)[0]
     draw_history(axes[0], axes[1] if phase else None, recording)
     heading(page, recording)
-    why = f"Nothing else to draw: {why_none(points_of(recording))}"
+    why = f"Nothing else to draw: {why_nothing_is_drawn(points_of(recording))}"
     last = recording.parts[-1] if recording.parts else None
     if last is not None and last.end is not None and last.end.get("text") and last.end.get("reason") != "completed":
         why += f"; the run ended: {last.end['text']}"

@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import FrequencyResponse, IdentificationError
 from identification.frequency_responses import Controlled
-from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
@@ -60,7 +60,7 @@ def passes_of(points: Iterable[Point[object]]) -> list[tuple[str, list[Point[obj
     Raises `IdentificationError` if no point was accepted.
     """
     passes: dict[tuple[float, str, int, str], list[Point[object]]] = {}
-    for point in of_the_result(points):
+    for point in without_repetition(points):
         if point.accepted:
             passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)
     if not passes:

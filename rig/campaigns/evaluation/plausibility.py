@@ -31,17 +31,17 @@ from rig.campaigns.evaluation.channel_misfit import (
     WARNED,
     WARNED_DEG,
     Misfit,
-    Seen,
+    Reference,
     misfit_sentence,
 )
 from rig.campaigns.evaluation.channel_ratios import (
+    allowance_growth,
     motions_of,
+    ratio_std,
     ratios_of,
     resistance_of,
     rms_ratios_of,
     shapes_of,
-    softened,
-    spread_of,
 )
 from rig.campaigns.evaluation.lost_samples import rms_of
 from rig.campaigns.evaluation.point import Point, Quality, vibration_of
@@ -77,7 +77,7 @@ def with_plausible_ways(bench: Bench, point: Point[object], pieces: Sequence[np.
     responses = [index for index, channel in enumerate(bench.channels) if channel.role == "response"]
     allowed = ALLOWANCE * float(np.max(up[motions_of(bench)]))
     misfits = [
-        _misfit(bench.channels[index].name, complex(down[index]), complex(up[index]), allowed, Seen.OTHER_WAY)
+        _misfit(bench.channels[index].name, complex(down[index]), complex(up[index]), allowed, Reference.OTHER_WAY)
         for index in responses
     ]
     return _judged(bench, point, misfits)
@@ -124,8 +124,8 @@ def misfits_of(bench: Bench, plan: Plan, point: Point[object], before: Sequence[
 def _of_a_tone(bench: Bench, plan: Plan, point: Point[object], before: Sequence[Point[object]]) -> list[Misfit]:
     """Compare the fundamentals of the responses, relative to the drive, with the mode shapes and with earlier points."""
     drive, locked = bench.index_of("drive"), isinstance(plan, LockedPlan)
-    ratios, spread = ratios_of(point, drive), spread_of(bench, point, drive)
-    times = 1.0 if spread is None else softened(bench, point, drive)
+    ratios, spread = ratios_of(point, drive), ratio_std(bench, point, drive)
+    times = 1.0 if spread is None else allowance_growth(bench, point, drive)
     if not locked:
         frequency_hz = vibration_of(point).frequency_hz
         off = [abs(math.log(vibration_of(one).frequency_hz / frequency_hz)) for one in before]
@@ -136,7 +136,7 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[object], before: Sequence[
     for index, channel in enumerate(bench.channels):
         if channel.role != "response" or spread is None:
             continue
-        for expected, by in ((shapes, Seen.SHAPES), (usual, Seen.BEFORE)):
+        for expected, by in ((shapes, Reference.SHAPES), (usual, Reference.BEFORE)):
             if expected is not None and np.isfinite(expected[index]):
                 largest = float(np.nanmax(np.abs([expected[i] for i in motions_of(bench)])))
                 allowed = ALLOWANCE * times * largest + SURE * spread[index]
@@ -166,12 +166,12 @@ def _of_the_force(
     if nearest is None:
         return []
     times, factor = _against(bench, point, nearest)
-    found = Misfit(force, times, 1.0, factor, Seen.BEFORE, _level_of(nearest))
+    found = Misfit(force, times, 1.0, factor, Reference.BEFORE, _level_of(nearest))
     if misfitting is not None and _apart(point, misfitting) < _apart(point, nearest):
         times, factor = _against(bench, point, misfitting)
         theirs = _misfit_of(misfitting)
         if factor < CHANGED <= theirs and found.factor < theirs:
-            return [Misfit(force, times, 1.0, theirs, Seen.NOT_TRUSTED, _level_of(misfitting))]
+            return [Misfit(force, times, 1.0, theirs, Reference.NOT_TRUSTED, _level_of(misfitting))]
     return [found]
 
 
@@ -197,13 +197,13 @@ def _of_a_band(bench: Bench, point: Point[object], before: Sequence[Point[object
     here = rms_ratios_of(point.channel_rms, drive)
     usual = np.median([rms_ratios_of(sizes, drive) for sizes in alike], axis=0)
     return [
-        _misfit(channel.name, complex(here[index]), complex(usual[index]), 1e-12, Seen.BEFORE)
+        _misfit(channel.name, complex(here[index]), complex(usual[index]), 1e-12, Reference.BEFORE)
         for index, channel in enumerate(bench.channels)
         if channel.role in ("force", "response") and usual[index] > 0.0
     ]
 
 
-def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: Seen) -> Misfit:
+def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: Reference) -> Misfit:
     """Return the misfit between a ratio and its expectation. If both are significant, opposite signs are always refused."""
     size, wanted = abs(seen), abs(expected)
     factor = (max(size, wanted) + allowed) / (min(size, wanted) + allowed)
@@ -214,7 +214,7 @@ def _misfit(name: str, seen: complex, expected: complex, allowed: float, by: See
 
 
 def _turned(
-    name: str, seen: complex, wanted: complex, allowed: float, by: Seen, spread: float, times: float
+    name: str, seen: complex, wanted: complex, allowed: float, by: Reference, spread: float, times: float
 ) -> list[Misfit]:
     """Return the misfit in phase between a ratio and its expectation; an empty list if either of them is too small to tell.
 
@@ -252,7 +252,7 @@ def _swapped(bench: Bench, sizes: np.ndarray, shapes: np.ndarray) -> list[Misfit
     if one == other or as_it_is < SWAPPED or pairs[one, other] > SWAPPED_FITS * as_it_is:
         return []
     names = [bench.channels[index].name for index in (one, other)]
-    return [Misfit(names[0], float(sizes[one]), float(shapes[one]), WARNED, Seen.SHAPES, swapped_with=names[1])]
+    return [Misfit(names[0], float(sizes[one]), float(shapes[one]), WARNED, Reference.SHAPES, swapped_with=names[1])]
 
 
 def _near_the_mode(bench: Bench, point: Point[object]) -> bool:

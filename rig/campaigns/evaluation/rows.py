@@ -81,7 +81,7 @@ class LongRows:
             return self._spool.column(key, self._first, self._first + self.size)
         start, stop, step = key.indices(self.size)
         if step != 1:
-            raise IndexError(f"rows: every {step}th is not to be had")
+            raise IndexError(f"rows: step = {step}: must be 1")
         return LongRows(self._spool, self._first + start, self._first + max(start, stop))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:

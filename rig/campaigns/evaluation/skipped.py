@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from rig.campaigns.evaluation.point import Point
 
 
-def what_was_skipped(points: Iterable[Point[object]], planned: int) -> str:
+def skipped_summary(points: Iterable[Point[object]], planned: int) -> str:
     """Return the missing points by quality: ``3 of 13 points skipped: not-settled (0.1 N), unreachable (2 N)``.
 
     The text is empty if every point was accepted. ``points`` holds the last result of each number; ``planned`` is the number of
@@ -24,7 +24,7 @@ def what_was_skipped(points: Iterable[Point[object]], planned: int) -> str:
     return f"{skipped} of {planned} points skipped: {'; '.join(causes)}" if skipped else ""
 
 
-def what_was_measured_again(points: Iterable[Point[object]]) -> str:
+def repeats_summary(points: Iterable[Point[object]]) -> str:
     """Return which points were measured again: ``measured again: points 3, 7; 3 attempts refused``; empty if none was."""
     again = [point for point in points if point.refused_before]
     refused = sum(len(point.refused_before) for point in again)

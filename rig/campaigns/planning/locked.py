@@ -56,10 +56,10 @@ class LockedPlan(KnownPlant, Plan):
             return self.longest_delay_on_plant_s(bench, self.controller, self.asked_lags_deg, longest_s)
         return min(longest_s, self.controller.longest_delay_s(self.amplitude_law))
 
-    def check_delay(self, bench: Bench, lead_samples: float) -> None:
+    def check_delay(self, bench: Bench, loop_delay_samples: float) -> None:
         """Refuse gains that do not bear the delay."""
-        super().check_delay(bench, lead_samples)
-        delay_s = lead_samples / bench.sample_rate_hz
+        super().check_delay(bench, loop_delay_samples)
+        delay_s = loop_delay_samples / bench.sample_rate_hz
         if self.plant is not None:
             self.check_delay_on_plant(bench, self.controller, self.asked_lags_deg, delay_s)
             return

@@ -175,8 +175,8 @@ class Plan(Configured):
         segments = self.segments(bench.sample_rate_hz)
         return self.law.harmonics.longest_delay_s(highest_frequency_hz(self.law, segments))
 
-    def check_delay(self, bench: Bench, lead_samples: float) -> None:
-        """Raise `ConfigurationError` for gains that do not bear ``lead_samples`` from an output to the input that shows it.
+    def check_delay(self, bench: Bench, loop_delay_samples: float) -> None:
+        """Raise `ConfigurationError` for gains that are not stable with ``loop_delay_samples`` from output to input.
 
         These are known once a device has its queue: block, queue, hold and filters.
         """
@@ -184,7 +184,7 @@ class Plan(Configured):
         if loop is None:
             return
         try:
-            loop.check_frequency(rate_hz, highest_frequency_hz(self.law, self.segments(rate_hz)), lead_samples)
+            loop.check_frequency(rate_hz, highest_frequency_hz(self.law, self.segments(rate_hz)), loop_delay_samples)
         except ValueError as error:
             raise ConfigurationError(f"controller.{error}") from None
 

@@ -49,7 +49,7 @@ class Continuation:
         return {"plan": self.plan.model_dump(mode="json"), "numbers": list(self.numbers)} if self.changed else {}
 
 
-def what_is_left(recording: Recording, change: Plan | None = None, source: str | Path = "") -> Continuation:
+def remaining(recording: Recording, change: Plan | None = None, source: str | Path = "") -> Continuation:
     """Return how a recording is continued, by its current plan or by ``change``, a plan read from ``source``.
 
     Raises `ConfigurationError` if the changed plan cannot follow the current one or does not fit the bench.

@@ -14,19 +14,19 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
 from rig.campaigns.evaluation.heavy_damping import with_heavy_damping
 from rig.campaigns.evaluation.measured_together import round_at
-from rig.campaigns.evaluation.passing import was_refused_in_passing
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.skipped import skipped_summary
 from rig.campaigns.evaluation.stored_point import point_from, stored
+from rig.campaigns.evaluation.transient_disturbance import refused_for_a_transient
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.running.attempts import RefusedRecords, after_attempts
 from rig.campaigns.running.device_remarks import with_device_remarks, with_disorder
 from rig.campaigns.running.evaluation_thread import EvaluationThread
-from rig.campaigns.running.measured_before import MeasuredBefore, before_another
+from rig.campaigns.running.measured_before import MeasuredBefore, measured_before_repeat
 from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.start import Start
 from rig.campaigns.running.start_judgement import StartJudgement
@@ -37,7 +37,7 @@ from rig.daq import flag_names
 from rig.errors import RecordingError
 from rig.live.publisher import Live, Unpublished
 from rig.loop.loop import LoopStatistics, RunningLoop
-from rig.system.stop_signals import asking, held
+from rig.system.stop_signals import deferred, stopping_on_signals
 from rig.text.disorder import disorder_text
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
@@ -102,7 +102,7 @@ class Execution:
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress, self.live = journal, progress, live or Unpublished()
         self.measure = KINDS[plan.kind].measure
-        self.in_one_go = KINDS[plan.kind].in_one_go
+        self.batched = KINDS[plan.kind].batched
         self.watch = KINDS[plan.kind].watch
         self.targets = plan.targets()
         self.measured_before = before.done | before.given_up
@@ -136,8 +136,8 @@ class Execution:
         self._write("part", {**information, **flags})
         for remark in self.loop.remarks:
             self._remark(remark)
-        with one_thread(), held():  # signals: until the end record is in the journal
-            with asking(self.loop.request_stop), self.live.heeding(self.loop.request_stop):
+        with one_thread(), deferred():  # signals: until the end record is in the journal
+            with stopping_on_signals(self.loop.request_stop), self.live.stopping_on_request(self.loop.request_stop):
                 try:
                     for rows in self.loop.run():
                         self._take(rows)
@@ -225,7 +225,7 @@ class Execution:
         self._note_refused()
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
-            if self.in_one_go and int(segments[self.next_segment]["point"]) >= 0:
+            if self.batched and int(segments[self.next_segment]["point"]) >= 0:
                 if not self._finish_round():
                     break
                 continue
@@ -287,16 +287,16 @@ class Execution:
         """
         found = self.measure(self.bench, self.plan, target, rows, *told)
         points = [
-            with_device_remarks(point, rows, self.loop.counters) for point in (found if self.in_one_go else [found])
+            with_device_remarks(point, rows, self.loop.counters) for point in (found if self.batched else [found])
         ]
-        if not self.in_one_go:
+        if not self.batched:
             left_alone = int(told[0]["left_alone"])
             points = [with_force_harmonics(self.bench, self.plan, target, point, left_alone) for point in points]
         points = [with_heavy_damping(point) for point in points]
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
         for point in points:
-            if was_refused_in_passing(point, self.bench, rows, faults, steady):
+            if refused_for_a_transient(point, self.bench, rows, faults, steady):
                 self.passing.add(point.number)
         return [replace(point, rows=where) for point in points]
 
@@ -309,7 +309,7 @@ class Execution:
     def _evaluated(self) -> np.ndarray:
         """Return which segments belong to the rows with which a point is evaluated, bool[n]."""
         segments = self.tick.arrays.segments
-        if self.in_one_go or self.plan.evaluates_approach:
+        if self.batched or self.plan.evaluates_approach:
             return np.asarray(segments["point"] >= 0)
         return np.isin(segments["kind"], list(EVALUATED))
 
@@ -335,7 +335,7 @@ class Execution:
             return first
         running = int(outcomes[index]["outcome"]) == Outcome.RUNNING
         of_a_point = int(segments[index]["point"]) >= 0
-        if self.in_one_go and of_a_point:
+        if self.batched and of_a_point:
             return self._begin(index) if int(outcomes[index]["outcome"]) != Outcome.PENDING else self.tick.sample
         if self.plan.evaluates_approach and of_a_point:
             approached = index > 0 and segments[index - 1]["point"] == segments[index]["point"]
@@ -383,16 +383,16 @@ class Execution:
         self.progress.point(point, self.finished, len(self.targets))
 
     @property
-    def worth_another(self) -> frozenset[int]:
+    def to_repeat(self) -> frozenset[int]:
         """Numbers in the plan of points refused for something that passes, once the whole plan was carried out."""
         completed = EndReason(int(self.tick.guard["reason"][0])) is EndReason.COMPLETED and self.loop.failure is None
         return frozenset(self.passing) if completed else frozenset()
 
-    def before_another(self, points: Iterable[Mapping[str, Any]]) -> MeasuredBefore:
-        """Return what was measured before the next attempts at `worth_another`; ``points``: all of the recording."""
+    def measured_before_repeat(self, points: Iterable[Mapping[str, Any]]) -> MeasuredBefore:
+        """Return what was measured before the next attempts at `to_repeat`; ``points``: all of the recording."""
         result: type[Any] = KINDS[self.plan.kind].result
         known = tuple(point_from(table, result) for table in points)
-        return before_another(self.numbers, known, self.worth_another, self.attempts)
+        return measured_before_repeat(self.numbers, known, self.to_repeat, self.attempts)
 
     def _mark_unlocked(self) -> None:
         """If no lock was found at the start voltage, mark all remaining points of the plan as failed for that reason."""
@@ -405,7 +405,7 @@ class Execution:
                 self._report(failed_point(self.plan, target, entry, at_start=True))
 
     def _mark_interrupted(self) -> None:
-        if self.in_one_go:
+        if self.batched:
             index, segments = self.next_segment, self.tick.arrays.segments
             if index < segments.size and int(segments[index]["point"]) >= 0:
                 self._finish_round(cut_short=True)
@@ -427,7 +427,7 @@ class Execution:
             "text": self._why(),
             "tripped": reason.is_trip,
             **(self._trip(reason) if reason.is_trip else {}),
-            "skipped": what_was_skipped(self.reported.values(), len(self.targets) - self.done),
+            "skipped": skipped_summary(self.reported.values(), len(self.targets) - self.done),
             "loop": self.loop.report,
             "counters": self.loop.counters,
         }
@@ -439,7 +439,7 @@ class Execution:
         trip = Trip(reason, int(self.tick.guard["channel"][0]), frequency_hz)
         recorded = [point for point in self.known if point.spectrum is not None or point.accepted]
         points = [point for point in recorded if point.quality is not Quality.IMPLAUSIBLE]
-        first = not points and (self.in_one_go or len(self.reported) <= 1)
+        first = not points and (self.batched or len(self.reported) <= 1)
         advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
         return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}
 
@@ -458,7 +458,7 @@ class Execution:
         )
 
 
-def nothing_left(bench: Bench) -> dict[str, Any]:
+def end_without_measuring(bench: Bench) -> dict[str, Any]:
     """Return the end record of a part in which nothing moved, because all points of the plan had been measured before."""
     return {
         "completed": True,

@@ -14,7 +14,7 @@ from rig.arming.arming import asked_once
 from rig.arming.run_options import RemarksOnce, RunOptions
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.runner import resume_run, run_plan
 from rig.recording.reader import Recording
 
 FIRST = 1e-3  # of the largest voltage, RMS
@@ -37,9 +37,9 @@ class MultisineSeries:
     def play(self, plan: MultisinePlan) -> Recording:
         """Play a multisine and return the recording with it as the last part. The first call creates the recording."""
         if self._begun:
-            return take_up(self.output, replace(self._options, seed=None), change=plan, trust_code=True)
+            return resume_run(self.output, replace(self._options, seed=None), change=plan, trust_code=True)
         self._begun = True
-        return carry_out(plan, self.bench, self.output, self._options)
+        return run_plan(plan, self.bench, self.output, self._options)
 
 
 @dataclass(frozen=True)

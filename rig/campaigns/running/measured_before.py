@@ -23,7 +23,7 @@ class MeasuredBefore:
     """Refused attempts of the same run at points that are measured again, by their number in the plan."""
 
 
-def before_another(
+def measured_before_repeat(
     numbers: Sequence[int],
     known: tuple[Point[object], ...],
     again: Set[int],

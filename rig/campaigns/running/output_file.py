@@ -11,7 +11,7 @@ from rig.recording.journal_contents import JournalContents
 from rig.system.locking import exclusive
 
 
-def make_way(output: Path, overwrite: bool) -> None:
+def prepare_output(output: Path, overwrite: bool) -> None:
     """Refuse an output that cannot or must not be written: a missing folder, a name of a folder, an existing file."""
     try:
         if not output.parent.is_dir():
@@ -30,7 +30,7 @@ def make_way(output: Path, overwrite: bool) -> None:
 
 
 @contextmanager
-def set_aside(output: Path) -> Iterator[None]:
+def back_up(output: Path) -> Iterator[None]:
     """Keep an earlier recording and its journal under other names; put them back if the new one is never begun."""
     journal = journal_path(output)
     moved: list[Path] = []
@@ -50,7 +50,7 @@ def set_aside(output: Path) -> Iterator[None]:
                 _before(path).replace(path)
 
 
-def put_back(output: Path) -> str:
+def restore_backup(output: Path) -> str:
     """Undo what a run into ``output`` has left if it was killed before it recorded anything.
 
     A journal without any part is removed. A recording that the run was to overwrite gets its name back. If rows were recorded,

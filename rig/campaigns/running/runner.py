@@ -24,11 +24,11 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.continuation import what_is_left
+from rig.campaigns.running.continuation import remaining
 from rig.campaigns.running.device_queue import armed_with_queue, settled_queue, with_queue
-from rig.campaigns.running.execution import Execution, nothing_left
+from rig.campaigns.running.execution import Execution, end_without_measuring
 from rig.campaigns.running.measured_before import MeasuredBefore
-from rig.campaigns.running.output_file import forget_before, make_way, put_back, set_aside
+from rig.campaigns.running.output_file import back_up, forget_before, prepare_output, restore_backup
 from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.campaigns.running.watched import watched_facts
 from rig.errors import ConfigurationError, RigError
@@ -40,7 +40,7 @@ from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.recording.stored import BenchTable, ChannelTable, PlanTable
-from rig.system.stop_signals import ended_in_order, held
+from rig.system.stop_signals import deferred, ended_in_order
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
@@ -49,7 +49,7 @@ from rig.tick.tick import TickSettings
 
 
 @ended_in_order()
-def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None = None) -> Recording:
+def run_plan(plan: Plan, bench: Bench, output: Path, options: RunOptions | None = None) -> Recording:
     """Carry out a plan from its beginning and record it in the HDF5 file ``output``.
 
     Raises `ConfigurationError`, before anything starts, if plan and bench do not fit; `RecordingError` if the file exists or
@@ -61,8 +61,8 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
     check_length(plan, bench)
     options = options or RunOptions()
     seed = options.seed or 0
-    _put_back(output, options.progress)
-    make_way(output, options.overwrite)
+    _restore_backup(output, options.progress)
+    prepare_output(output, options.overwrite)
     with _published(plan, bench, output, options) as live:
         with open_session(bench, seed, realtime=options.realtime) as session:
             facts = _facts(plan, bench, session, options)
@@ -82,7 +82,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
             settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz), _checked(facts))
             _refuse_stopped(live)
             with (
-                set_aside(output),
+                back_up(output),
                 _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
                 _started(session, settings, output) as loop,
             ):
@@ -93,7 +93,7 @@ def carry_out(plan: Plan, bench: Bench, output: Path, options: RunOptions | None
 
 
 @ended_in_order()
-def take_up(
+def resume_run(
     output: Path,
     options: RunOptions | None = None,
     *,
@@ -108,20 +108,20 @@ def take_up(
     on; its points that were accepted before are not measured again. If none is missing, nothing is driven, and it is said. A
     complete recording without a change of plan is returned unchanged.
 
-    Raises the same errors as `carry_out`. Also raises `ConfigurationError` for a plan that cannot follow the previous one; for
+    Raises the same errors as `run_plan`. Also raises `ConfigurationError` for a plan that cannot follow the previous one; for
     a level that tripped or a higher one, unless ``retry_tripped``; and for a bench with functions of the user, unless
     ``trust_code``: the recording names the module to import, so the author of the file chooses the code.
     """
     options = options or RunOptions()
     progress = options.progress
-    _put_back(output, progress)
+    _restore_backup(output, progress)
     with Recording(output) as recording:
         for number, part in enumerate(recording.parts, 1):
             if part.dropped_reason:
                 progress.remark(
                     f"part {number}: {part.dropped_reason}; points whose results are missing are measured again"
                 )
-        left = what_is_left(recording, change, source)
+        left = remaining(recording, change, source)
         # Each part has its own noise: with the same seed, a new part would repeat the noise of the first.
         drawn = (recording.seed or 0) + len(recording.parts) if options.seed is None else options.seed
         information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
@@ -153,7 +153,7 @@ def take_up(
     if not finished:
         with continue_recording(output) as journal:
             journal.part({**information, "points_done": len(left.done), "device_flags": []})
-            journal.end(nothing_left(bench))
+            journal.end(end_without_measuring(bench))
     return _whole(output, progress) if journal_path(output).exists() else Recording(output)
 
 
@@ -200,12 +200,12 @@ def _with_further_attempts(
     with attempts left, and where the device has latched meanwhile: only a person clears that.
     """
     plan, bench, output, progress = execution.plan, execution.bench, recording.path, options.progress
-    while again := execution.worth_another:
+    while again := execution.to_repeat:
         if not live.another_part():
             progress.remark("nothing is measured again: a stop was requested")
             break
         with recording:
-            before = execution.before_another(recording.points)
+            before = execution.measured_before_repeat(recording.points)
             seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before
             first_sample = recording.n_rows
         with open_session(bench, seed, realtime=options.realtime) as session:
@@ -217,7 +217,7 @@ def _with_further_attempts(
             if live.stop_requested:  # while the device was opened
                 return Recording(output)
             names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
-            progress.remark(f"measured again, for what was in the way may have passed: point {names}")
+            progress.remark(f"repeating point {names}: the disturbance may be over")
             try:
                 choice = settled_queue(plan, bench, session, options)
             except ConfigurationError as error:
@@ -259,14 +259,14 @@ def _refuse_stopped(live: Live) -> None:
         raise RigError("stopped by request before anything was driven; nothing was recorded")
 
 
-def _put_back(output: Path, progress: Progress) -> None:
-    if told := put_back(output):
+def _restore_backup(output: Path, progress: Progress) -> None:
+    if told := restore_backup(output):
         progress.remark(told)
 
 
 def _whole(output: Path, progress: Progress) -> Recording:
     """Convert the journal to the recording's file and return it. A signal ends the program once nothing can be lost."""
-    with held() as signals:
+    with deferred() as signals:
         damaged = finalise(journal_path(output), output, signals.check)
         forget_before(output)
         if damaged is not None:
@@ -310,7 +310,7 @@ def _checked(facts: Mapping[str, Any]) -> CheckedScale | None:
 def _lead(loop: RunningLoop) -> float:
     """Return the number of samples between an output and the input that responds to it."""
     record = loop.tick.arrays.loop
-    return float(record["lead_whole"][0] + record["lead_fraction"][0])
+    return float(record["delay_whole"][0] + record["delay_fraction"][0])
 
 
 @contextmanager

@@ -60,7 +60,7 @@ class Start:
             self._undecided = self._judgement.pending and self._judgement.longest_periods > 0.0
             self._loop.release_start()
         else:
-            self._loop.go_on_starting(number)
+            self._loop.continue_start(number)
             return []
         self._segment = None
         return []

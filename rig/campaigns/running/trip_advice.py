@@ -11,9 +11,9 @@ from rig.campaigns.running.margins import LIMITS, margin_before
 from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
 
-CLEAR = 0.7  # of a limit: a level expected to reach this share, in proportion to an earlier level, is too high
-ROOM = 0.9  # of a limit: share that the proposed level should reach, in proportion
-AT_AN_END = 0.01  # of a frequency window's width
+SHARE_TOO_HIGH = 0.7  # of a limit: a level expected to reach this share, in proportion to an earlier level, is too high
+PROPOSED_SHARE = 0.9  # of a limit: share that the proposed level should reach, in proportion
+NEAR_WINDOW_END = 0.01  # of a frequency window's width
 
 BESIDE_THE_LEVEL = {
     EndReason.NON_FINITE_INPUT: ("the device delivered no number", "look at device and driver, then `rig check`"),
@@ -113,8 +113,8 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
         return Advice(f"{what} is too high{polarity}", f"lower {_key(plan, at)}, or {raised}{then}")
     reached = f"{100.0 * margin.share:.2g} % of {margin.key} on channel {name}"
     had = f"the point before, {margin.level:.4g} {unit}, had reached {reached}"
-    if at is None or margin.share * max(at.level / margin.level, 1.0) >= CLEAR:
-        below = ROOM * margin.level / margin.share
+    if at is None or margin.share * max(at.level / margin.level, 1.0) >= SHARE_TOO_HIGH:
+        below = PROPOSED_SHARE * margin.level / margin.share
         bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
         return Advice(f"{had}: {what} is too high", f"lower {_key(plan, at)}{bound}, or {raised}")
     return Advice(
@@ -130,7 +130,7 @@ def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Ad
     key = "limits.frequency_hz of the bench" if window is None else "controller.frequency_window_hz"
     from_end = min(abs(trip.frequency_hz - low), abs(trip.frequency_hz - high))
     where = "" if at is None else f" at {at.text}"
-    if from_end <= AT_AN_END * (high - low):
+    if from_end <= NEAR_WINDOW_END * (high - low):
         return Advice(
             f"the resonance{where} lies beyond {key} = [{low:g}, {high:g}]",
             "widen it if rig and specimen bear it, or lower the levels",

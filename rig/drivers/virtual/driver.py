@@ -255,7 +255,7 @@ class VirtualDAQ(DAQ):
 
         The lead of the tick must be the block plus the latency. A run is either fused or exchanged, not both.
         """
-        lead = int(t.loop["lead_whole"][0])
+        lead = int(t.loop["delay_whole"][0])
         if lead != math.floor(self.block + self.latency_samples):
             raise DaqRefused(
                 f"the tick expects a lead of {lead} samples, this device has {math.floor(self.block + self.latency_samples)}"

@@ -151,6 +151,6 @@ def fused(
         rows[index].flags |= np.uint32(flags) << np.uint32(DEVICE_SHIFT)
         if converters.faults.any and t.loop[0].sample % outputs.block == 0:
             tell_continuation(t, outputs.told)
-        if is_over(t.guard[0], t.loop[0].lead_whole):
+        if is_over(t.guard[0], t.loop[0].delay_whole):
             return index + 1
     return int(rows.size)

@@ -76,7 +76,7 @@ class Layout:
         """Return the layout for a bench and its tick's arrays; a campaign may be late by ``ring_s`` before a ramp begins."""
         chunk = max(1, round(CHUNK_S * bench.sample_rate_hz / bench.block)) * bench.block
         chunk_s = chunk / bench.sample_rate_hz
-        lead = int(arrays.loop["lead_whole"][0])
+        lead = int(arrays.loop["delay_whole"][0])
         reserve = math.ceil((bench.limits.ramp_down_s + lead / bench.sample_rate_hz) / chunk_s) + 4
         state = sum(_aligned(getattr(arrays, name).nbytes) for name in SNAPSHOT)
         slots = math.ceil(ring_s / chunk_s) + reserve
@@ -181,6 +181,6 @@ class SharedMemory:
         """Let the start segment end; the loop looks for it at every block."""
         self.words[RELEASE_START] = 1
 
-    def go_on_starting(self, judgements: int) -> None:
+    def continue_start(self, judgements: int) -> None:
         """Let a loop in lockstep go on that waits for so many judgements of its start."""
         self.words[START_JUDGED] = judgements

@@ -24,7 +24,7 @@ from rig.tick.tick import TickSettings
 RING_S = 10.0
 LONGEST_SILENCE_S = 10.0
 HUNG_S = 0.5
-PATIENCE_S = 5.0
+TIMEOUT_S = 5.0
 
 
 class WorkerLoop:
@@ -82,9 +82,9 @@ class WorkerLoop:
         """Let the start segment end at its time; the loop looks for it at every block."""
         self._memory.release_start()
 
-    def go_on_starting(self, judgements: int) -> None:
+    def continue_start(self, judgements: int) -> None:
         """Let the start segment go on after so many judgements; a loop in lockstep waits for this or for its release."""
-        self._memory.go_on_starting(judgements)
+        self._memory.continue_start(judgements)
 
     def bring_down(self) -> None:
         """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
@@ -211,9 +211,9 @@ class WorkerSession:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Ramp down if the loop still runs, and wait for its end."""
-        patience_s = PATIENCE_S + self._bench.limits.ramp_down_s  # it may run although its answer was lost
+        timeout_s = TIMEOUT_S + self._bench.limits.ramp_down_s  # it may run although its answer was lost
         if self._loop is not None and not self._loop.ended:
             self._loop.request_stop()
-        left = self._worker.close(patience_s)
+        left = self._worker.close(timeout_s)
         if left:
             warnings.warn(left, RuntimeWarning, stacklevel=2)

@@ -79,22 +79,22 @@ class Worker:
         how = signal.Signals(-status).name if status < 0 else f"status {status}"
         return DaqError(f"the loop's process has ended ({how}); the device's own watchdog brings its output to 0 V")
 
-    def end(self, patience_s: float) -> str:
+    def end(self, timeout_s: float) -> str:
         """Ask the process to end, then kill it. Return in one sentence what went wrong; empty if it ended by itself."""
         for action, said in ((self._process.terminate, ""), (self._process.kill, KILLED)):
             action()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(patience_s)
+                self._process.wait(timeout_s)
                 return said
         return f"{KILLED}, and it is there still as process {self.pid}"
 
-    def close(self, patience_s: float) -> str:
+    def close(self, timeout_s: float) -> str:
         """Wait a while for the process to end by itself, then `end` it; return what `end` returns."""
         self._commands.close()
         try:
-            self._process.wait(patience_s)
+            self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
-            return self.end(patience_s)
+            return self.end(timeout_s)
         else:
             return ""
         finally:

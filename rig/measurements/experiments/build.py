@@ -11,7 +11,7 @@ from identification import Experiment, IdentificationError
 from identification.signals.decimation import LARGEST_FACTOR
 from identification.validation import positive
 from rig.bench.configuration import validated
-from rig.campaigns.evaluation.drift import of_the_result
+from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, Result, point_name, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.evaluation.stored_point import point_from
@@ -213,7 +213,7 @@ def _made_of(recording: Recording) -> str | None:
 
 def _accepted(recording: Recording, points: Iterable[Point[Result]]) -> list[Point[Result]]:
     """Return the accepted points of the current plan, without the repetition of the first point."""
-    found = [point for point in of_the_result(points) if point.accepted]
+    found = [point for point in without_repetition(points) if point.accepted]
     if not found:
         raise IdentificationError(f"{recording.path}: points: none of the recording was accepted")
     return found

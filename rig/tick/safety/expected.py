@@ -6,7 +6,7 @@ import numpy as np
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
-from rig.tick.safety.following import EXPECTED, VISIBLE
+from rig.tick.safety.response_plausibility import EXPECTED, VISIBLE
 
 # Only amplitudes above JUDGED times the smallest readable amplitude plus NOISES times the channel's RMS noise are judged.
 JUDGED = 16.0
@@ -22,7 +22,7 @@ def expected_record(
     exciter: PlantModel | None = None,
     per_volt: tuple[float, float] | None = None,
 ) -> np.ndarray:
-    """Return one record of `rig.tick.safety.following.EXPECTED`.
+    """Return one record of `rig.tick.safety.response_plausibility.EXPECTED`.
 
     ``smallest_n`` and ``smallest_m_s2`` are the smallest amplitudes whose phase can be read. Of the plant model ``exciter`` the
     exciter's part is used, because a nonlinear structure does not change it, and the structure's as far as a test cannot tell

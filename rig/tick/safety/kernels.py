@@ -106,7 +106,7 @@ def watch_motion(guard: Record, limits: Record, watch: Record, acceleration: flo
 
 
 @kernel
-def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> float:
+def extrapolate_motion(limits: Record, watch: Record, cos_step: float, sin_step: float, omega: float) -> float:
     """Extrapolate the motion over one lost sample, as a harmonic vibration at ``omega`` (rad/s).
 
     Integrating an acceleration with a gap would leave a velocity offset and feign a displacement. With the leak l (1/s),
@@ -122,7 +122,7 @@ def carry_motion(limits: Record, watch: Record, cos_step: float, sin_step: float
 
 
 @kernel
-def watch_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
+def check_gap(guard: Record, limits: Record, lost: int, sample: int, dt_s: float) -> None:
     """Trip if the count of lost samples, minus those received since, reaches its limit."""
     if lost >= limits.lost_samples:
         shut_down(guard, SAMPLES_LOST, -1, lost * dt_s, sample, False)
@@ -147,7 +147,7 @@ def release(guard: Record) -> None:
 
 
 @kernel
-def permitted_turn(limits: Record, turn: float, demanded: float, before_v: float, after_v: float) -> float:
+def permitted_command_phase(limits: Record, turn: float, demanded: float, before_v: float, after_v: float) -> float:
     """Return the next angle (rad) of the complex command after ``turn``; its amplitude goes from ``before_v`` to ``after_v``.
 
     The command's total change keeps the slew limit s: ``|dU|^2 = da^2 + 4 a_0 a_1 sin^2(d/2) <= da^2 + a_0 a_1 d^2 <= s^2``.

@@ -15,7 +15,7 @@ import numpy as np
 from rig.arming.checked_scale import CheckedScale
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench
-from rig.campaigns.running.runner import carry_out
+from rig.campaigns.running.runner import run_plan
 from rig.check.run import check
 from rig.recording.conversion import finalise
 from rig.recording.journal import journal_path
@@ -114,7 +114,7 @@ def carried_out(levels: str, device: str, *given: Any) -> tuple[Any, "Kept", str
     with tempfile.TemporaryDirectory() as folder, driver(DEVICES[device], *given) as made:
         output, raised, kept = Path(folder) / "run.h5", "", None
         try:
-            with carry_out(plan_for(levels), bench_for(levels), output, options) as recording:
+            with run_plan(plan_for(levels), bench_for(levels), output, options) as recording:
                 kept = Kept(recording.parts[-1])
         except (Exception, HostKilledError) as error:
             raised = f"{type(error).__name__}: {error}"

@@ -9,7 +9,7 @@ import pytest
 import rig
 from rig.bench import load_bench
 from rig.bench.user_code import named_code
-from rig.campaigns.running.continuation import what_is_left
+from rig.campaigns.running.continuation import remaining
 from rig.errors import ConfigurationError
 from rig.measurements import sweeps
 from rig.recording.reader import Recording
@@ -116,7 +116,7 @@ def test_a_recording_is_shown_plotted_exported_and_completed_without_its_code(la
         status, _, err = command(line)
         assert status == 0, (line, err)
     with Recording("run.h5") as recording:
-        assert what_is_left(recording).to_measure == ()
+        assert remaining(recording).to_measure == ()
         assert len(sweeps(recording)) == 1
     assert not Path("imported.txt").exists()
     assert lab not in sys.modules

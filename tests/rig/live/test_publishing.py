@@ -176,7 +176,7 @@ def test_a_first_request_is_kept_and_one_that_was_left_before_is_heeded_at_once(
         run.request_stop("first \x1b[31m")
         run.request_stop("second")
         heard = []
-        with live.heeding(heard.append):
+        with live.stopping_on_request(heard.append):
             assert heard == ["first \\x1b[31m"]
         assert len(heard) == 1
         run.close()
@@ -188,7 +188,7 @@ def test_a_request_needs_no_text_for_the_memory_may_be_full(monkeypatch):
             patch.setattr(os, "write", full)
             run.request_stop("no room for this")
         heard = []
-        with live.heeding(heard.append):
+        with live.stopping_on_request(heard.append):
             pass
         assert heard == ["stopped by request"]
         assert sorted(path.name for path in live.folder.glob("*stop*")) == ["stop"]
@@ -239,7 +239,7 @@ def test_an_error_in_publishing_is_told_once_and_raised_never():
             live.take(np.zeros(3), None, 0, 1)
         live.line("event", {})
         heard = []
-        with live.heeding(heard.append):
+        with live.stopping_on_request(heard.append):
             pass
     (remark,) = remarks
     assert remark.startswith("the run can no longer be watched (")

@@ -21,8 +21,8 @@ from rig.live.reader import LiveRun
 from rig.live.stopping import request_stop
 from rig.live.time_left import time_left_s
 from rig.loop.loop import Loop
-from rig.monitor.coming_down import ComingDown
 from rig.monitor.shown import as_json, shown_bins, shown_frame, state_of
+from rig.monitor.shutdown_monitor import ShutdownMonitor
 from rig.tick.safety.layout import EndReason, GuardMode
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.rigs import bench_with
@@ -122,8 +122,8 @@ def test_a_request_left_between_two_parts_ends_the_run_without_another(monkeypat
         def advance(self, rows, tick):
             pass
 
-    monkeypatch.setattr("rig.campaigns.running.execution.Execution.worth_another", frozenset({0}))
-    monkeypatch.setattr("rig.live.publisher.heeding", lambda folder, stop: nullcontext())
+    monkeypatch.setattr("rig.campaigns.running.execution.Execution.to_repeat", frozenset({0}))
+    monkeypatch.setattr("rig.live.publisher.stopping_on_request", lambda folder, stop: nullcontext())
     heard = OnlyOne()
     with rig.run(short_plan(), output=tmp_path / "run.h5", progress=heard) as done:
         assert len(done.recording.parts) == 1
@@ -256,13 +256,13 @@ def test_a_trip_is_told_with_channel_value_and_cause(tmp_path):
 @pytest.mark.parametrize("realtime", [False, True])
 def test_a_request_while_the_device_is_opened_keeps_the_rig_still_and_is_no_death(monkeypatch, tmp_path, realtime):
     """Found before its device is opened; nothing is driven and nothing recorded, and whoever watches is told so."""
-    told: list[ComingDown] = []
+    told: list[ShutdownMonitor] = []
     watching: list[LiveRun] = []
     opened = runner.open_session
 
     def asked_meanwhile(*arguments, **options):
         watching.append(LiveRun(runs()[0]))
-        told.append(ComingDown(runs()[0], "stopped by a test"))
+        told.append(ShutdownMonitor(runs()[0], "stopped by a test"))
         return opened(*arguments, **options)
 
     monkeypatch.setattr(runner, "open_session", asked_meanwhile)

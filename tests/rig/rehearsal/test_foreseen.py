@@ -9,7 +9,7 @@ from rig.arming.rehearsed import subject_digest
 from rig.arming.run_options import RunOptions
 from rig.bench.bench import Arming
 from rig.campaigns.evaluation.recorded import points_of
-from rig.campaigns.running.runner import carry_out, take_up
+from rig.campaigns.running.runner import resume_run, run_plan
 from rig.errors import NotArmed
 from rig.recording.reader import Recording
 from rig.rehearsal.comparison import compared
@@ -62,16 +62,16 @@ def test_a_bench_that_asks_for_a_rehearsal_is_armed_by_one_alone(tmp_path, fores
     told = rehearsed_in(foreseeing, "r.h5")
     bench = careful(largest_trip_probability=0.3)
     with pytest.raises(NotArmed, match="arms only what was rehearsed, with a trip below 30 %"):
-        carry_out(SHORT, bench, tmp_path / "run.h5")
+        run_plan(SHORT, bench, tmp_path / "run.h5")
     assert not list(tmp_path.iterdir())
-    with carry_out(SHORT, bench, tmp_path / "run.h5", RunOptions(rehearsal=told)) as recording:
+    with run_plan(SHORT, bench, tmp_path / "run.h5", RunOptions(rehearsal=told)) as recording:
         assert recording.complete
         assert recording.parts[0].information["about"]["rehearsal"]["digest"] == foreseeing.digest
     with pytest.raises(NotArmed, match=r"with 16 draws up to 19.4 %; allowed is up to 10 %"):
-        carry_out(SHORT, careful(largest_trip_probability=0.1), tmp_path / "other.h5", RunOptions(rehearsal=told))
+        run_plan(SHORT, careful(largest_trip_probability=0.1), tmp_path / "other.h5", RunOptions(rehearsal=told))
     old = replace(told, finished="2020-01-01T00:00:00+00:00")
     with pytest.raises(NotArmed, match="counts for 168 h"):
-        carry_out(SHORT, bench, tmp_path / "other.h5", RunOptions(rehearsal=old))
+        run_plan(SHORT, bench, tmp_path / "other.h5", RunOptions(rehearsal=old))
 
 
 def test_a_rehearsal_of_something_else_arms_nothing(tmp_path, foreseeing):
@@ -79,13 +79,13 @@ def test_a_rehearsal_of_something_else_arms_nothing(tmp_path, foreseeing):
     other = SHORT.model_copy(update={"levels_v": (0.4, 0.9)})
     for plan, bench in ((other, magnet_beam()), (SHORT, bench_with({"limits": {"force_n": 30.0}}))):
         with pytest.raises(NotArmed, match=r"r\.h5: is of another plan or another bench"):
-            carry_out(plan, bench, tmp_path / "run.h5", RunOptions(rehearsal=told))
+            run_plan(plan, bench, tmp_path / "run.h5", RunOptions(rehearsal=told))
 
 
 def test_who_overrides_is_recorded(tmp_path, monkeypatch):
     monkeypatch.setenv("VIBROLOCK_OPERATOR", "a person")
     options = RunOptions(override_rehearsal="the specimen is scrap")
-    with carry_out(SHORT, careful(largest_trip_probability=0.02), tmp_path / "run.h5", options) as recording:
+    with run_plan(SHORT, careful(largest_trip_probability=0.02), tmp_path / "run.h5", options) as recording:
         overridden = recording.parts[0].information["about"]["rehearsal"]["overridden"]
     assert (overridden["why"], overridden["by"]) == ("the specimen is scrap", "a person")
     assert "arms only what was rehearsed" in overridden["against"]
@@ -101,12 +101,12 @@ def test_a_recording_shows_its_rehearsal_and_resumes_with_it(tmp_path, foreseein
     told = rehearsed_in(foreseeing, "r.h5")
     bench = careful(largest_trip_probability=0.3)
     path = tmp_path / "run.h5"
-    carry_out(SHORT, bench, path, RunOptions(rehearsal=told)).close()
+    run_plan(SHORT, bench, path, RunOptions(rehearsal=told)).close()
     print_summary(summarise(path))
     shown = capsys.readouterr().out
     assert "rehearsed: ends well 100 %, trips 0 % (up to 19 %) of 16 draws; r.h5" in shown
     assert "the run lies within what was foreseen" in shown
-    with take_up(path) as recording:
+    with resume_run(path) as recording:
         assert recording.complete
     with Recording(path) as recording:
         assert "foreseen" in recording.parts[0].information["about"]["rehearsal"]

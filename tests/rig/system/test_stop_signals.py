@@ -9,12 +9,12 @@ import typer
 import rig
 from rig.arming.run_options import RunOptions, Silent
 from rig.bench import load_bench
-from rig.campaigns.running.runner import carry_out
+from rig.campaigns.running.runner import run_plan
 from rig.cli.run import _carry
 from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.system.stop_signals import Interrupted, Terminated, asking, ended_in_order, held, insisting
+from rig.system.stop_signals import Interrupted, Terminated, deferred, ended_in_order, escalating, stopping_on_signals
 from tests.command import signals_as_they_were
 from tests.rig.campaigns.running.test_runs import plan_with
 
@@ -76,7 +76,7 @@ def test_a_signal_once_the_file_is_there_says_so_and_the_command_succeeds(tmp_pa
         rig.run(PLAN, output=output)
     assert ended.value.recorded == output
     again = RunOptions(overwrite=True)
-    _carry("backbone", again, lambda watched: carry_out(PLAN, BENCH, output, watched), json=False)
+    _carry("backbone", again, lambda watched: run_plan(PLAN, BENCH, output, watched), json=False)
     assert "1 of 1 points accepted" in capsys.readouterr().out
     signal.raise_signal(signal.SIGTERM)  # all is done: a run that succeeded is not ended by a signal
 
@@ -90,13 +90,13 @@ def test_a_run_that_did_not_complete_fails_whatever_signal_comes_at_its_end(tmp_
     monkeypatch.setattr("rig.campaigns.running.runner.forget_before", lambda path: signal.raise_signal(signal.SIGTERM))
     stopping = RunOptions(progress=Stopping())
     with pytest.raises(typer.Exit) as ended:
-        _carry("backbone", RunOptions(), lambda _: carry_out(PLAN, BENCH, tmp_path / "run.h5", stopping), json=False)
+        _carry("backbone", RunOptions(), lambda _: run_plan(PLAN, BENCH, tmp_path / "run.h5", stopping), json=False)
     assert ended.value.exit_code == 1
 
 
 def test_a_signal_while_the_last_point_is_evaluated_comes_after_the_end_of_the_journal(tmp_path, monkeypatch):
     output = tmp_path / "run.h5"
-    monkeypatch.setattr("rig.campaigns.running.execution.what_was_skipped", raising(signal.SIGTERM, lambda *_: ""))
+    monkeypatch.setattr("rig.campaigns.running.execution.skipped_summary", raising(signal.SIGTERM, lambda *_: ""))
     with pytest.raises(Terminated):
         rig.run(PLAN, output=output)
     with Recording(output) as recording:
@@ -108,7 +108,7 @@ def test_a_signal_while_the_last_point_is_evaluated_comes_after_the_end_of_the_j
 def test_a_closed_terminal_that_was_to_be_ignored_from_the_start_stays_ignored():
     before, asked = signal.signal(signal.SIGHUP, signal.SIG_IGN), []
     try:
-        with asking(asked.append), ended_in_order(), held():
+        with stopping_on_signals(asked.append), ended_in_order(), deferred():
             signal.raise_signal(signal.SIGHUP)
         assert asked == []
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
@@ -117,7 +117,7 @@ def test_a_closed_terminal_that_was_to_be_ignored_from_the_start_stays_ignored()
 
 
 def test_ctrl_c_that_a_library_swallows_is_raised_again():
-    with insisting() as signals:
+    with escalating() as signals:
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controller import AmplitudeLaw, preset
-from rig.tick.measure import pass_over
+from rig.tick.measure import bridge_lost_sample
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
@@ -29,7 +29,7 @@ def tick():
 def lose(tick, theta):
     """Lose a sample at this angle of the output; the readings that it leaves."""
     readings = np.zeros(len(tick.arrays.inputs))
-    pass_over(tick.arrays, readings, math.cos(theta), math.sin(theta))
+    bridge_lost_sample(tick.arrays, readings, math.cos(theta), math.sin(theta))
     return readings
 
 

@@ -22,19 +22,19 @@ def _tick(lead, bench=None, law=None):
     return Tick(bench or bench_with(), law or preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), HELD, lead)
 
 
-def _wired(lead_whole, lead_fraction, samples=20_000, bench=None, skew=(0.0, 0.0), law=None):
+def _wired(delay_whole, delay_fraction, samples=20_000, bench=None, skew=(0.0, 0.0), law=None):
     """A tick whose inputs are its own output, late by the lead and by the channels' skew: force as it is, drive a quarter
     turn ahead of it, so that the lag is that of phase resonance."""
     bench = bench or bench_with()
     still = preset("magnet-beam").model_copy(update={"k1": 0.0, "k2": 0.0})  # the oscillator keeps its 24 Hz
-    tick = _tick(lead_whole + lead_fraction, bench, law or still)
+    tick = _tick(delay_whole + delay_fraction, bench, law or still)
     omega, dt = 2 * math.pi * 24.0, 1 / bench.sample_rate_hz
     readings, rows = tick.buffers(samples)
     estimates = np.zeros(samples, complex)
     out, volts = np.zeros(1), np.zeros((1, 4))
     scale = [channel.sensitivity_v_per_unit for channel in bench.channels]
     for k in range(samples):
-        phase = [omega * dt * (k - lead_whole - lead_fraction - s) for s in skew]
+        phase = [omega * dt * (k - delay_whole - delay_fraction - s) for s in skew]
         volts[0, 0] = scale[0] * math.cos(phase[0])
         volts[0, 1:] = scale[1] * math.cos(phase[1] + math.pi / 2)
         tick_block(
@@ -104,7 +104,7 @@ def test_every_recorded_column_is_described():
 
 
 def test_a_lead_below_one_sample_is_refused():
-    with pytest.raises(ConfigurationError, match="lead_samples"):
+    with pytest.raises(ConfigurationError, match="loop_delay_samples"):
         _tick(0.5)
 
 

@@ -1,7 +1,7 @@
 """What a run has not measured, in one line."""
 
 from rig.campaigns.evaluation.point import Quality
-from rig.campaigns.evaluation.skipped import what_was_skipped
+from rig.campaigns.evaluation.skipped import skipped_summary
 from tests.rig.campaigns.made_points import made_point
 
 
@@ -13,7 +13,7 @@ def test_what_was_skipped_is_one_line_with_every_quality_and_place():
         made_point(4.0, "N", quality=Quality.UNREACHABLE),
         made_point(5.0, "N", quality=Quality.UNREACHABLE, asked_phase_lag_deg=-150.0),
     ]
-    assert what_was_skipped(points, 7) == (
+    assert skipped_summary(points, 7) == (
         "5 of 7 points skipped: not-settled (3 N); unreachable (4 N, 5 N -150 deg); not tried (2)"
     )
-    assert what_was_skipped(points[:2], 2) == ""
+    assert skipped_summary(points[:2], 2) == ""

@@ -75,10 +75,10 @@ def test_what_is_left_of_a_level_is_approached_from_the_lag_before():
 
 
 def test_a_level_that_is_added_leaves_the_points_of_the_others_their_numbers(tmp_path):
-    from rig.campaigns.running.continuation import what_is_left
+    from rig.campaigns.running.continuation import remaining
 
     held = recording(tmp_path, (plan(), None))
-    left = what_is_left(held, plan(levels_m=(1e-3, 1.5e-3, 2e-3)), "more.toml")
+    left = remaining(held, plan(levels_m=(1e-3, 1.5e-3, 2e-3)), "more.toml")
     assert left.numbers == (0, 1, 2, 6, 7, 8, 3, 4, 5)
 
 

@@ -12,7 +12,7 @@ from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.evaluation.point import Quality
 from rig.campaigns.evaluation.stored_point import stored
 from rig.campaigns.multisine.plan import MultisinePlan
-from rig.campaigns.running.continuation import changed_keys, identities, numbered, what_is_left
+from rig.campaigns.running.continuation import changed_keys, identities, numbered, remaining
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import ConfigurationError
@@ -142,7 +142,7 @@ def test_what_is_done_is_what_was_accepted_and_is_asked_for(tmp_path_factory, ac
     qualities = [Quality.GOOD if good else Quality.REJECTED for good in accepted]
     points = [stored(made_point(quality=quality, number=number)) for number, quality in enumerate(qualities)]
     change = backbone(levels_v=tuple(level / 10 for level in levels))
-    left = what_is_left(recording(tmp_path_factory.getbasetemp(), (before, None), points=points), change)
+    left = remaining(recording(tmp_path_factory.getbasetemp(), (before, None), points=points), change)
     good = {level for level, ok in zip((0.1, 0.2, 0.3), accepted, strict=True) if ok}
     done = {change.targets()[place].level for place in left.done}
     assert done == good & set(change.levels)
@@ -151,7 +151,7 @@ def test_what_is_done_is_what_was_accepted_and_is_asked_for(tmp_path_factory, ac
 
 
 def test_the_plan_in_force_given_again_is_no_change(tmp_path):
-    left = what_is_left(recording(tmp_path, (backbone(), None)), backbone())
+    left = remaining(recording(tmp_path, (backbone(), None)), backbone())
     assert not left.changed
     assert left.information() == {}
 
@@ -171,7 +171,7 @@ OTHER_BENCH = backbone(bench="friction-beam", controller=preset("friction-beam")
 )
 def test_a_plan_that_cannot_follow_is_refused_in_one_line(tmp_path, change, message):
     with pytest.raises(ConfigurationError, match=message):
-        what_is_left(recording(tmp_path, (backbone(), None)), change, "mine.toml")
+        remaining(recording(tmp_path, (backbone(), None)), change, "mine.toml")
 
 
 def test_a_bench_file_of_the_same_bench_is_the_same_bench(tmp_path):
@@ -180,7 +180,7 @@ def test_a_bench_file_of_the_same_bench_is_the_same_bench(tmp_path):
     text = (resources.files("rig.bench") / "shipped" / "magnet-beam.toml").read_text(encoding="utf-8")
     (tmp_path / "mine.toml").write_text(text)
     change = backbone(bench="mine.toml", levels_v=(0.9,))
-    assert what_is_left(recording(tmp_path, (backbone(), None)), change, tmp_path / "plan.toml").changed
+    assert remaining(recording(tmp_path, (backbone(), None)), change, tmp_path / "plan.toml").changed
 
 
 def test_changed_keys_are_named_by_their_path():

@@ -9,9 +9,9 @@ import pytest
 
 from rig.bench import load_bench
 from rig.campaigns.evaluation.acceptance import settled_point
-from rig.campaigns.evaluation.passing import came_and_went
 from rig.campaigns.evaluation.rows import LongRows, Spool, mean_of, phases, std_of, stretches, turned_rad
 from rig.campaigns.evaluation.stored_point import stored
+from rig.campaigns.evaluation.transient_disturbance import has_transient_disturbance
 from rig.campaigns.evaluation.vibrations import frequency_scatter, recorded_vibration, within_periods
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.device_remarks import with_device_remarks
@@ -50,7 +50,7 @@ def spooled(n, folder):
 def evaluated(rows):
     vibration = recorded_vibration(BENCH, rows, PLAN.harmonics)
     point = settled_point(PLAN, TARGET, BENCH, vibration, rows)
-    assert not came_and_went(BENCH, rows)
+    assert not has_transient_disturbance(BENCH, rows)
     return with_device_remarks(point, rows, ())
 
 

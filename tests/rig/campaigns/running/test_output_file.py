@@ -3,7 +3,7 @@
 import pytest
 
 import rig
-from rig.campaigns.running.output_file import make_way, put_back
+from rig.campaigns.running.output_file import prepare_output, restore_backup
 from rig.errors import RecordingError
 from rig.recording.conversion import finalise
 from rig.recording.journal import JournalWriter, journal_path
@@ -27,17 +27,17 @@ def test_a_recording_that_was_moved_out_of_the_way_comes_back(killed, begun):
     output, good = killed
     if begun:
         JournalWriter.create(journal_path(output), header()).close()
-    assert "is back under its name" in put_back(output)
+    assert "is back under its name" in restore_backup(output)
     assert output.read_bytes() == good
     assert sorted(path.name for path in output.parent.iterdir()) == ["OUT.h5"]
-    assert put_back(output) == ""
+    assert restore_backup(output) == ""
 
 
 def test_a_journal_with_rows_has_taken_its_place_and_the_old_recording_goes_when_that_is_whole(killed):
     output, _ = killed
     with JournalWriter.create(journal_path(output), header(identity="another")) as writer:
         fill(writer, 0, 50)
-    assert put_back(output) == ""
+    assert restore_backup(output) == ""
     with Recording(output) as recording:
         assert recording.n_rows == 50
     assert (output.parent / "OUT.h5.vibrolock-before").exists()
@@ -59,4 +59,4 @@ def test_the_next_run_and_the_next_resumption_put_it_back_and_say_so(killed, mon
 
 def test_a_name_that_no_file_can_have_is_refused_in_one_line(tmp_path):
     with pytest.raises(RecordingError, match=r"cannot be used \(File name too long\)"):
-        make_way(tmp_path / ("a" * 300 + ".h5"), overwrite=False)
+        prepare_output(tmp_path / ("a" * 300 + ".h5"), overwrite=False)

@@ -15,7 +15,7 @@ import rig
 from controller import preset
 from rig.arming.run_options import RunOptions, Silent
 from rig.campaigns.backbone.plan import BackbonePlan
-from rig.campaigns.running.runner import carry_out
+from rig.campaigns.running.runner import run_plan
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, DaqDisconnected, RecordingError
 from rig.loop.loop import Loop
@@ -175,7 +175,7 @@ def test_a_force_that_the_voltage_limit_does_not_reach_is_marked_and_the_rest_go
     law = preset("magnet-beam").model_dump() | {"k3": 0.0, "k4": 10.0}
     plan = plan_with(levels_v=None, levels_n=(0.06, 0.56), controller=law)
     bench = bench_with({"limits": {"voltage_v": 1.0}})
-    with carry_out(plan, bench, tmp_path / "run.h5", RunOptions(seed=1)) as recording:
+    with run_plan(plan, bench, tmp_path / "run.h5", RunOptions(seed=1)) as recording:
         first, second = recording.points
     assert first["accepted"]
     assert first["force_n"] == pytest.approx(0.06, rel=0.01)
@@ -190,13 +190,13 @@ MISTAKEN = {"specimen": {"linear_frequency_hz": 29.0}}
 
 def test_a_window_that_does_not_hold_the_tested_mode_is_refused(tmp_path):
     with pytest.raises(ConfigurationError, match=r"linear_frequency_hz = 24\.37"):
-        carry_out(plan_with(controller=OFF_RESONANCE), bench_with(), tmp_path / "run.h5")
+        run_plan(plan_with(controller=OFF_RESONANCE), bench_with(), tmp_path / "run.h5")
 
 
 def test_a_start_outside_the_pull_in_range_gives_no_point(tmp_path):
     settle = SettleRule(longest_periods=80).model_dump()
     plan = plan_with(controller=OFF_RESONANCE, settle=settle)
-    with carry_out(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
+    with run_plan(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
         assert not recording.complete
         assert all(not point["settled"] and "frequency_hz" not in point for point in recording.points)
 
@@ -213,7 +213,7 @@ def test_a_sensor_that_reads_only_noise_gives_no_point(tmp_path, monkeypatch, ch
     monkeypatch.setattr(VirtualDAQ, "_exchange", dead)
     settle = SettleRule(longest_periods=100).model_dump()
     bench = bench_with({"block": 10})
-    with carry_out(plan_with(levels_v=(0.4,), settle=settle), bench, tmp_path / "run.h5") as recording:
+    with run_plan(plan_with(levels_v=(0.4,), settle=settle), bench, tmp_path / "run.h5") as recording:
         assert not recording.complete
         assert not any(point["accepted"] for point in recording.points)
         assert "frequency_hz" not in recording.points[0]
@@ -234,7 +234,7 @@ def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, m
     channels = [channel.model_dump() for channel in bench_with().channels]
     channels[1]["skew_samples"] = 2.0
     bench = bench_with({"channels": channels, "block": 10})
-    with carry_out(plan_with(), bench, tmp_path / "run.h5", RunOptions(seed=1)) as recording:
+    with run_plan(plan_with(), bench, tmp_path / "run.h5", RunOptions(seed=1)) as recording:
         points = {point["number"]: point for point in recording.points}
     _same_points(points, whole)
 
@@ -242,7 +242,7 @@ def test_skew_between_channels_is_taken_out_of_loop_and_points_alike(tmp_path, m
 @pytest.mark.parametrize("gains", [{"k1": 100.0, "k2": 600.0}, {"k1": 300.0, "k2": 600.0}])
 def test_a_loop_that_hunts_is_not_accepted(tmp_path, gains):
     law = preset("magnet-beam").model_dump() | gains
-    with carry_out(plan_with(levels_v=(0.3,), controller=law), bench_with(), tmp_path / "run.h5") as recording:
+    with run_plan(plan_with(levels_v=(0.3,), controller=law), bench_with(), tmp_path / "run.h5") as recording:
         assert not recording.complete
         assert not recording.points[0]["accepted"]
 
@@ -250,7 +250,7 @@ def test_a_loop_that_hunts_is_not_accepted(tmp_path, gains):
 def test_an_output_that_has_not_reached_its_level_does_not_settle(tmp_path):
     bench = bench_with({"limits": {"slew_v_per_s": 0.001}})
     settle = SettleRule(longest_periods=100).model_dump()
-    with carry_out(plan_with(levels_v=(2.0,), settle=settle), bench, tmp_path / "run.h5") as recording:
+    with run_plan(plan_with(levels_v=(2.0,), settle=settle), bench, tmp_path / "run.h5") as recording:
         assert not recording.points[0]["settled"]
 
 
@@ -260,7 +260,7 @@ def test_the_ramp_reaches_the_converter_before_the_run_ends(tmp_path, block, opt
     law = preset("magnet-beam").model_dump() | {"k1": 0.5, "k2": 0.5}
     settle = SettleRule(longest_periods=60).model_dump()
     plan = plan_with(levels_v=(1.0,), controller=law, settle=settle)
-    with carry_out(plan, bench_with({"block": block}, **options), tmp_path / "run.h5") as recording:
+    with run_plan(plan, bench_with({"block": block}, **options), tmp_path / "run.h5") as recording:
         assert np.abs(recording.parts[0].rows("command_v")).max() > 0.9
         assert recording.parts[0].rows("command_v")[-1] == 0.0
         assert recording.parts[0].rows("output_v")[-1] == 0.0
@@ -274,7 +274,7 @@ class _Fails(Silent):
 def test_a_failure_beside_the_loop_ramps_down_before_it_is_raised(tmp_path):
     output = tmp_path / "run.h5"
     with pytest.raises(KeyError, match="a bug"):
-        carry_out(plan_with(), bench_with(), output, RunOptions(progress=_Fails()))
+        run_plan(plan_with(), bench_with(), output, RunOptions(progress=_Fails()))
     with Recording(output) as recording:
         assert recording.parts[0].end["reason"] == "stop_requested"
         assert recording.parts[0].rows("command_v")[-1] == 0.0
@@ -292,7 +292,7 @@ class _FailsAtTheEnd(Silent):
 def test_a_failure_at_the_last_point_leaves_no_run_that_calls_itself_complete(tmp_path):
     output = tmp_path / "run.h5"
     with pytest.raises(KeyError, match="a bug"):
-        carry_out(plan_with(levels_v=(0.4,)), bench_with(), output, RunOptions(progress=_FailsAtTheEnd()))
+        run_plan(plan_with(levels_v=(0.4,)), bench_with(), output, RunOptions(progress=_FailsAtTheEnd()))
     with Recording(output) as recording:
         assert not recording.complete
 
@@ -300,7 +300,7 @@ def test_a_failure_at_the_last_point_leaves_no_run_that_calls_itself_complete(tm
 @pytest.mark.parametrize("before_the_end", [300, 1500])  # the last 205 samples are not evaluated
 def test_a_sensor_that_dies_shortly_before_the_end_of_a_record_spoils_the_point(tmp_path, monkeypatch, before_the_end):
     plan = plan_with(levels_v=(0.4,))
-    with carry_out(plan, bench_with({"block": 10}), tmp_path / "whole.h5", RunOptions(seed=1)) as recording:
+    with run_plan(plan, bench_with({"block": 10}), tmp_path / "whole.h5", RunOptions(seed=1)) as recording:
         end = recording.points[0]["end_sample"]
     exchange, noise, count = VirtualDAQ._exchange, np.random.default_rng(1), 0
 
@@ -313,7 +313,7 @@ def test_a_sensor_that_dies_shortly_before_the_end_of_a_record_spoils_the_point(
 
     monkeypatch.setattr("rig.loop.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", dying)
-    with carry_out(plan, bench_with({"block": 10}), tmp_path / "run.h5", RunOptions(seed=1)) as recording:
+    with run_plan(plan, bench_with({"block": 10}), tmp_path / "run.h5", RunOptions(seed=1)) as recording:
         assert not recording.complete
         assert not recording.points[0]["accepted"]
 
@@ -346,7 +346,7 @@ def test_a_reversed_sensor_gives_no_point_and_a_hint(tmp_path):
     channels[1]["sensitivity_v_per_unit"] *= -1
     settle = SettleRule(longest_periods=150).model_dump()
     plan = plan_with(levels_v=(0.4,), settle=settle)
-    with carry_out(plan, bench_with({"channels": channels}), tmp_path / "run.h5") as recording:
+    with run_plan(plan, bench_with({"channels": channels}), tmp_path / "run.h5") as recording:
         assert not recording.complete
         assert "polarity" in recording.points[0]["reason"]
 
@@ -354,14 +354,14 @@ def test_a_reversed_sensor_gives_no_point_and_a_hint(tmp_path):
 def test_a_plan_whose_loop_never_locks_ends_at_the_first_level(tmp_path):
     settle = SettleRule(longest_periods=80).model_dump()
     plan = plan_with(controller=OFF_RESONANCE, settle=settle, on_failure="stop")
-    with carry_out(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
+    with run_plan(plan, bench_with(MISTAKEN), tmp_path / "run.h5") as recording:
         assert recording.parts[0].end["reason"] == "no_lock_in_window"
         assert recording.points[0]["quality"] == "outside-window"
 
 
 def test_a_trip_ends_the_run_and_the_file_names_channel_value_and_sample(tmp_path):
     bench = bench_with({"limits": {"displacement_m": 1.0e-3}})
-    with carry_out(plan_with(), bench, tmp_path / "run.h5") as recording:
+    with run_plan(plan_with(), bench, tmp_path / "run.h5") as recording:
         end = recording.parts[0].end
         accepted = [point for point in recording.points if point["accepted"]]
     assert end["tripped"]
@@ -382,7 +382,7 @@ def test_a_device_that_disappears_ends_the_run_and_keeps_its_rows(tmp_path, monk
 
     monkeypatch.setattr("rig.loop.session.Loop", partial(Loop, fused=False))
     monkeypatch.setattr(VirtualDAQ, "_exchange", vanish)
-    with carry_out(plan_with(), bench_with(), tmp_path / "run.h5") as recording:
+    with run_plan(plan_with(), bench_with(), tmp_path / "run.h5") as recording:
         end = recording.parts[0].end
         assert end["reason"] == "driver_failed"
         assert "unplugged" in end["text"]

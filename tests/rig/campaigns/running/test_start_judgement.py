@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.arming.run_options import RunOptions
-from rig.campaigns.running.runner import _checked, carry_out
+from rig.campaigns.running.runner import _checked, run_plan
 from rig.campaigns.running.start_judgement import StartJudgement
 from rig.check.run import check
 from rig.emulator.emulated import emulated
@@ -37,7 +37,7 @@ def scale(tmp_path_factory):
 
 
 def run(tmp_path, levels, **options):
-    recording = carry_out(plan_for(levels), bench_for(levels), tmp_path / "run.h5", RunOptions(seed=3, **options))
+    recording = run_plan(plan_for(levels), bench_for(levels), tmp_path / "run.h5", RunOptions(seed=3, **options))
     with recording:
         return recording.parts[-1].end, np.abs(recording.parts[-1].rows("output_v")).max(), len(list(recording.points))
 
@@ -69,7 +69,7 @@ def test_a_sensor_of_another_scale_than_in_the_check_ends_the_run_at_the_start_v
 
 def test_half_of_the_scale_is_a_warning_of_every_point(tmp_path, monkeypatch, scale):
     rewire(monkeypatch, scaled("force", 2.0))
-    with carry_out(plan_for("m"), bench_for("m"), tmp_path / "run.h5", RunOptions(seed=3, check=scale)) as recording:
+    with run_plan(plan_for("m"), bench_for("m"), tmp_path / "run.h5", RunOptions(seed=3, check=scale)) as recording:
         points = list(recording.points)
     assert len(points) == 3
     assert all(any("channel force: " in line for line in point["warnings"]) for point in points)
@@ -124,7 +124,7 @@ def test_in_lockstep_behind_a_wire_the_same_rows_come_as_in_this_process(tmp_pat
     found = []
     with emulated(bench, "serial") as far:
         for number, one in enumerate((near, far)):
-            with carry_out(plan, one, tmp_path / f"{number}.h5", RunOptions(check=wrong)) as recording:
+            with run_plan(plan, one, tmp_path / f"{number}.h5", RunOptions(check=wrong)) as recording:
                 part = recording.parts[-1]
                 found.append((part.end["reason"], part.rows("command_v")))
     assert found[0][0] == found[1][0] == ("completed" if scaled_by == 1.0 else "start_refused")
@@ -147,7 +147,7 @@ def test_a_judgement_that_fails_ends_the_run_and_leaves_no_loop_waiting(tmp_path
 
     monkeypatch.setattr(StartJudgement, "refusal_of_rows", fail)
     with emulated(bench_for("m"), "serial") as far, pytest.raises(RuntimeError, match="for a test"):
-        carry_out(plan_for("m"), far, tmp_path / "run.h5", RunOptions())
+        run_plan(plan_for("m"), far, tmp_path / "run.h5", RunOptions())
 
 
 @pytest.mark.parametrize("with_check", [True, False])
@@ -157,7 +157,7 @@ def test_a_start_that_cannot_be_compared_with_the_check_says_so_and_the_first_po
     rewire(monkeypatch, scaled("force", 2.0))
     monkeypatch.setattr(StartJudgement, "refusal_of_rows", lambda judgement, rows: "")  # none can be evaluated
     options = RunOptions(seed=3, check=scale if with_check else None)
-    with carry_out(plan_for("m"), bench_for("m"), tmp_path / "run.h5", options) as recording:
+    with run_plan(plan_for("m"), bench_for("m"), tmp_path / "run.h5", options) as recording:
         points = list(recording.points)
         remarks = [event["text"] for event in recording.parts[0].events if event["what"] == "remark"]
     assert len(points) == 3

@@ -89,7 +89,7 @@ def test_a_loop_killed_before_it_is_started_or_before_its_rows_are_asked_for_is_
 
 
 def test_a_campaign_interrupted_while_the_loop_starts_leaves_nothing_driven(tmp_path, noting, monkeypatch):
-    monkeypatch.setattr(rig.loop.worker.session, "PATIENCE_S", 2.0 * LONG_S)  # after which it would be told to
+    monkeypatch.setattr(rig.loop.worker.session, "TIMEOUT_S", 2.0 * LONG_S)  # after which it would be told to
     log = tmp_path / "outputs"
     with WorkerSession(slow_bench(log=str(log))) as session:
         session.settle_queue()
@@ -232,4 +232,4 @@ def test_a_process_that_had_to_be_killed_is_said_at_the_end_of_the_session(monke
     session._bench, session._loop, session._worker = bench, None, worker
     with pytest.warns(RuntimeWarning, match="was killed; only the device's watchdog.*" + said):
         session.__exit__(None, None, None)
-    assert min(process.waited) >= rig.loop.worker.session.PATIENCE_S + bench.limits.ramp_down_s  # it may run unheard of
+    assert min(process.waited) >= rig.loop.worker.session.TIMEOUT_S + bench.limits.ramp_down_s  # it may run unheard of

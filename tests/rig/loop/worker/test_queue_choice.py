@@ -222,7 +222,7 @@ def test_a_session_measures_once_and_also_if_nobody_asked(made):
         assert daq.queue_blocks == 5
         lead = loop.tick.arrays.loop
         # block and queue; half a sample of hold, and the filters
-        assert lead["lead_whole"][0] == 60 + int(0.5 + daq.filter_delay_samples)
+        assert lead["delay_whole"][0] == 60 + int(0.5 + daq.filter_delay_samples)
         for _ in loop.run():
             pass
     with made() as daq:

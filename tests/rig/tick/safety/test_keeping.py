@@ -34,7 +34,7 @@ from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.tick import TickSettings
 from tests.reliability.faults.plans import bench_for, plan_for
 from tests.rig.rigs import bench_with
-from tests.rig.tick.safety.test_following import BLOCK, DRIVE_CHANNEL, FORCE_CHANNEL, Spoilt
+from tests.rig.tick.safety.test_response_plausibility import BLOCK, DRIVE_CHANNEL, FORCE_CHANNEL, Spoilt
 
 LAG = -0.5 * math.pi
 ON_BEAM = {"magnet-beam": (0.151, 15.7), "friction-beam": (1.96, 199.0)}
@@ -166,7 +166,7 @@ def test_a_sound_rig_stays_far_from_what_the_last_check_foretells_though_frictio
         loop = Loop(daq, settings.build(daq.latency_samples))
         assert all(True for _ in loop.run())
     assert EndReason(int(loop.tick.guard["reason"][0])) is EndReason.COMPLETED
-    assert loop.tick.arrays.following["kept"]["highest"][0] < 0.5 * FAR
+    assert loop.tick.arrays.plausibility["kept"]["highest"][0] < 0.5 * FAR
 
 
 def test_a_run_is_built_with_the_scale_of_the_last_check():

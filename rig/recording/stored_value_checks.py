@@ -28,7 +28,7 @@ class _Told(Protocol):
     end: End | None
 
 
-def check_told(part: _Told, where: str) -> None:
+def check_stored_values(part: _Told, where: str) -> None:
     """Check points, events, information and end of a part (`rig.recording.parts.Part`).
 
     Raises:

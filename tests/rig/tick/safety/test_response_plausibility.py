@@ -15,19 +15,19 @@ from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.loop.loop import Loop
 from rig.tick.safety.expected import expected_record
-from rig.tick.safety.following import (
-    ASTRAY_PERIODS,
-    CREEP,
-    FOLLOWING,
-    LARGEST_RISE,
-    begin_to_follow,
-    contradicts_exciter,
-    follow_level,
-    permitted_level,
-    see_frequency,
-)
 from rig.tick.safety.layout import EndReason
 from rig.tick.safety.limits import describe_end
+from rig.tick.safety.response_plausibility import (
+    CREEP,
+    LARGEST_RISE,
+    OUT_OF_BAND_PERIODS,
+    PLAUSIBILITY,
+    check_held_level,
+    contradicts_exciter,
+    permitted_level,
+    see_frequency,
+    set_reference,
+)
 from rig.tick.tick import TickSettings
 from tests.rig.rigs import bench_with
 
@@ -187,17 +187,17 @@ def test_a_sound_rig_never_comes_near_the_trip_past_force_drops_and_turning_poin
         )
         loop = Loop(daq, settings.build(daq.latency_samples))
         assert all(True for _ in loop.run())
-    following = loop.tick.arrays.following[0]
+    plausibility = loop.tick.arrays.plausibility[0]
     assert EndReason(int(loop.tick.guard["reason"][0])) is EndReason.COMPLETED
-    assert following["most_periods"] <= ASTRAY_PERIODS // 2
-    assert following["most_unlike_s"] < 0.5 / bench.specimen.linear_frequency_hz
+    assert plausibility["most_periods"] <= OUT_OF_BAND_PERIODS // 2
+    assert plausibility["most_unlike_s"] < 0.5 / bench.specimen.linear_frequency_hz
 
 
 def _fresh(plant=None, bench=None):
     expected = expected_record(bench or bench_with(), 0.001, 0.01, plant)[0]
-    following = np.zeros(1, FOLLOWING)[0]
-    begin_to_follow(expected, following, 1.0, 0.0, 0.0)
-    return expected, following
+    plausibility = np.zeros(1, PLAUSIBILITY)[0]
+    set_reference(expected, plausibility, 1.0, 0.0, 0.0)
+    return expected, plausibility
 
 
 @given(
@@ -210,18 +210,18 @@ def test_the_exciter_is_held_against_amplitudes_that_grow_and_turn(rate, turn, r
     omega, dt, gain = PLANT.frequency_rad_s, 2e-4, 1.0 - math.exp(-200.0 * 2e-4)
     s = complex(rate, omega + turn)
     alpha, beta = (complex(value) for value in PLANT.exciter(s))
-    expected, following = _fresh(PLANT)
-    see_frequency(expected, following, omega)
+    expected, plausibility = _fresh(PLANT)
+    see_frequency(expected, plausibility, omega)
     force, drive = 1.0 + 0.0j, 20.0 * ratio
     for step in range(1500):
         growth = cmath.exp((s - 1j * omega) * step * dt)
         # What a detector shows of an amplitude that grows at a rate is the amplitude behind its low-pass.
         shown = growth * gain / (1.0 - (1.0 - gain) * cmath.exp(-(s - 1j * omega) * dt))
         sent = growth * (alpha * force + beta * drive)
-        contradicts_exciter(expected, following, sent, shown * force, shown * drive, gain, dt)
+        contradicts_exciter(expected, plausibility, sent, shown * force, shown * drive, gain, dt)
     terms = max(abs(alpha * force), abs(beta * drive)) * abs(growth)
-    missed = complex(following["needed"]) - complex(following["late_sent"])
-    behind = complex(following["late_force"])  # of a force of 1 N: both filters, and the growth
+    missed = complex(plausibility["needed"]) - complex(plausibility["late_sent"])
+    behind = complex(plausibility["late_force"])  # of a force of 1 N: both filters, and the growth
     remainder = sum(_of_second_order(part, omega, s) * size for part, size in ((0, force), (1, drive)))
     assert abs(missed - remainder * behind) < 2e-3 * terms
 
@@ -235,33 +235,34 @@ def _of_second_order(part, omega, s):
 
 @given(factor=st.floats(2.0, 50.0), periods=st.integers(1, 40))
 def test_the_output_of_a_held_level_at_most_doubles_within_a_period(factor, periods):
-    expected, following = _fresh()
+    expected, plausibility = _fresh()
     amplitude = 1.0
     for _ in range(periods):
-        allowed = permitted_level(following, factor * amplitude)
+        allowed = permitted_level(plausibility, factor * amplitude)
         assert allowed <= LARGEST_RISE * max(amplitude, float(expected["floor_v"]))
         amplitude = allowed
-        assert not follow_level(
-            expected, following, _period(amplitude, amplitude, 10.0), amplitude, FORCE, False, False
+        assert not check_held_level(
+            expected, plausibility, _period(amplitude, amplitude, 10.0), amplitude, FORCE, False, False
         )
 
 
 @pytest.mark.parametrize("law", [FORCE, RESPONSE])
 def test_what_does_not_follow_goes_astray_after_the_stated_number_of_periods(law):
-    expected, following = _fresh()
-    assert not follow_level(expected, following, _period(1.0, 1.0, 1.0), 1.0, law, False, False)
+    expected, plausibility = _fresh()
+    assert not check_held_level(expected, plausibility, _period(1.0, 1.0, 1.0), 1.0, law, False, False)
     found = [
-        follow_level(expected, following, _period(1.6, 0.6, 0.6), 1.0, law, False, False) for _ in range(ASTRAY_PERIODS)
+        check_held_level(expected, plausibility, _period(1.6, 0.6, 0.6), 1.0, law, False, False)
+        for _ in range(OUT_OF_BAND_PERIODS)
     ]
-    assert found == [False] * (ASTRAY_PERIODS - 1) + [True]
+    assert found == [False] * (OUT_OF_BAND_PERIODS - 1) + [True]
 
 
 def test_a_force_that_drops_while_the_vibration_jumps_follows():
-    expected, following = _fresh()
-    assert not follow_level(expected, following, _period(1.0, 1.0, 1.0), 1.0, FORCE, False, True)
-    for step in range(3 * ASTRAY_PERIODS):
+    expected, plausibility = _fresh()
+    assert not check_held_level(expected, plausibility, _period(1.0, 1.0, 1.0), 1.0, FORCE, False, True)
+    for step in range(3 * OUT_OF_BAND_PERIODS):
         period = _period(1.0 + 0.02 * step, 0.3, 1.0 + 0.2 * step)
-        assert not follow_level(expected, following, period, 1.0, FORCE, False, True)
+        assert not check_held_level(expected, plausibility, period, 1.0, FORCE, False, True)
 
 
 FORCE_SOURCE = PlantModel(
@@ -296,12 +297,12 @@ def test_the_plant_that_is_told_wrongly_has_the_same_responses():
 
 def _contradicted(plant, hardened, amplifier=1.0):
     """Whether a force source on an oscillator that has hardened by this factor contradicts a plant; at phase resonance."""
-    expected, following = _fresh(plant)
+    expected, plausibility = _fresh(plant)
     omega = hardened * FORCE_SOURCE.frequency_rad_s
-    see_frequency(expected, following, omega)
+    see_frequency(expected, plausibility, omega)
     drive = 1j * omega / (2.0 * FORCE_SOURCE.damping_ratio * FORCE_SOURCE.frequency_rad_s)  # of 1 N, phi_d = 1
     sent = complex(0.5 / amplifier)
-    return any(contradicts_exciter(expected, following, sent, 1.0, drive, 0.05, 2e-4) for _ in range(3000))
+    return any(contradicts_exciter(expected, plausibility, sent, 1.0, drive, 0.05, 2e-4) for _ in range(3000))
 
 
 @pytest.mark.parametrize("hardened", [1.0, 1.005, 1.01])
@@ -319,7 +320,7 @@ def test_an_amplifier_of_another_gain_still_contradicts_it_where_the_structure_i
 
 
 def test_frequencies_outside_the_band_of_the_known_plant_are_not_judged():
-    expected, following = _fresh(PLANT)
-    see_frequency(expected, following, 2.0 * 2.0 * math.pi * PLANT.band_hz[1])
-    assert following["alpha"] == 0.0
-    assert not any(contradicts_exciter(expected, following, 1.0, 0.0, 0.0, 0.1, 1e-3) for _ in range(1000))
+    expected, plausibility = _fresh(PLANT)
+    see_frequency(expected, plausibility, 2.0 * 2.0 * math.pi * PLANT.band_hz[1])
+    assert plausibility["alpha"] == 0.0
+    assert not any(contradicts_exciter(expected, plausibility, 1.0, 0.0, 0.0, 0.1, 1e-3) for _ in range(1000))

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from rig.monitor import coming_down
-from rig.monitor.coming_down import ComingDown
+from rig.monitor import shutdown_monitor
+from rig.monitor.shutdown_monitor import ShutdownMonitor
 from rig.tick.safety.layout import GuardMode
 from tests.rig.monitor.scripted import Scripted
 
@@ -27,10 +27,10 @@ def followed(monkeypatch, tmp_path):
         clock = SimpleNamespace(monotonic=lambda: clock.now_s, now_s=1000.0)
         run = Held(limits={"ramp_down_s": ramp_s})
         run.step(GuardMode.RAMPING, voltage_v=0.25)
-        monkeypatch.setattr(coming_down, "time", clock)
-        monkeypatch.setattr(coming_down, "lives", lambda folder: True)
-        monkeypatch.setattr(ComingDown, "_open", lambda self: setattr(self, "_run", run if begun else None))
-        one = ComingDown(tmp_path, "stopped by a test", timeout_s)
+        monkeypatch.setattr(shutdown_monitor, "time", clock)
+        monkeypatch.setattr(shutdown_monitor, "lives", lambda folder: True)
+        monkeypatch.setattr(ShutdownMonitor, "_open", lambda self: setattr(self, "_run", run if begun else None))
+        one = ShutdownMonitor(tmp_path, "stopped by a test", timeout_s)
 
         def after(seconds):
             clock.now_s = 1000.0 + seconds
@@ -48,7 +48,7 @@ def test_a_run_has_its_own_ramp_and_ten_seconds_to_be_at_0_v(followed, ramp_s, l
     outcome = after(longest_s + 0.01)
     assert not outcome.at_0_v
     assert outcome.text.startswith(f"not at 0 V within {longest_s:.1f} s (guard ramping, 0.250 V, ")
-    assert outcome.text.endswith(coming_down.HARDWARE)
+    assert outcome.text.endswith(shutdown_monitor.HARDWARE)
 
 
 def test_a_run_that_has_not_begun_has_ten_seconds(followed):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rig.campaigns.evaluation.passing import came_and_went, was_refused_in_passing
 from rig.campaigns.evaluation.point import Quality
+from rig.campaigns.evaluation.transient_disturbance import has_transient_disturbance, refused_for_a_transient
 from rig.tick.layout import recorded_row
 from tests.rig.campaigns.made_points import made_point
 from tests.rig.rigs import bench_with
@@ -34,24 +34,24 @@ def ringing(at_s, size, frequency_hz=134.0, decay_per_s=10.0):
 
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 1.9])
 def test_a_knock_that_rings_down_within_the_record_has_come_and_gone(at_s):
-    assert came_and_went(BENCH, record(ringing(at_s, 0.3)))
+    assert has_transient_disturbance(BENCH, record(ringing(at_s, 0.3)))
 
 
 def test_noise_alone_a_lasting_mode_and_a_loop_that_swings_have_not():
-    assert not came_and_went(BENCH, record())
-    assert not came_and_went(BENCH, record(lambda t: 0.3 * np.sin(2.0 * np.pi * 134.06 * t)))
-    assert not came_and_went(BENCH, record(lambda t: 0.2 * np.sin(2.0 * np.pi * (FREQUENCY_HZ + 1.7) * t)))
+    assert not has_transient_disturbance(BENCH, record())
+    assert not has_transient_disturbance(BENCH, record(lambda t: 0.3 * np.sin(2.0 * np.pi * 134.06 * t)))
+    assert not has_transient_disturbance(BENCH, record(lambda t: 0.2 * np.sin(2.0 * np.pi * (FREQUENCY_HZ + 1.7) * t)))
 
 
 def test_a_record_of_a_few_periods_tells_nothing():
-    assert not came_and_went(BENCH, record(ringing(0.05, 0.3), periods=4))
-    assert not came_and_went(BENCH, record()[:0])
+    assert not has_transient_disturbance(BENCH, record(ringing(0.05, 0.3), periods=4))
+    assert not has_transient_disturbance(BENCH, record()[:0])
 
 
 def test_lost_samples_alone_are_no_knock():
     rows = record()
     rows["inputs"][3000:3040] = np.nan
-    assert not came_and_went(BENCH, rows)
+    assert not has_transient_disturbance(BENCH, rows)
 
 
 @pytest.mark.parametrize(
@@ -75,4 +75,4 @@ def test_only_refused_points_with_something_that_passes_are_worth_another_attemp
 ):
     rows = record(ringing(1.0, 0.3)) if knocked else record()
     point = made_point(quality=quality)
-    assert was_refused_in_passing(point, BENCH, rows, faults, steady) is again
+    assert refused_for_a_transient(point, BENCH, rows, faults, steady) is again

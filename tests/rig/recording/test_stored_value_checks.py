@@ -9,7 +9,7 @@ from rig.errors import RecordingError
 from rig.recording.hdf5_recording import write_recording
 from rig.recording.layout import new_file
 from rig.recording.reader import Recording
-from rig.recording.told_values import check_told
+from rig.recording.stored_value_checks import check_stored_values
 from tests.recorded import recorded
 
 COMMANDS = (
@@ -91,7 +91,7 @@ def part_of(**told):
 )
 def test_what_a_part_may_not_tell_is_named(told, message):
     with pytest.raises(RecordingError, match=f"x.h5: part 1: .*{message}"):
-        check_told(part_of(**told), "x.h5: part 1")
+        check_stored_values(part_of(**told), "x.h5: part 1")
 
 
 def test_numbers_that_are_none_and_an_unknown_event_are_told():
@@ -99,4 +99,4 @@ def test_numbers_that_are_none_and_an_unknown_event_are_told():
         "points": [{"force_purity": float("nan"), "misfit": float("inf")}],
         "events": [{"what": "of a later version"}],
     }
-    check_told(part_of(**told, end={"loop": None}), "x.h5: part 1")
+    check_stored_values(part_of(**told, end={"loop": None}), "x.h5: part 1")

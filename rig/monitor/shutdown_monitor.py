@@ -1,4 +1,4 @@
-"""A run on its way to 0 V: asked to stop from outside, and followed until its output is known to be there, or not to be."""
+"""Request a ramp-down of a run and poll until 0 V is confirmed or a timeout expires."""
 
 import math
 import time
@@ -25,8 +25,8 @@ class Outcome(NamedTuple):
     """In one line."""
 
 
-class ComingDown:
-    """Asks the run with this folder to ramp down, and looks what becomes of it. Holds files open until `close`.
+class ShutdownMonitor:
+    """Requests the ramp-down of the run in this folder and polls its outcome. Holds files open until `close`.
 
     ``timeout_s``: how long the output may take to be at 0 V; by default the run's own ramp and ten seconds.
     """

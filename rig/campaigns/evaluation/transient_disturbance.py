@@ -14,16 +14,16 @@ STANDS_OUT = (
 FEWEST_PERIODS = 4
 
 
-def was_refused_in_passing(point: Point[object], bench: Bench, rows: Rows, faults: int, steady: bool) -> bool:
+def refused_for_a_transient(point: Point[object], bench: Bench, rows: Rows, faults: int, steady: bool) -> bool:
     """Return whether a point was refused, but for something that passes, so that it is worth another attempt.
 
     That is a passing fault of the device (``faults``: samples with a held output, and lost ones, while the point was approached
     and recorded), or, in the ``rows`` of a ``steady`` vibration, a disturbance that came and went.
     """
-    return point.quality is Quality.REJECTED and (faults > 0 or (steady and came_and_went(bench, rows)))
+    return point.quality is Quality.REJECTED and (faults > 0 or (steady and has_transient_disturbance(bench, rows)))
 
 
-def came_and_went(bench: Bench, rows: Rows) -> bool:
+def has_transient_disturbance(bench: Bench, rows: Rows) -> bool:
     """Return whether force or drive changed from one period to the next far more somewhere than it usually did.
 
     The RMS of the difference between neighbouring periods, taken at equal phases, is that of the noise in a steady vibration,

@@ -1,9 +1,9 @@
-"""Compiled check whether force and motion follow the output.
+"""Compiled plausibility check of the response: whether force and motion follow the output.
 
 There are two checks. A linear exciter obeys ``u = alpha(s) F + beta(s) A`` whatever the structure does. If alpha and beta are
 known, the fundamentals of every sample are compared with this equation (`contradicts_exciter`). In any case the output that
 last sufficed serves as reference: a law that holds a force or a response may not raise its output beyond `LARGEST_RISE` times
-this reference while the held quantity does not follow (`follow_level`).
+this reference while the held quantity does not follow (`check_held_level`).
 """
 
 import math
@@ -17,9 +17,9 @@ from vibrolock.compiled import Record, kernel
 
 LARGEST_RISE = 2.0  # largest output over the output that last sufficed; this also bounds the rise within one period
 CREEP = 1.05  # a period: largest rise of the reference output while the held quantity stays at its level
-ASTRAY_RISE = 1.5  # rise of the output from which a held quantity that does not follow counts as astray
-ASTRAY_PART = 0.5  # of its reference; a held quantity below it is astray from a rise of RISEN on
-ASTRAY_PERIODS = 10
+OUT_OF_BAND_RISE = 1.5  # rise of the output from which a held quantity that does not follow counts as astray
+OUT_OF_BAND_PART = 0.5  # of its reference; a held quantity below it is astray from a rise of RISEN on
+OUT_OF_BAND_PERIODS = 10
 RISEN = 1.2  # rise from which the output counts as risen; a force that sags during build-up needs no more output
 IN_ORDER = 0.9  # of its level; a held quantity above it follows
 SAGGED = 0.75  # of its level; a force may sag to it while the vibration builds up
@@ -70,7 +70,7 @@ amplitudes below which the exciter is not judged. ``visible_``: amplitudes above
 from noise. ``floor_v``: output that is always allowed. ``_skew_s``: delays of the two channels. ``checked_``: force (N) and
 motion (m/s^2) per volt at resonance in the last check, 0 if unknown."""
 
-FOLLOWING = np.dtype(
+PLAUSIBILITY = np.dtype(
     [
         ("alpha", "c16"),
         ("beta", "c16"),
@@ -90,7 +90,7 @@ FOLLOWING = np.dtype(
         ("reference_v", "f8"),
         ("reference_level", "f8"),
         ("reference_other", "f8"),
-        ("astray_periods", "i8"),
+        ("out_of_band_periods", "i8"),
         ("largest_rise", "f8"),
         ("most_periods", "i8"),
         ("kept", KEPT),
@@ -104,9 +104,9 @@ force and per motion. ``sent``: complex output after the detector's low-pass; ``
 same low-pass once more; ``needed``: output that the known exciter needs for force and motion. ``unlike_s``: present
 uninterrupted time in which ``late_sent`` and ``needed`` contradict each other; ``most_unlike_s``: the longest such time.
 ``silent_periods``: periods in a row in which either force or motion showed nothing while the other was large. ``reference_``:
-output (V), held quantity, and the other of force and motion, when the held quantity last followed. ``astray_periods``: count of
-periods since then in which the held quantity did not follow; ``most_periods``: the highest count so far; ``largest_rise``: the
-largest ratio of output to reference output in these periods. ``kept``: state of `rig.tick.safety.keeping`."""
+output (V), held quantity, and the other of force and motion, when the held quantity last followed. ``out_of_band_periods``:
+count of periods since then in which the held quantity did not follow; ``most_periods``: the highest count so far;
+``largest_rise``: the largest ratio of output to reference output in these periods. ``kept``: state of `rig.tick.safety.keeping`."""
 
 
 @kernel
@@ -117,16 +117,16 @@ def polynomial(coefficients: np.ndarray, z: complex) -> tuple[complex, complex]:
 
 
 @kernel
-def see_frequency(expected: Record, following: Record, omega: float) -> None:
+def see_frequency(expected: Record, plausibility: Record, omega: float) -> None:
     """Evaluate the known exciter at the present frequency (rad/s), once a period; set it to zero outside its range.
 
     Alpha and beta are individually known (``told``) within the exciter's band. Within `WIDE` times the band they can still show
     an amplifier of another gain. ``alpha``, ``beta`` and their derivatives by s come from polynomials in ``z = s/centre``; the
     polynomial of beta is divided by z^2.
     """
-    following.alpha = following.beta = following.alpha_rate = following.beta_rate = 0.0
-    following.force_doubt = following.drive_doubt = 0.0
-    following.told = 1 if expected.lowest_rad_s <= omega <= expected.highest_rad_s else 0
+    plausibility.alpha = plausibility.beta = plausibility.alpha_rate = plausibility.beta_rate = 0.0
+    plausibility.force_doubt = plausibility.drive_doubt = 0.0
+    plausibility.told = 1 if expected.lowest_rad_s <= omega <= expected.highest_rad_s else 0
     middle, half = (
         0.5 * (expected.lowest_rad_s + expected.highest_rad_s),
         0.5 * (expected.highest_rad_s - expected.lowest_rad_s),
@@ -139,12 +139,12 @@ def see_frequency(expected: Record, following: Record, omega: float) -> None:
     of_drive = complex(math.cos(drive_turn), math.sin(drive_turn))
     alpha, alpha_slope = polynomial(expected.force_v_n, z)
     beta, beta_slope = polynomial(expected.acceleration_v_s2_m, z)
-    following.alpha = alpha * of_force
-    following.beta = beta / (z * z) * of_drive
-    following.alpha_rate = alpha_slope / expected.centre_rad_s * of_force
-    following.beta_rate = (beta_slope - 2.0 * beta / z) / (z * z) / expected.centre_rad_s * of_drive
-    following.force_doubt = expected.force_v_n_std * of_force
-    following.drive_doubt = expected.force_v_n_std * of_drive / accelerance(expected, omega)
+    plausibility.alpha = alpha * of_force
+    plausibility.beta = beta / (z * z) * of_drive
+    plausibility.alpha_rate = alpha_slope / expected.centre_rad_s * of_force
+    plausibility.beta_rate = (beta_slope - 2.0 * beta / z) / (z * z) / expected.centre_rad_s * of_drive
+    plausibility.force_doubt = expected.force_v_n_std * of_force
+    plausibility.drive_doubt = expected.force_v_n_std * of_drive / accelerance(expected, omega)
 
 
 @kernel
@@ -158,7 +158,7 @@ def accelerance(expected: Record, omega: float) -> complex:
 
 @kernel
 def contradicts_exciter(
-    expected: Record, following: Record, sent: complex, force: complex, drive: complex, gain: float, dt_s: float
+    expected: Record, plausibility: Record, sent: complex, force: complex, drive: complex, gain: float, dt_s: float
 ) -> bool:
     """Return whether force and motion have contradicted the output, by the known exciter, for `UNLIKE_PERIODS`; once a sample.
 
@@ -170,28 +170,30 @@ def contradicts_exciter(
     with all these exciters, for x up to `DOUBTED` standard errors of alpha: what was not identified contradicts nothing. On the
     linear structure, where ``A = Y F``, they all need the same output.
     """
-    following.sent += gain * (sent - following.sent)
-    following.late_sent += gain * (following.sent - following.late_sent)
-    force_step, drive_step = gain * (force - following.late_force), gain * (drive - following.late_drive)
-    following.late_force += force_step
-    following.late_drive += drive_step
-    for_force, for_motion = following.alpha * following.late_force, following.beta * following.late_drive
-    for_change = (following.alpha_rate * force_step + following.beta_rate * drive_step) / dt_s
-    following.needed = for_force + for_motion + for_change
-    most = max(size(following.late_sent), size(for_force), size(for_motion), size(for_change))
-    noise = size(following.alpha) * expected.noise_n + size(following.beta) * expected.noise_m_s2
-    doubt = DOUBTED * size(following.drive_doubt * following.late_drive - following.force_doubt * following.late_force)
-    too_strong = size(following.needed) - doubt > max(TOO_STRONG * size(following.late_sent), noise)
-    apart = size(following.late_sent - following.needed) - doubt
-    unlike = following.told == 1 and most > noise and apart > UNLIKE * most
+    plausibility.sent += gain * (sent - plausibility.sent)
+    plausibility.late_sent += gain * (plausibility.sent - plausibility.late_sent)
+    force_step, drive_step = gain * (force - plausibility.late_force), gain * (drive - plausibility.late_drive)
+    plausibility.late_force += force_step
+    plausibility.late_drive += drive_step
+    for_force, for_motion = plausibility.alpha * plausibility.late_force, plausibility.beta * plausibility.late_drive
+    for_change = (plausibility.alpha_rate * force_step + plausibility.beta_rate * drive_step) / dt_s
+    plausibility.needed = for_force + for_motion + for_change
+    most = max(size(plausibility.late_sent), size(for_force), size(for_motion), size(for_change))
+    noise = size(plausibility.alpha) * expected.noise_n + size(plausibility.beta) * expected.noise_m_s2
+    doubt = DOUBTED * size(
+        plausibility.drive_doubt * plausibility.late_drive - plausibility.force_doubt * plausibility.late_force
+    )
+    too_strong = size(plausibility.needed) - doubt > max(TOO_STRONG * size(plausibility.late_sent), noise)
+    apart = size(plausibility.late_sent - plausibility.needed) - doubt
+    unlike = plausibility.told == 1 and most > noise and apart > UNLIKE * most
     unlike = noise > 0.0 and (unlike or too_strong)
-    following.unlike_s = following.unlike_s + dt_s if unlike else 0.0
-    following.most_unlike_s = max(following.most_unlike_s, following.unlike_s)
-    return bool(following.unlike_s > UNLIKE_PERIODS * TWO_PI / expected.centre_rad_s)
+    plausibility.unlike_s = plausibility.unlike_s + dt_s if unlike else 0.0
+    plausibility.most_unlike_s = max(plausibility.most_unlike_s, plausibility.unlike_s)
+    return bool(plausibility.unlike_s > UNLIKE_PERIODS * TWO_PI / expected.centre_rad_s)
 
 
 @kernel
-def silent_side(expected: Record, following: Record, force: float, response: float) -> int:
+def silent_side(expected: Record, plausibility: Record, force: float, response: float) -> int:
     """Return 1 if the force (N), 2 if the motion (m/s^2) has shown nothing for `SILENT_PERIODS`, else 0.
 
     Called once a period while no lock was ever gained. The other signal must be clearly visible, because a level may be too
@@ -199,30 +201,30 @@ def silent_side(expected: Record, following: Record, force: float, response: flo
     """
     no_force = force < expected.visible_n / VISIBLE and response > VISIBLE * expected.visible_m_s2
     no_motion = response < expected.visible_m_s2 / VISIBLE and force > VISIBLE * expected.visible_n
-    following.silent_periods = following.silent_periods + 1 if no_force or no_motion else 0
-    return 0 if following.silent_periods < SILENT_PERIODS else 1 if no_force else 2
+    plausibility.silent_periods = plausibility.silent_periods + 1 if no_force or no_motion else 0
+    return 0 if plausibility.silent_periods < SILENT_PERIODS else 1 if no_force else 2
 
 
 @kernel
-def begin_to_follow(expected: Record, following: Record, amplitude_v: float, level: float, other: float) -> None:
+def set_reference(expected: Record, plausibility: Record, amplitude_v: float, level: float, other: float) -> None:
     """Take the present output (V), held quantity and other quantity as the reference of the supervision."""
-    following.reference_v = max(amplitude_v, expected.floor_v)
-    following.reference_level = level
-    following.reference_other = other
-    following.astray_periods = 0
+    plausibility.reference_v = max(amplitude_v, expected.floor_v)
+    plausibility.reference_level = level
+    plausibility.reference_other = other
+    plausibility.out_of_band_periods = 0
 
 
 @kernel
-def follow_level(
+def check_held_level(
     expected: Record,
-    following: Record,
+    plausibility: Record,
     period: Record,
     wanted: float,
     law: int,
     slipping: bool,
     may_jump: bool,
 ) -> bool:
-    """Check once a period whether the held quantity follows the output; return whether it was astray for `ASTRAY_PERIODS`.
+    """Check once a period whether the held quantity follows the output; return whether it was astray for `OUT_OF_BAND_PERIODS`.
 
     ``period`` (of `controller.period.PERIOD`) gives the output, the fundamentals and the held quantity, which should be
     ``wanted`` (N or m). The reference is the last state in which the held quantity followed. ``slipping``: the lock is about to
@@ -243,42 +245,46 @@ def follow_level(
     smallest = expected.visible_m_s2 if law == RESPONSE else min(expected.visible_n, IN_ORDER * wanted)
     other = force if law == RESPONSE else response
     visible = (response if law == RESPONSE else force) >= smallest
-    rise = amplitude_v / following.reference_v
+    rise = amplitude_v / plausibility.reference_v
     too_much = held > TOO_MUCH * wanted
-    moves_more = law != RESPONSE and other > JUMPED * following.reference_other * max(rise, 1.0)
+    moves_more = law != RESPONSE and other > JUMPED * plausibility.reference_other * max(rise, 1.0)
     if visible and not slipping:
         jumped = may_jump and moves_more and held >= VANISHED * wanted
         building_up = law != RESPONSE and too_much and held < FAR * wanted
-        building_up = building_up and other >= GROWN * following.reference_other
-        if jumped or building_up or GROWN * following.reference_level <= held <= GROWN * wanted:
-            begin_to_follow(expected, following, amplitude_v, min(held, wanted), other)
+        building_up = building_up and other >= GROWN * plausibility.reference_other
+        if jumped or building_up or GROWN * plausibility.reference_level <= held <= GROWN * wanted:
+            set_reference(expected, plausibility, amplitude_v, min(held, wanted), other)
             return False
         if moves_more and SAGGED * wanted <= held < IN_ORDER * wanted:
-            following.reference_v = min(amplitude_v, CREEP * following.reference_v)
-            following.astray_periods = 0
+            plausibility.reference_v = min(amplitude_v, CREEP * plausibility.reference_v)
+            plausibility.out_of_band_periods = 0
             return False
         if held >= IN_ORDER * wanted and not too_much:
-            begin_to_follow(expected, following, min(amplitude_v, CREEP * following.reference_v), held, other)
+            set_reference(expected, plausibility, min(amplitude_v, CREEP * plausibility.reference_v), held, other)
             return False
-    fallen = following.reference_level > 0.0 and held < ASTRAY_PART * following.reference_level and not moves_more
-    if rise >= ASTRAY_RISE or (rise >= RISEN and (fallen or (visible and too_much))):
-        following.astray_periods += 1
-        following.largest_rise = max(following.largest_rise, rise)
-        following.most_periods = max(following.most_periods, following.astray_periods)
+    fallen = (
+        plausibility.reference_level > 0.0 and held < OUT_OF_BAND_PART * plausibility.reference_level and not moves_more
+    )
+    if rise >= OUT_OF_BAND_RISE or (rise >= RISEN and (fallen or (visible and too_much))):
+        plausibility.out_of_band_periods += 1
+        plausibility.largest_rise = max(plausibility.largest_rise, rise)
+        plausibility.most_periods = max(plausibility.most_periods, plausibility.out_of_band_periods)
     else:
-        following.astray_periods = max(following.astray_periods - 1, 0)
-    return bool(following.astray_periods >= ASTRAY_PERIODS)
+        plausibility.out_of_band_periods = max(plausibility.out_of_band_periods - 1, 0)
+    return bool(plausibility.out_of_band_periods >= OUT_OF_BAND_PERIODS)
 
 
 @kernel
-def forget_output(following: Record) -> None:
+def reset_output(plausibility: Record) -> None:
     """Forget outputs, forces and motions of before: while the output was silent they were not compared."""
-    following.sent = following.late_sent = following.late_force = following.late_drive = following.needed = 0.0
-    following.unlike_s = 0.0
-    following.silent_periods = 0
+    plausibility.sent = plausibility.late_sent = plausibility.late_force = plausibility.late_drive = (
+        plausibility.needed
+    ) = 0.0
+    plausibility.unlike_s = 0.0
+    plausibility.silent_periods = 0
 
 
 @kernel
-def permitted_level(following: Record, demanded_v: float) -> float:
+def permitted_level(plausibility: Record, demanded_v: float) -> float:
     """Return the output amplitude (V), limited to `LARGEST_RISE` times the reference, that a law holding a level may use."""
-    return float(min(demanded_v, LARGEST_RISE * following.reference_v))
+    return float(min(demanded_v, LARGEST_RISE * plausibility.reference_v))
