@@ -19,7 +19,6 @@ from identification import (
 )
 from identification.experiments.simulators import Simulator
 from identification.packing import pack_all, unpack_all
-from identification.experiments.simulators import Simulator
 from rig.results.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result

@@ -106,7 +106,8 @@ uninterrupted time in which ``late_sent`` and ``needed`` contradict each other; 
 ``silent_periods``: periods in a row in which either force or motion showed nothing while the other was large. ``reference_``:
 output (V), held quantity, and the other of force and motion, when the held quantity last followed. ``out_of_band_periods``:
 count of periods since then in which the held quantity did not follow; ``most_periods``: the highest count so far;
-``largest_rise``: the largest ratio of output to reference output in these periods. ``kept``: state of `rig.tick.safety.keeping`."""
+``largest_rise``: the largest ratio of output to reference output in these periods. ``kept``: state of
+`rig.tick.safety.keeping`."""
 
 
 @kernel
