@@ -29,10 +29,11 @@ class Tick:
 
     ``loop_delay_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the
     device's latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is
-    known, the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's. ``per_volt``:
-    force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts. A record that is
-    refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the output at 0 V. With
-    ``start_judged`` a start segment lasts until `release_start`, so that a caller can judge the vibration there.
+    known, the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's.
+    ``per_volt``: force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts. A
+    record that is refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the
+    output at 0 V. With ``start_judged`` a start segment lasts until `release_start`, so that a caller can judge the vibration
+    there.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """
