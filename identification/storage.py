@@ -1,0 +1,279 @@
+"""Store results: dataclasses to arrays by name and JSON attributes, and back. Every stored type passes here.
+
+``encode(result)`` returns arrays and attributes; ``decode(Kind, arrays, attributes)`` builds the result again from its type
+hints. A kind of file needs no code of its own: ``pack=encode``, ``unpack=partial(decode, Kind)``.
+
+Layout, by what a field holds:
+
+==================================  =========================================================================
+array                               the array ``field``
+number, text, tuple, enum, mapping  the attribute ``field``, as JSON has it
+dataclass                           arrays ``field/...``, and its other fields as the attribute ``field``
+tuple of dataclasses or arrays      arrays ``field_0/...``, ``field_1/...``; the attribute ``field``, a list
+None                                no array; the attribute is left out if None is the default
+==================================  =========================================================================
+
+A field that a file lacks takes its default, so a new field with a default needs nothing to read older files. Where a type is
+stored otherwise, or was in earlier files, it declares a `Layout` by ``@stored(...)``.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from enum import Enum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import IdentificationError
+
+Arrays = Mapping[str, NDArray[Any]]
+Attributes = Mapping[str, Any]
+T = TypeVar("T")
+
+_ABSENT = object()
+"""Stands for an attribute that a file lacks."""
+
+
+class Stored(NamedTuple):
+    """What a file holds of a result."""
+
+    arrays: dict[str, NDArray[Any]]
+    attributes: dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """How a type is stored where it departs from the rules of the module.
+
+    Parameters
+    ----------
+    inline
+        Array fields that are stored as lists among the attributes.
+    as_arrays
+        Number fields that are stored as arrays.
+    groups
+        Names of numbered groups by field, where they differ from the field's.
+    shared
+        Fields by the part that also has them: not stored while that part is not None.
+    kinds
+        Concrete types of an abstract one, by the text in their class attribute ``kind``.
+    upgrade
+        Changes arrays and attributes of earlier files, in place, to those of today.
+    """
+
+    inline: tuple[str, ...] = ()
+    as_arrays: tuple[str, ...] = ()
+    groups: Mapping[str, str] = field(default_factory=dict)
+    shared: Mapping[str, str] = field(default_factory=dict)
+    kinds: Callable[[], Mapping[str, type]] | None = None
+    upgrade: Callable[[dict[str, NDArray[Any]], dict[str, Any]], None] | None = None
+
+
+def stored(**layout: Any) -> Callable[[type[T]], type[T]]:
+    """Declare the `Layout` of a dataclass and of those that inherit from it."""
+
+    def declare(kind: type[T]) -> type[T]:
+        kind._layout = Layout(**layout)  # type: ignore[attr-defined]
+        return kind
+
+    return declare
+
+
+def encode(result: Any) -> Stored:
+    """Return arrays and JSON attributes of a dataclass."""
+    layout = _layout_of(type(result))
+    found = Stored({}, {} if layout.kinds is None else {"kind": result.kind})
+    for one in _fields(type(result)):
+        name, value = one.name, getattr(result, one.name)
+        shared = layout.shared.get(name)
+        if (value is None and one.default is None) or (shared and getattr(result, shared) is not None):
+            continue
+        if name in layout.inline:
+            value = np.asarray(value).tolist()
+        elif name in layout.as_arrays:
+            value = np.asarray(value)
+        attribute = _encoded(value, name, layout.groups.get(name, name), found.arrays)
+        if attribute is not _ABSENT:
+            found.attributes[name] = attribute
+    return found
+
+
+def decode(kind: type[T], arrays: Arrays, attributes: Attributes) -> T:
+    """Invert `encode`.
+
+    Raises
+    ------
+    IdentificationError
+        If a field is missing, unknown or ill-shaped.
+    """
+    layout = _layout_of(kind)
+    if not isinstance(attributes, Mapping):
+        raise IdentificationError(f"{_label(kind)}: is {attributes!r}, needs a mapping of fields")
+    held, told = dict(arrays), dict(attributes)
+    if layout.kinds is not None:
+        kind = _concrete(kind, layout.kinds(), told.pop("kind", None))
+    if layout.upgrade is not None:
+        layout.upgrade(held, told)
+    hints, known = _hints(kind), _fields(kind)
+    if unknown := next((name for name in told if name not in hints), None):
+        raise IdentificationError(f"{_label(kind)}: {unknown!r} is missing or unknown")
+    values: dict[str, Any] = {}
+    for one in known:
+        name = one.name
+        found = _decoded(hints[name], name, layout.groups.get(name, name), held, told.get(name, _ABSENT), kind)
+        if found is not _ABSENT:
+            values[name] = found
+    for name, part in layout.shared.items():
+        if values.get(part) is not None:
+            values[name] = getattr(values[part], name)
+    for one in known:
+        if one.name not in values and one.default is MISSING and one.default_factory is MISSING:
+            raise IdentificationError(f"{_label(kind)}: {one.name!r} is missing or unknown")
+    try:
+        return kind(**values)
+    except IdentificationError:
+        raise
+    except (TypeError, ValueError, AttributeError, LookupError) as error:
+        raise IdentificationError(f"{_label(kind)}: does not fit ({error})") from None
+
+
+def _encoded(value: Any, name: str, group: str, arrays: dict[str, NDArray[Any]]) -> Any:
+    """Return the attribute of a value, `_ABSENT` if it is an array; add its arrays."""
+    if isinstance(value, np.ndarray):
+        arrays[name] = value
+        return _ABSENT
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, np.generic):
+        return value.item()
+    if is_dataclass(value):
+        inside = encode(value)
+        arrays.update({f"{group}/{key}": array for key, array in inside.arrays.items()})
+        return inside.attributes
+    if isinstance(value, Mapping):
+        items = {key: _encoded(item, f"{name}/{key}", f"{group}/{key}", arrays) for key, item in value.items()}
+        return {key: None if item is _ABSENT else item for key, item in items.items()}
+    if isinstance(value, (tuple, list)):
+        listed = [_encoded(item, f"{group}_{i}", f"{group}_{i}", arrays) for i, item in enumerate(value)]
+        return [None if item is _ABSENT else item for item in listed]
+    return value
+
+
+def _decoded(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: type) -> Any:
+    """Return the value of a field; `_ABSENT` if the file does not have it."""
+    options = [option for option in get_args(hint) if option is not NoneType] if _is_union(hint) else [hint]
+    optional = _is_union(hint) and NoneType in get_args(hint)
+    if not _structured(hint):
+        if name in arrays:
+            attribute = np.asarray(arrays[name]).tolist()
+        return attribute if attribute is _ABSENT else _plain(hint, attribute, name, owner)
+    hint = options[0]
+    if _is_array(hint):
+        return _array(name, arrays, attribute, optional)
+    if get_origin(hint) is not None:
+        return _several(hint, name, group, arrays, attribute, owner)
+    if optional and isinstance(attribute, list):  # earlier files: none or one in a list
+        return decode(hint, _inside(arrays, f"{group}_0"), attribute[0]) if attribute else None
+    inside = _inside(arrays, group)
+    if attribute is None and optional:
+        return None
+    if attribute is _ABSENT and not inside:
+        return _ABSENT
+    return decode(hint, inside, {} if attribute is _ABSENT else attribute)
+
+
+def _array(name: str, arrays: Arrays, attribute: Any, optional: bool) -> Any:
+    if name in arrays:
+        return np.asarray(arrays[name])
+    if attribute is _ABSENT or (attribute is None and optional):
+        return attribute
+    return np.asarray(attribute)
+
+
+def _several(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: type) -> Any:
+    """Return a tuple or a mapping of dataclasses or arrays."""
+    if attribute is _ABSENT:
+        return attribute
+    inner = get_args(hint)
+    if issubclass(get_origin(hint), Mapping):
+        if not isinstance(attribute, Mapping):
+            raise _misfit(owner, name, attribute)
+        heads = {key: f"{group}/{key}" for key in attribute}
+        return {key: _decoded(inner[1], heads[key], heads[key], arrays, attribute[key], owner) for key in attribute}
+    if not isinstance(attribute, (list, tuple)):
+        raise _misfit(owner, name, attribute)
+    return tuple(
+        _decoded(inner[0], f"{group}_{i}", f"{group}_{i}", arrays, item, owner) for i, item in enumerate(attribute)
+    )
+
+
+def _plain(hint: Any, value: Any, name: str, owner: type) -> Any:
+    """Return numbers, texts, tuples and enums as the field's type has them."""
+    from pydantic import ValidationError  # only on use: it takes long to load
+
+    try:
+        return _adapter(hint).validate_python(value)
+    except ValidationError:
+        raise _misfit(owner, name, value) from None
+
+
+def _misfit(owner: type, name: str, value: Any) -> IdentificationError:
+    return IdentificationError(f"{_label(owner)}: {name} is {value!r}, which does not fit")
+
+
+def _concrete(kind: type[T], kinds: Mapping[str, type], named: Any) -> type[T]:
+    if named not in kinds:
+        raise IdentificationError(f"{_label(kind)}: kind is {named!r}, allowed are {', '.join(kinds)}")
+    return kinds[named]
+
+
+def _label(kind: type) -> str:
+    """Return the name of a class as words."""
+    words = "".join(f" {letter}" if letter.isupper() else letter for letter in kind.__name__).split()
+    return " ".join("PNLSS" if word == "Pnlss" else word.lower() for word in words)
+
+
+def _inside(arrays: Arrays, group: str) -> dict[str, NDArray[Any]]:
+    head = f"{group}/"
+    return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}
+
+
+def _layout_of(kind: type) -> Layout:
+    layout: Layout = getattr(kind, "_layout", _PLAIN)
+    return layout
+
+
+_PLAIN = Layout()
+"""Layout of a type that declares none."""
+
+
+def _fields(kind: type) -> tuple[Field[Any], ...]:
+    return tuple(one for one in fields(kind) if one.init)
+
+
+def _hints(kind: type) -> dict[str, Any]:
+    hints = get_type_hints(kind)
+    return {one.name: hints[one.name] for one in _fields(kind)}
+
+
+@cache
+def _adapter(hint: Any) -> Any:
+    from pydantic import TypeAdapter  # only on use: it takes long to load
+
+    return TypeAdapter(hint)
+
+
+def _is_union(hint: Any) -> bool:
+    return get_origin(hint) in (Union, UnionType)
+
+
+def _is_array(hint: Any) -> bool:
+    return hint is np.ndarray or get_origin(hint) is np.ndarray
+
+
+def _structured(hint: Any) -> bool:
+    """Return whether values of a type are, or contain, dataclasses or arrays."""
+    return _is_array(hint) or is_dataclass(hint) or any(map(_structured, get_args(hint)))
