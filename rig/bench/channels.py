@@ -164,3 +164,8 @@ class Channel(Configured):
     def range_in_unit(self) -> float:
         """Largest reading in the physical unit."""
         return self.range_v / abs(self.sensitivity_v_per_unit)
+
+    @property
+    def resolution_in_unit(self) -> float:
+        """Step of the converter in the physical unit."""
+        return self.resolution_v / abs(self.sensitivity_v_per_unit)

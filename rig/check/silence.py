@@ -56,12 +56,12 @@ def _of_channel(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
 
 def floor(channel: Channel) -> float:
     """RMS that the bench expects of a channel at rest, from its declared noise and the converter's steps, in its unit."""
-    bit = channel.resolution_v / abs(channel.sensitivity_v_per_unit)
+    bit = channel.resolution_in_unit
     return math.hypot(channel.noise_rms, bit / math.sqrt(12.0))
 
 
 def _noise(channel: Channel, values: Float) -> Finding:
-    bit = channel.resolution_v / abs(channel.sensitivity_v_per_unit)
+    bit = channel.resolution_in_unit
     found, expected = float(values.std()), floor(channel)
     if np.ptp(values) < 0.5 * bit:
         if channel.noise_rms < 0.5 * bit:

@@ -18,6 +18,7 @@ from identification import (
     best_linear_approximation,
 )
 from rig.bench import Bench
+from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
 from rig.measurements import spectra
@@ -226,8 +227,7 @@ def _plant(found: _Found, bench: Bench, plant: PlantModel, ratios: Mapping[str, 
 
 
 def _ratios(plan: Plan, bench: Bench) -> Mapping[str, float]:
-    ratios = getattr(plan, "ratios_to_drive", None)
-    return bench.response_ratios if ratios is None else ratios(bench)
+    return plan.ratios_to_drive(bench) if isinstance(plan, Levels) else bench.response_ratios
 
 
 def _linear_modes(found: _Found, bench: Bench, name: str, modes: LinearModes) -> None:

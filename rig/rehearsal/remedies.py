@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.bench.configuration import merged
-from rig.campaigns.planning.levels import LEVELS
+from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import plan_from
 from rig.errors import RigError
@@ -106,11 +106,9 @@ def _windows(table: Table, bench: Bench) -> Iterator[Remedy]:
 
 
 def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
-    key = getattr(plan, "levels_key", None)
-    if key not in LEVELS:
+    if not isinstance(plan, Levels):
         return
-    levels = sorted(getattr(plan, key))
-    start = getattr(plan, "start_v", None)
+    key, levels, start = plan.levels_key, sorted(plan.levels), plan.start_v
     lower: Table = {key: [levels[0] / 3.0, *levels]}
     if start is not None:
         lower["start_v"] = start / 3.0

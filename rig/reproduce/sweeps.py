@@ -120,8 +120,8 @@ def _simulated(
     )  # an envelope needs at least one period
     width = max(least, there.size // _BINS)
     seconds = (np.arange(there.size // width) + 0.5) * width / experiment.sample_rate_hz
-    swept = max(0.0, experiment.counted / experiment.sample_rate_hz - plan.duration_s)
-    share = np.clip((seconds - swept) / plan.duration_s, 0.0, 1.0)
+    swept = max(0.0, experiment.counted / experiment.sample_rate_hz - plan.sweep_s)
+    share = np.clip((seconds - swept) / plan.sweep_s, 0.0, 1.0)
     return SweepResult(
         sweep=sweep,
         training_set=training_set,

@@ -69,14 +69,12 @@ class Tick:
             segments, bench.sample_rate_hz, amplitude_law, lag_rad, law_record["harmonics"]["wanted"][0]
         )
         force, drive = bench.index_of("force"), bench.index_of("drive")
-        smallest = [SMALLEST_BITS * c.resolution_v / abs(c.sensitivity_v_per_unit) for c in bench.channels]
+        smallest = [SMALLEST_BITS * c.resolution_in_unit for c in bench.channels]
         law_record["lock"] = law.lock.build(smallest[force], smallest[drive])
         limits = limits_record(bench)
         if law.harmonics is not None:
             controlled = bench.channels[force if law.harmonics.channel == "force" else drive]
-            law_record["harmonics"]["smallest"] = (
-                NEGLIGIBLE_BITS * controlled.resolution_v / abs(controlled.sensitivity_v_per_unit)
-            )
+            law_record["harmonics"]["smallest"] = NEGLIGIBLE_BITS * controlled.resolution_in_unit
             law_record["harmonics"]["high_pass_rad_s"] = 2.0 * math.pi * controlled.high_pass_hz
             law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"] / law.harmonics.highest
         loop = np.zeros(1, LOOP)

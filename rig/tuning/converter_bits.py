@@ -26,7 +26,7 @@ def rounding(bit: float, noise_rms: float = 0.0) -> float:
 def input_bits_n(bench: Bench) -> float:
     """Return the RMS of the lines that rounding in the input converter adds to the measured force, N."""
     force = bench.channels[bench.index_of("force")]
-    return rounding(force.resolution_v / abs(force.sensitivity_v_per_unit), force.noise_rms)
+    return rounding(force.resolution_in_unit, force.noise_rms)
 
 
 def bits_force_n(bench: Bench, responses: FrequencyResponseMatrix, beyond_n: float) -> float:

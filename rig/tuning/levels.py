@@ -125,7 +125,7 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
     read_n, sent_n = input_bits_n(bench), bits_force_n
     rounded_n = math.hypot(read_n, sent_n)
-    few_n = max(highest_n / SPAN, BITS * force.resolution_v / abs(force.sensitivity_v_per_unit))
+    few_n = max(highest_n / SPAN, BITS * force.resolution_in_unit)
     quiet_n = math.sqrt(2.0) * rounded_n / NONHARMONIC
     if max(few_n, quiet_n) == highest_n / SPAN:
         return LowestForce(few_n)

@@ -32,7 +32,7 @@ def ratio_std(bench: Bench, point: Point[object], drive: int) -> np.ndarray | No
     size = np.abs(spectrum_of(point).harmonics[:, 1])
     known = spectrum_of(point).harmonics_std
     std = np.zeros(size.size) if known is None else known[:, 1]
-    steps = np.array([channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels])
+    steps = np.array([channel.resolution_in_unit for channel in bench.channels])
     return None if not size[drive] > 0.0 else np.hypot(std, steps / math.sqrt(12.0)) / size[drive]
 
 

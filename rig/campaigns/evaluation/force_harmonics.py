@@ -23,7 +23,7 @@ def with_force_harmonics(
         return point
     channel = bench.index_of(loop.channel)
     facts = bench.channels[channel]
-    negligible = NEGLIGIBLE_BITS * facts.resolution_v / abs(facts.sensitivity_v_per_unit)
+    negligible = NEGLIGIBLE_BITS * facts.resolution_in_unit
     wanted = harmonic_ratios(loop.wanted if target.harmonics is None else target.harmonics)
     off = _errors(point.spectrum, channel, wanted[: loop.highest + 1], loop.accepted, negligible)
     alone = [order for order in off if left_alone & 1 << order]

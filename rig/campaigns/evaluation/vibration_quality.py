@@ -65,7 +65,7 @@ def quality_warnings(bench: Bench, vibration: PeriodicVibration, rows: Rows, hel
     scatter = lag_scatter_deg(rows) if held else 0.0
     if scatter > SCATTERING_DEG:
         force = bench.channels[bench.index_of("force")]
-        bits = vibration.force_n * abs(force.sensitivity_v_per_unit) / force.resolution_v
+        bits = vibration.force_n / force.resolution_in_unit
         out.append(
             f"the lag scatters by {scatter:.1f} deg, trusted up to {SCATTERING_DEG:g}: too little signal "
             f"(force {vibration.force_n:.3g} N, {bits:.1f} steps of its converter), or too quick a detector"

@@ -107,7 +107,7 @@ def recorded_vibration(
         channels_of(bench),
         sample_rate_hz=bench.sample_rate_hz,
         harmonics=harmonics,
-        resolution=[channel.resolution_v / abs(channel.sensitivity_v_per_unit) for channel in bench.channels],
+        resolution=[channel.resolution_in_unit for channel in bench.channels],
         noise_rms=[channel.noise_rms for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )
@@ -203,7 +203,7 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
     """Warn where the fundamental of force or drive uses only a few bits of its converter."""
     out = []
     for channel, harmonics in zip(bench.channels, vibration.harmonics, strict=True):
-        bits = abs(harmonics[1] * channel.sensitivity_v_per_unit) / channel.resolution_v
+        bits = abs(harmonics[1]) / channel.resolution_in_unit
         if channel.role in ("force", "drive") and bits < FEW_BITS:
             out.append(
                 f"channel {channel.name}: an amplitude of {bits:.1f} steps of its converter; "

@@ -3,6 +3,7 @@
 from collections import defaultdict
 
 from rig.bench import Bench
+from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
@@ -55,18 +56,18 @@ def check_length(plan: Plan, bench: Bench) -> None:
 def _duration_s(plan: Plan, bench: Bench, segment: Segment) -> float:
     """Longest possible duration of a segment, at the lowest frequency that it may have, s."""
     if segment.kind is SegmentKind.SWEEP:
-        return float(getattr(plan, "duration_s", 0.0))
+        return plan.sweep_s
     if segment.duration_s is not None:
         return segment.duration_s
     lowest_hz = bench.limits.frequency_hz[0]
     if segment.excitation is not None:
         lowest_hz = segment.excitation.frequency_hz
-    elif (window := getattr(plan.law, "frequency_window_hz", None)) is not None:
-        lowest_hz = window[0]
+    elif isinstance(plan, LockedPlan):
+        lowest_hz = plan.controller.frequency_window_hz[0]
     return segment.periods / lowest_hz
 
 
 def _keys(plan: Plan, kind: SegmentKind) -> str:
-    known = {*type(plan).model_fields, "settle.longest_periods"}
-    given = [key for key in _KEYS[kind] if key in known and getattr(plan, key, 1) is not None]
+    values = {"settle.longest_periods": plan.settle_rule.longest_periods, **dict(plan)}
+    given = [key for key in _KEYS[kind] if values.get(key) is not None]
     return ", ".join(given) or kind.name.lower()

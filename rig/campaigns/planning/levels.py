@@ -59,7 +59,7 @@ class Levels(Configured):
 
     @model_validator(mode="after")
     def _levels_make_sense(self) -> Self:
-        given = [name for name in LEVELS if getattr(self, name) is not None]
+        given = list(self._given)
         if len(given) != 1:
             raise ValueError(f"{', '.join(LEVELS)}: exactly one of them is to be given")
         if not self.levels:
@@ -72,19 +72,30 @@ class Levels(Configured):
         return self
 
     @property
+    def _given(self) -> dict[str, tuple[float, ...]]:
+        """The levels, by each level key that is given."""
+        levels = {
+            "levels_v": self.levels_v,
+            "levels_n": self.levels_n,
+            "levels_rms_n": self.levels_rms_n,
+            "levels_m": self.levels_m,
+        }
+        return {name: values for name, values in levels.items() if values is not None}
+
+    @property
     def level_count(self) -> dict[str, int]:
         """Number of levels, by each level key that is given."""
-        return {name: len(getattr(self, name)) for name in LEVELS if getattr(self, name) is not None}
+        return {name: len(values) for name, values in self._given.items()}
 
     @property
     def levels_key(self) -> str:
         """Name of the key that gives the levels."""
-        return next(name for name in LEVELS if getattr(self, name) is not None)
+        return next(iter(self._given))
 
     @property
     def levels(self) -> tuple[float, ...]:
         """The levels, in V, N or m."""
-        return tuple(getattr(self, self.levels_key))
+        return next(iter(self._given.values()))
 
     @property
     def amplitude_law(self) -> AmplitudeLaw:
@@ -95,6 +106,11 @@ class Levels(Configured):
     def level_unit(self) -> str:
         """Unit of the levels: ``V``, ``N``, ``N RMS`` or ``m``."""
         return LEVELS[self.levels_key][1]
+
+    @property
+    def force_loop(self) -> str:
+        """Name of the loop that would hold a force."""
+        return "linear"
 
     def start_segments(self, lag_deg: float | None = None, excitation: Excitation | None = None) -> list[Segment]:
         """Return the segments that set the rig in motion at ``start_v``; none without ``start_v`` or with levels in volts."""
@@ -136,11 +152,8 @@ class Levels(Configured):
             raise ConfigurationError(
                 f"start_v = {self.start_v:g} V: the bench {bench.name} allows up to {limits.voltage_v:g} V"
             )
-        loops = getattr(self, "controller", None)
-        linear = self.amplitude_law is AmplitudeLaw.VOLTAGE or (
-            self.amplitude_law is not AmplitudeLaw.RESPONSE and getattr(loops, "force_loop", "linear") == "linear"
-        )
-        if self.start_v is None and not linear:
+        linear = self.amplitude_law is not AmplitudeLaw.RESPONSE and self.force_loop == "linear"
+        if self.start_v is None and not linear and self.amplitude_law is not AmplitudeLaw.VOLTAGE:
             raise ConfigurationError(f"start_v: levels by {self.levels_key} of this loop need a voltage to begin with")
 
     def _check_channels(self, bench: Bench) -> None:
@@ -150,12 +163,16 @@ class Levels(Configured):
         omega = 2.0 * math.pi * bench.specimen.linear_frequency_hz
         ratios = self.ratios_to_drive(bench)
         name = max(ratios, key=lambda channel: ratios[channel])
+        limits = bench.limits
         for index, level in enumerate(self.levels):
             moved = level * ratios[name]
-            for key, unit, value in (("displacement_m", "m", moved), ("acceleration_m_s2", "m/s^2", moved * omega**2)):
-                if value > getattr(bench.limits, key):
+            for key, unit, value, allowed in (
+                ("displacement_m", "m", moved, limits.displacement_m),
+                ("acceleration_m_s2", "m/s^2", moved * omega**2, limits.acceleration_m_s2),
+            ):
+                if value > allowed:
                     raise ConfigurationError(
                         f"{self.levels_key}[{index}] = {level:g} m: means {value:.3g} {unit} at channel {name!r}, which moves "
                         f"{ratios[name]:.3g} times as far as the drive point; "
-                        f"the bench {bench.name} allows limits.{key} = {getattr(bench.limits, key):g}"
+                        f"the bench {bench.name} allows limits.{key} = {allowed:g}"
                     )

@@ -39,6 +39,11 @@ class LockedPlan(KnownPlant, Plan):
         return self.controller
 
     @property
+    def force_loop(self) -> str:
+        """Name of the loop that would hold a force."""
+        return self.controller.force_loop
+
+    @property
     def asked_lags_deg(self) -> tuple[float, ...]:
         """All lags that are held, each of the acceleration behind the force, deg."""
         return (self.controller.phase_lag_deg,)

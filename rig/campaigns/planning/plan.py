@@ -88,6 +88,16 @@ class Plan(Configured):
         return "V"
 
     @property
+    def levels_key(self) -> str:
+        """Name of the key that gives the levels."""
+        return "levels_rms_v"
+
+    @property
+    def sweep_s(self) -> float:
+        """Duration of a frequency sweep, s; 0 if the plan sweeps none."""
+        return 0.0
+
+    @property
     def amplitude_law(self) -> AmplitudeLaw:
         """Quantity that the levels of the segments refer to."""
         return AmplitudeLaw.VOLTAGE
@@ -223,6 +233,11 @@ class OpenLoopPlan(Plan):
 
 class TonePlan(Levels, OpenLoopPlan):
     """Base of the plans that excite one frequency at a time. The levels are measured one after the other."""
+
+    @property
+    def force_loop(self) -> str:
+        """Name of the loop that would hold a force."""
+        return self.controller.force_loop
 
     @property
     def counts(self) -> dict[str, int]:

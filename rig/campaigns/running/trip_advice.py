@@ -125,7 +125,7 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
 
 def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Advice:
     """Advise on a lock that was gained and then lost, at an end of the frequency window or within it."""
-    window = getattr(plan.law, "frequency_window_hz", None)
+    window = plan.controller.frequency_window_hz if isinstance(plan, LockedPlan) else None
     low, high = bench.limits.frequency_hz if window is None else window
     key = "limits.frequency_hz of the bench" if window is None else "controller.frequency_window_hz"
     from_end = min(abs(trip.frequency_hz - low), abs(trip.frequency_hz - high))
@@ -154,7 +154,7 @@ def _key(plan: Plan, at: TrippedAt | None) -> str:
     """Return the key of the plan that gives the level."""
     if at is not None and at.start:
         return "start_v"
-    return str(getattr(plan, "levels_key", "levels_rms_v" if plan.level_unit == "V RMS" else "the levels"))
+    return plan.levels_key
 
 
 def _name(bench: Bench, trip: Trip) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan, Target
 from rig.errors import ConfigurationError
 from rig.recording.parts import Part
@@ -93,6 +94,6 @@ def _is_beyond(point: Point[object], at: TrippedAt) -> bool:
 
 def _asks_for(plan: Plan, left: Sequence[Target], at: TrippedAt) -> bool:
     if at.start:
-        start_v = getattr(plan, "start_v", None)
+        start_v = plan.start_v if isinstance(plan, Levels) else None
         return start_v is None or start_v >= ALMOST * at.level
     return plan.level_unit != at.level_unit or any(target.level >= ALMOST * at.level for target in left)

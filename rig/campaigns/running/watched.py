@@ -40,7 +40,7 @@ def watched_facts(plan: Plan, bench: Bench, recording: Path, about: Mapping[str,
                 "name": channel.name,
                 "role": channel.role,
                 "unit": channel.unit,
-                "range": channel.range_v / abs(channel.sensitivity_v_per_unit),
+                "range": channel.range_in_unit,
                 "limit": limit.get(channel.role),
             }
             for channel in bench.channels

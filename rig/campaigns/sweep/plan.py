@@ -58,11 +58,11 @@ class SweepPlan(TonePlan):
         mean_hz = 0.5 * (self.start_hz + self.stop_hz)
         if self.rate_hz_per_s is None:
             mean_hz = (self.stop_hz - self.start_hz) / math.log(self.stop_hz / self.start_hz)
-        periods = mean_hz * self.duration_s
+        periods = mean_hz * self.sweep_s
         name = "rate_hz_per_s" if self.rate_hz_per_s is not None else "rate_octaves_per_min"
-        rate = getattr(self, name)
-        if self.duration_s > LONGEST_S:
-            least = rate * self.duration_s / LONGEST_S
+        rate = self.rate_hz_per_s or self.rate_octaves_per_min or 0.0
+        if self.sweep_s > LONGEST_S:
+            least = rate * self.sweep_s / LONGEST_S
             raise ValueError(f"{name} = {rate:g}: allowed is from {least:.4g}, a sweep of a day")
         if periods < FEWEST_PERIODS:
             raise ValueError(
@@ -78,7 +78,7 @@ class SweepPlan(TonePlan):
         return self
 
     @property
-    def duration_s(self) -> float:
+    def sweep_s(self) -> float:
         """Duration of one sweep, s."""
         if self.rate_hz_per_s is not None:
             return abs(self.stop_hz - self.start_hz) / self.rate_hz_per_s

@@ -87,14 +87,14 @@ def planned_simulated_sweeps(plan_source: str, models: SimulatedSweepModels) -> 
 def _waveform(plan: SweepPlan, rate_hz: float) -> tuple[Float, Float, int]:
     """Return phase and envelope of a planned sweep with its ramp and hold, at the model's rate, and its first sample."""
     first = round((plan.ramp_periods + plan.hold_periods) / plan.start_hz * rate_hz)
-    time_s = np.arange(first + round(plan.duration_s * rate_hz)) / rate_hz
+    time_s = np.arange(first + round(plan.sweep_s * rate_hz)) / rate_hz
     swept = np.maximum(time_s - time_s[first], 0.0)
     before = 2.0 * np.pi * plan.start_hz * np.minimum(time_s, time_s[first])
     if plan.rate_hz_per_s is not None:
         way = np.sign(plan.stop_hz - plan.start_hz)
         turned = plan.start_hz * swept + 0.5 * way * plan.rate_hz_per_s * swept**2
     else:
-        growth = np.log(plan.stop_hz / plan.start_hz) / plan.duration_s
+        growth = np.log(plan.stop_hz / plan.start_hz) / plan.sweep_s
         turned = plan.start_hz * np.expm1(growth * swept) / growth
     risen = np.clip(time_s * plan.start_hz / plan.ramp_periods, 0.0, 1.0)
     return before + 2.0 * np.pi * turned, 0.5 - 0.5 * np.cos(np.pi * risen), first
