@@ -17,7 +17,8 @@ A field that a file lacks takes its default, so a new field with a default needs
 stored otherwise, or was in earlier files, it declares a `Layout` by ``@stored(...)``.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from enum import Enum
 from functools import cache
@@ -33,6 +34,8 @@ Arrays = Mapping[str, NDArray[Any]]
 Attributes = Mapping[str, Any]
 T = TypeVar("T")
 
+_Owner = tuple[type, str]
+"""Type of the dataclass that has a field, and its path, for messages."""
 _ABSENT = object()
 """Stands for an attribute that a file lacks."""
 
@@ -101,8 +104,17 @@ def encode(result: Any) -> Stored:
     return found
 
 
-def decode(kind: type[T], arrays: Arrays, attributes: Attributes) -> T:
+def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "") -> T:
     """Invert `encode`.
+
+    Parameters
+    ----------
+    kind
+        Type of the result.
+    arrays, attributes
+        What `encode` returned.
+    where
+        Path of the result in a larger one, for messages, such as ``model/``.
 
     Raises
     ------
@@ -111,19 +123,21 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes) -> T:
     """
     layout = _layout_of(kind)
     if not isinstance(attributes, Mapping):
-        raise IdentificationError(f"{_label(kind)}: is {attributes!r}, needs a mapping of fields")
+        raise IdentificationError(f"{_label(kind, where)}: is {attributes!r}, needs a mapping of fields")
     held, told = dict(arrays), dict(attributes)
     if layout.kinds is not None:
         kind = _concrete(kind, layout.kinds(), told.pop("kind", None))
     if layout.upgrade is not None:
-        layout.upgrade(held, told)
+        with _fitting(kind):
+            layout.upgrade(held, told)
     hints, known = _hints(kind), _fields(kind)
     if unknown := next((name for name in told if name not in hints), None):
-        raise IdentificationError(f"{_label(kind)}: {unknown!r} is missing or unknown")
+        raise IdentificationError(f"{_label(kind, where)}: {unknown!r} is missing or unknown")
     values: dict[str, Any] = {}
     for one in known:
         name = one.name
-        found = _decoded(hints[name], name, layout.groups.get(name, name), held, told.get(name, _ABSENT), kind)
+        group = layout.groups.get(name, name)
+        found = _decoded(hints[name], name, group, held, told.get(name, _ABSENT), (kind, where))
         if found is not _ABSENT:
             values[name] = found
     for name, part in layout.shared.items():
@@ -131,9 +145,16 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes) -> T:
             values[name] = getattr(values[part], name)
     for one in known:
         if one.name not in values and one.default is MISSING and one.default_factory is MISSING:
-            raise IdentificationError(f"{_label(kind)}: {one.name!r} is missing or unknown")
-    try:
+            raise IdentificationError(f"{_label(kind, where)}: {one.name!r} is missing or unknown")
+    with _fitting(kind):
         return kind(**values)
+
+
+@contextmanager
+def _fitting(kind: type) -> Iterator[None]:
+    """Convert errors of wrong types and shapes to an `IdentificationError` that names the kind."""
+    try:
+        yield
     except IdentificationError:
         raise
     except (TypeError, ValueError, AttributeError, LookupError) as error:
@@ -162,7 +183,7 @@ def _encoded(value: Any, name: str, group: str, arrays: dict[str, NDArray[Any]])
     return value
 
 
-def _decoded(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: type) -> Any:
+def _decoded(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: _Owner) -> Any:
     """Return the value of a field; `_ABSENT` if the file does not have it."""
     options = [option for option in get_args(hint) if option is not NoneType] if _is_union(hint) else [hint]
     optional = _is_union(hint) and NoneType in get_args(hint)
@@ -176,13 +197,13 @@ def _decoded(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, o
     if get_origin(hint) is not None:
         return _several(hint, name, group, arrays, attribute, owner)
     if optional and isinstance(attribute, list):  # earlier files: none or one in a list
-        return decode(hint, _inside(arrays, f"{group}_0"), attribute[0]) if attribute else None
+        return decode(hint, _inside(arrays, f"{group}_0"), attribute[0], f"{owner[1]}{group}_0/") if attribute else None
     inside = _inside(arrays, group)
     if attribute is None and optional:
         return None
     if attribute is _ABSENT and not inside:
         return _ABSENT
-    return decode(hint, inside, {} if attribute is _ABSENT else attribute)
+    return decode(hint, inside, {} if attribute is _ABSENT else attribute, f"{owner[1]}{group}/")
 
 
 def _array(name: str, arrays: Arrays, attribute: Any, optional: bool) -> Any:
@@ -193,7 +214,7 @@ def _array(name: str, arrays: Arrays, attribute: Any, optional: bool) -> Any:
     return np.asarray(attribute)
 
 
-def _several(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: type) -> Any:
+def _several(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, owner: _Owner) -> Any:
     """Return a tuple or a mapping of dataclasses or arrays."""
     if attribute is _ABSENT:
         return attribute
@@ -210,7 +231,7 @@ def _several(hint: Any, name: str, group: str, arrays: Arrays, attribute: Any, o
     )
 
 
-def _plain(hint: Any, value: Any, name: str, owner: type) -> Any:
+def _plain(hint: Any, value: Any, name: str, owner: _Owner) -> Any:
     """Return numbers, texts, tuples and enums as the field's type has them."""
     from pydantic import ValidationError  # only on use: it takes long to load
 
@@ -220,8 +241,8 @@ def _plain(hint: Any, value: Any, name: str, owner: type) -> Any:
         raise _misfit(owner, name, value) from None
 
 
-def _misfit(owner: type, name: str, value: Any) -> IdentificationError:
-    return IdentificationError(f"{_label(owner)}: {name} is {value!r}, which does not fit")
+def _misfit(owner: _Owner, name: str, value: Any) -> IdentificationError:
+    return IdentificationError(f"{_label(*owner)}: {name} is {value!r}, which does not fit")
 
 
 def _concrete(kind: type[T], kinds: Mapping[str, type], named: Any) -> type[T]:
@@ -230,10 +251,12 @@ def _concrete(kind: type[T], kinds: Mapping[str, type], named: Any) -> type[T]:
     return kinds[named]
 
 
-def _label(kind: type) -> str:
-    """Return the name of a class as words."""
+def _label(kind: type, where: str = "") -> str:
+    """Return the name of a class as words, and the path of the object that is of it."""
     words = "".join(f" {letter}" if letter.isupper() else letter for letter in kind.__name__).split()
-    return " ".join("PNLSS" if word == "Pnlss" else word.lower() for word in words)
+    return " ".join(
+        ["PNLSS" if word == "Pnlss" else word.lower() for word in words] + [where.rstrip("/")] * bool(where)
+    )
 
 
 def _inside(arrays: Arrays, group: str) -> dict[str, NDArray[Any]]:

@@ -1,15 +1,14 @@
 """What a free decay tells of its modes."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS, NonlinearMode
+from identification.storage import stored
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -101,10 +100,7 @@ class DecayMode:
         return [{name: float(values[row]) for name, values in columns.items()} for row in range(self.time_s.size)]
 
 
-_SCALARS = ("reference", "start_s", "stop_s", "floor_m", "drive_mode_shape")
-_ARRAYS = tuple(entry.name for entry in fields(DecayMode) if entry.name not in _SCALARS)
-
-
+@stored(groups={"modes": "mode"})
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DecayBackbone(Result):
     """Modes of one free decay.
@@ -129,31 +125,6 @@ class DecayBackbone(Result):
     def __post_init__(self) -> None:
         if not self.modes:
             raise IdentificationError("modes: a decay needs at least one")
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays = {f"mode_{n}/{name}": getattr(mode, name) for n, mode in enumerate(self.modes) for name in _ARRAYS}
-        modes = [{name: getattr(mode, name) for name in _SCALARS} for mode in self.modes]
-        channels = [vars(channel) for channel in self.channels]
-        return arrays, {"modes": modes, "channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "DecayBackbone":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        try:
-            modes = []
-            for n, scalars in enumerate(attributes["modes"]):
-                values: dict[str, Any] = {name: np.asarray(arrays[f"mode_{n}/{name}"]) for name in _ARRAYS}
-                modes.append(DecayMode(**values, **scalars))
-            channels = tuple(Channel(**channel) for channel in attributes["channels"])
-            return cls(
-                modes=tuple(modes),
-                channels=channels,
-                specimen=str(attributes["specimen"]),
-                notes=tuple(attributes["notes"]),
-            )
-        except (KeyError, TypeError) as error:
-            raise IdentificationError(f"decay: {error} is missing or does not fit") from None
 
     def mode(self, near_hz: float | None = None) -> DecayMode:
         """Return the mode nearest to a frequency; without one, the only mode there is."""

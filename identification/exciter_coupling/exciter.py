@@ -13,14 +13,14 @@ The recorded voltage is the number sent to a converter, and the inputs that meas
 `VoltagePath` models the path from this number to the amplifier.
 """
 
-from collections.abc import Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.errors import IdentificationError
+from identification.storage import stored
 from identification.validation import finite_array, positive
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
@@ -108,6 +108,25 @@ class ExciterLines:
                 )
 
 
+def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Name the numbers of earlier files, which hold them in three arrays."""
+    if "values" not in arrays:
+        return
+    values = arrays.pop("values")
+    if values.size != len(PARAMETERS):
+        raise IdentificationError(
+            f"exciter: has {values.size} parameters, needs {len(PARAMETERS)} ({', '.join(PARAMETERS)}); identify it anew"
+        )
+    for names, numbers in (
+        (PARAMETERS, values),
+        (("lowest_hz", "highest_hz", "fit_residual"), arrays.pop("fit", np.zeros(0))),
+    ):
+        attributes |= dict(zip(names, numbers.tolist(), strict=True))
+    path = [one.name for one in fields(VoltagePath)]
+    attributes["path"] = dict(zip(path, arrays.pop("path", np.zeros(0)).tolist(), strict=True))
+
+
+@stored(upgrade=_upgrade)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Exciter(Result):
     """Amplifier, exciter and stinger of one rig; the module docstring has the equations.
@@ -234,39 +253,3 @@ class Exciter(Result):
             "resistance_ohm": resistance,
             "inductance_h": self.coil_time_constant_s * resistance,
         }
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        numbers = (self.lowest_hz, self.highest_hz, self.fit_residual)
-        path = np.array(astuple(self.path))
-        arrays = {"values": self.values, "covariance": np.asarray(self.covariance), "fit": np.array(numbers)}
-        kept = {} if self.lines is None else {f"lines/{name}": value for name, value in vars(self.lines).items()}
-        return arrays | {"path": path} | kept, {"source": self.source, "notes": list(self.notes)}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Exciter":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        try:
-            values = finite_array("values", arrays["values"], np.float64, 1)
-            if values.size != len(PARAMETERS):
-                raise IdentificationError(
-                    f"exciter: has {values.size} parameters, needs {len(PARAMETERS)} ({', '.join(PARAMETERS)}); "
-                    "identify it anew"
-                )
-            kept = {name.removeprefix("lines/"): array for name, array in arrays.items() if name.startswith("lines/")}
-            lowest, highest, residual = np.asarray(arrays["fit"], dtype=np.float64).tolist()
-            return cls(
-                **dict(zip(PARAMETERS, values.tolist(), strict=True)),
-                covariance=arrays["covariance"],
-                lowest_hz=lowest,
-                highest_hz=highest,
-                fit_residual=residual,
-                path=VoltagePath(*np.asarray(arrays["path"], dtype=np.float64).tolist()),
-                source=attributes["source"],
-                notes=tuple(attributes["notes"]),
-                lines=ExciterLines(**kept) if kept else None,
-            )
-        except IdentificationError:
-            raise
-        except (KeyError, TypeError, ValueError) as error:
-            raise IdentificationError(f"exciter: {error} is missing or unknown") from None

@@ -1,6 +1,5 @@
 """Records over time that somebody else has measured: channels, samples, periods, levels."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
+from identification.storage import stored
 from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 from vibrolock.results import Result
@@ -37,6 +37,20 @@ class TimeRecord:
         object.__setattr__(self, "samples", finite_array(where, self.samples, np.float64, 2))
 
 
+def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Split the samples of earlier files, which hold all records side by side."""
+    if "lengths" not in arrays:
+        return
+    samples, lengths, levels = (arrays.pop(name, np.zeros(0)) for name in ("samples", "lengths", "levels"))
+    if samples.ndim != 2 or np.any(lengths < 0) or lengths.sum() != samples.shape[1]:
+        raise IdentificationError(f"lengths: do not add up to the samples, which have shape {samples.shape}")
+    parts = np.split(samples, np.cumsum(lengths)[:-1], axis=1)
+    arrays.update({f"records_{number}/samples": part for number, part in enumerate(parts)})
+    named = zip(attributes.pop("names", ()), levels.tolist(), strict=True)
+    attributes["records"] = [{"name": name, "level": level} for name, level in named]
+
+
+@stored(upgrade=_upgrade)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TimeRecords(Result):
     """Evenly sampled records of the same channels at one sample rate.
@@ -125,37 +139,3 @@ class TimeRecords(Result):
         """Return it with other records."""
         kept = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "records"}
         return TimeRecords(records=records, **kept)
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays = {
-            "samples": np.concatenate([record.samples for record in self.records], axis=1),
-            "lengths": np.array([record.samples.shape[1] for record in self.records]),
-            "levels": np.array([record.level for record in self.records]),
-        }
-        plain = ("sample_rate_hz", "period_samples", "ahead_periods", "at_rest", "instrument", "specimen", "source")
-        attributes: dict[str, Any] = {name: getattr(self, name) for name in plain}
-        attributes["channels"] = [vars(channel) for channel in self.channels]
-        attributes["excited_hz"] = None if self.excited_hz is None else list(self.excited_hz)
-        attributes["names"] = [record.name for record in self.records]
-        return arrays, {**attributes, "notes": list(self.notes)}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "TimeRecords":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing or does not fit."""
-        try:
-            rest = dict(attributes)
-            channels = tuple(Channel(**channel) for channel in rest.pop("channels"))
-            band, notes, names = rest.pop("excited_hz"), tuple(rest.pop("notes")), rest.pop("names")
-            samples, lengths = np.asarray(arrays["samples"]), np.asarray(arrays["lengths"], np.int64)
-            if samples.ndim != 2 or np.any(lengths < 0) or lengths.sum() != samples.shape[1]:
-                raise IdentificationError(f"lengths: do not add up to the samples, which have shape {samples.shape}")
-            parts = np.split(samples, np.cumsum(lengths)[:-1], axis=1)
-            records = tuple(
-                TimeRecord(samples=part, name=str(name), level=float(level))
-                for part, name, level in zip(parts, names, arrays["levels"], strict=True)
-            )
-            excited = None if band is None else (float(band[0]), float(band[1]))
-            return cls(channels=channels, records=records, excited_hz=excited, notes=notes, **rest)
-        except (KeyError, TypeError, ValueError) as error:
-            raise IdentificationError(f"time records: {error} is missing or does not fit") from None

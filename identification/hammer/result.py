@@ -1,11 +1,9 @@
 """Result of a hammer test: the hits, the frequency responses with their errors, the coherence."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel
 from identification.errors import IdentificationError
@@ -94,32 +92,3 @@ class HammerTest(Result):
     def table(self) -> list[dict[str, Any]]:
         """Return one JSON-able dictionary per hit."""
         return [asdict(hit) for hit in self.hits]
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, those of the responses in one group, and the JSON-able attributes that go with them."""
-        arrays, attributes = self.responses.to_arrays()
-        own = {"coherence": self.coherence, "force_n_s": self.force_n_s}
-        scalars = {"sample_rate_hz": self.sample_rate_hz, "record_s": self.record_s, "hits": self.table()}
-        channels = [vars(channel) for channel in self.channels]
-        return {**own, **{f"responses/{name}": values for name, values in arrays.items()}}, {
-            **scalars,
-            "channels": channels,
-            "responses": attributes,
-        }
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "HammerTest":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        own = {name.removeprefix("responses/"): values for name, values in arrays.items() if "/" in name}
-        try:
-            return cls(
-                channels=tuple(Channel(**channel) for channel in attributes["channels"]),
-                sample_rate_hz=float(attributes["sample_rate_hz"]),
-                record_s=float(attributes["record_s"]),
-                hits=tuple(Hit(**hit) for hit in attributes["hits"]),
-                responses=FrequencyResponseMatrix.from_arrays(own, attributes["responses"]),
-                coherence=arrays["coherence"],
-                force_n_s=arrays["force_n_s"],
-            )
-        except (KeyError, TypeError) as error:
-            raise IdentificationError(f"hammer test: {error} is missing or unknown") from None

@@ -1,11 +1,9 @@
 """Experimental modal analysis in one call: from frequency responses to mass-normalised modes with standard errors."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import find_role
 from identification.errors import IdentificationError
@@ -51,39 +49,6 @@ class ModalAnalysis(Result):
     modes: LinearModes
     responses: FrequencyResponseMatrix | None = None
     stabilisation: StabilisationDiagram | None = None
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, in one group per part, and the JSON-able attributes that go with them."""
-        arrays, attributes = _grouped("modes", self.modes)
-        if self.responses is not None:
-            more, attributes_of_responses = _grouped("responses", self.responses)
-            arrays, attributes = arrays | more, attributes | attributes_of_responses
-        if self.stabilisation is not None:
-            arrays |= {
-                f"stabilisation/{f.name}": getattr(self.stabilisation, f.name) for f in fields(self.stabilisation)
-            }
-        return arrays, attributes
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "ModalAnalysis":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        diagram = {name: np.asarray(values) for name, values in _group(arrays, "stabilisation").items()}
-        return cls(
-            LinearModes.from_arrays(_group(arrays, "modes"), attributes.get("modes", {})),
-            FrequencyResponseMatrix.from_arrays(_group(arrays, "responses"), attributes["responses"])
-            if "responses" in attributes
-            else None,
-            StabilisationDiagram(**diagram) if diagram else None,
-        )
-
-
-def _grouped(name: str, part: LinearModes | FrequencyResponseMatrix) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    arrays, attributes = part.to_arrays()
-    return {f"{name}/{key}": values for key, values in arrays.items()}, {name: attributes}
-
-
-def _group(arrays: Mapping[str, NDArray[Any]], name: str) -> dict[str, NDArray[Any]]:
-    return {key.removeprefix(f"{name}/"): values for key, values in arrays.items() if key.startswith(f"{name}/")}
 
 
 def linear_modes(

@@ -12,9 +12,7 @@ the stiffness of the lower modes. Complex residues ``rho_ok`` in place of ``phi_
 ``s^2 (a + b s) / (s^2 + 2 z w s + w^2)`` with ``rho = a + b p`` at the pole ``p = -z w + i w sqrt(1 - z^2)``.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +21,7 @@ from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
 from identification.linear.mode_shapes import ModeShapes
 from identification.linear.response_matrix import FrequencyResponseMatrix
+from identification.storage import stored
 from identification.validation import finite_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
@@ -31,9 +30,9 @@ _POLES = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_st
 _SHAPES = ("shapes", "shapes_std")
 _RESIDUALS = ("lower", "upper")
 _OPTIONAL = ("covariance", "residues", "small_terms")
-_SCALARS = ("lowest_hz", "highest_hz", "upper_hz", "force_rms_n", "fit_residual")
 
 
+@stored(as_arrays=("lowest_hz", "highest_hz", "upper_hz", "force_rms_n", "fit_residual"))
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearModes(Result):
     """Linear modes of a structure, lowest frequency first.
@@ -208,28 +207,6 @@ class LinearModes(Result):
             {name: float(v) if np.isfinite(v := getattr(self, name)[mode]) else None for name in names}
             for mode in range(self.frequency_hz.size)
         ]
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays = {name: getattr(self, name) for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
-        arrays |= {name: np.array(getattr(self, name)) for name in _SCALARS}
-        arrays |= {name: getattr(self, name) for name in _OPTIONAL if getattr(self, name) is not None}
-        channels = [vars(channel) for channel in self.channels]
-        told = {"channels": channels, "specimen": self.specimen, "notes": list(self.notes)}
-        return arrays, told if self.force_unit == "N" else {**told, "force_unit": self.force_unit}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "LinearModes":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        try:
-            channels = tuple(Channel(**channel) for channel in attributes["channels"])
-            values: dict[str, Any] = {name: arrays[name] for name in (*_POLES, *_SHAPES, *_RESIDUALS)}
-            values |= {name: float(arrays[name]) for name in _SCALARS if name in arrays or name != "upper_hz"}
-            values |= {name: arrays.get(name) for name in _OPTIONAL}
-            values |= {"specimen": attributes["specimen"], "notes": tuple(attributes["notes"])}
-            return cls(channels=channels, **values, force_unit=str(attributes.get("force_unit", "N")))
-        except (KeyError, TypeError) as error:
-            raise IdentificationError(f"linear modes: {error} is missing or unknown") from None
 
 
 def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:

@@ -1,19 +1,16 @@
 """Frequency responses from several inputs to several outputs, with the known covariances of their errors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
 from identification.validation import finite_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-_ARRAYS = ("frequency_hz", "value", "noise_covariance", "total_covariance", "deviations")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -153,25 +150,3 @@ class FrequencyResponseMatrix(Result):
             total_covariance=part(self.total_covariance),
             deviations=None if self.deviations is None else self.deviations[lines][:, :, paths],
         )
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays = {name: getattr(self, name) for name in _ARRAYS if getattr(self, name) is not None}
-        channels = {name: [vars(channel) for channel in getattr(self, name)] for name in ("outputs", "inputs")}
-        texts = {"estimator": self.estimator, "specimen": self.specimen, "notes": list(self.notes)}
-        window = {"decay_rate_1_s": self.decay_rate_1_s} if self.decay_rate_1_s else {}
-        return arrays, {**channels, **texts, "input_rms": list(self.input_rms), **window}
-
-    @classmethod
-    def from_arrays(
-        cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]
-    ) -> "FrequencyResponseMatrix":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        try:
-            channels = {name: tuple(Channel(**c) for c in attributes[name]) for name in ("outputs", "inputs")}
-            texts = {name: attributes[name] for name in ("estimator", "specimen", "notes", "input_rms")}
-            rate = float(attributes.get("decay_rate_1_s", 0.0))
-            stored = {name: arrays.get(name) for name in _ARRAYS}
-            return cls(**channels, **texts, **stored, decay_rate_1_s=rate)  # type: ignore[arg-type]
-        except (KeyError, TypeError) as error:
-            raise IdentificationError(f"frequency response matrix: {error} is missing or unknown") from None

@@ -1,34 +1,16 @@
 """Predictions of one model together with their references."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
-
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.models.modal.sweep_prediction import SweepPrediction
 from identification.models.modal.uncertainty import ResponseBand
-from identification.packing import pack_all, unpack_all
 from identification.prediction.comparison import PredictionError
 from identification.prediction.simulated_runs import SimulatedRun
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.signals.transients import Transient
 from vibrolock.results import Result
-
-_PARTS: dict[str, type] = {
-    "steady": SteadyPrediction,
-    "steady_references": FrequencyResponse,
-    "steady_errors": PredictionError,
-    "steady_bands": ResponseBand,
-    "sweeps": SweepPrediction,
-    "sweep_references": Transient,
-    "sweep_errors": PredictionError,
-    "runs": SimulatedRun,
-}
-_LATER = ("runs",)
-"""Parts that files of earlier versions do not have."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,19 +67,3 @@ class Predictions(Result):
     def errors(self) -> tuple[PredictionError, ...]:
         """Errors of all comparisons, steady responses first."""
         return tuple(error for error in (*self.steady_errors, *self.sweep_errors) if error is not None)
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays: dict[str, NDArray[Any]] = {}
-        attributes: dict[str, Any] = {"specimen": self.specimen, "notes": list(self.notes)}
-        for name in _PARTS:
-            inside, of_parts = pack_all(name, getattr(self, name))
-            arrays, attributes = arrays | inside, attributes | of_parts
-        return arrays, attributes
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "Predictions":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        present = {name: kind for name, kind in _PARTS.items() if name in attributes or name not in _LATER}
-        parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in present.items()}
-        return cls(**parts, specimen=str(attributes.get("specimen", "")), notes=tuple(attributes.get("notes", ())))

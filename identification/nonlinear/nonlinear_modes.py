@@ -1,13 +1,13 @@
 """An identified nonlinear mode: modal frequency and damping ratio over the vibration level."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
+from identification.storage import stored
 from identification.validation import read_only
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
@@ -34,8 +34,6 @@ _TABLE = (
     *("modal_amplitude", "mac", "force_purity", "response_purity", "fit_residual"),
     *(name for name in STANDARD_ERRORS.values() if name not in ("modal_frequency_std_hz", "damping_ratio_std")),
 )
-_TEXT = ("source", "specimen")
-_DRIVE_SHAPE = ("drive_mode_shape", "drive_mode_shape_std", "drive_mode_shape_source")
 
 
 def _unknown() -> Float:
@@ -43,6 +41,14 @@ def _unknown() -> Float:
     return np.array(np.nan)
 
 
+def _note_missing_errors(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Add a note to files of earlier versions, which hold fewer standard errors."""
+    notes = attributes.get("notes", [])
+    if any(name not in arrays for name in _ADDED) and _EARLIER not in notes:
+        attributes["notes"] = [*notes, _EARLIER]
+
+
+@stored(upgrade=_note_missing_errors)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NonlinearMode(Result):
     """Properties of one nonlinear mode, one entry per measured point or level; NaN marks unknown values.
@@ -213,32 +219,8 @@ class NonlinearMode(Result):
         rows = range(len(self.force_n))
         return [{name: _number(values[row]) for name, values in columns.items()} for row in rows]
 
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        named = {name: getattr(self, name) for name in (*_TEXT, *_DRIVE_SHAPE)}
-        return arrays, {**named, "notes": list(self.notes)}
 
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "NonlinearMode":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing.
-
-        Files of earlier versions hold fewer standard errors; the missing ones are NaN, and a note says so.
-        """
-        needed = [name for name in _ARRAYS if name not in _ADDED]
-        missing = [name for name in needed if name not in arrays] + [name for name in _TEXT if name not in attributes]
-        if missing:
-            raise IdentificationError(f"nonlinear mode: {', '.join(missing)} missing")
-        values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS if name in arrays}
-        values |= {name: str(attributes[name]) for name in _TEXT}
-        values |= {name: attributes[name] for name in _DRIVE_SHAPE if name in attributes}
-        notes = tuple(attributes.get("notes", ()))
-        if any(name not in arrays for name in _ADDED) and _EARLIER not in notes:
-            notes = (*notes, _EARLIER)
-        return cls(**values, notes=notes)
-
-
-_ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if entry.name not in (*_TEXT, *_DRIVE_SHAPE, "notes"))
+_ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if get_origin(entry.type) is np.ndarray)
 _ADDED = tuple(entry.name for entry in fields(NonlinearMode) if entry.default_factory is _unknown)
 _EARLIER = "written by an earlier version: identify the recording again for the standard errors that are missing"
 _HARMONICS = ("force_harmonics", "response_harmonics_m")

@@ -1,12 +1,10 @@
 """Distribution of run-to-run shifts, and predictions for runs that nobody has measured."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
@@ -18,11 +16,8 @@ from identification.validation import read_only
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
-Arrays = Mapping[str, NDArray[Any]]
-
 _LARGEST = 0.3
 """Largest shift that is drawn: from few runs the distribution has long tails."""
-_ARRAYS = ("shifts", "estimates", "variances", "misfit")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,7 +73,7 @@ class RunScatter(Result):
     settled: bool
 
     def __post_init__(self) -> None:
-        for name in _ARRAYS:
+        for name in ("shifts", "estimates", "variances", "misfit"):
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
 
     def model_of(self, model: Scattered, run: str) -> Scattered:
@@ -128,29 +123,3 @@ class RunScatter(Result):
             high=middle + np.hypot(np.maximum(high - middle, 0.0), added),
             unbounded=len(runs) - len(bounded),
         )
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        attributes = {
-            "effects": [asdict(effect) for effect in self.effects],
-            "widths": [list(width) for width in self.widths],
-            "runs": list(self.runs),
-            "fits": self.fits,
-            "settled": self.settled,
-        }
-        return {name: getattr(self, name) for name in _ARRAYS}, attributes
-
-    @classmethod
-    def from_arrays(cls, arrays: Arrays, attributes: Mapping[str, Any]) -> "RunScatter":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing or unknown."""
-        try:
-            return cls(
-                effects=tuple(Effect(**effect) for effect in attributes["effects"]),
-                widths=tuple(Width(*map(float, width)) for width in attributes["widths"]),
-                runs=tuple(attributes["runs"]),
-                fits=int(attributes["fits"]),
-                settled=bool(attributes["settled"]),
-                **{name: arrays[name] for name in _ARRAYS},
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise IdentificationError(f"scatter: {error} is missing or unknown") from None

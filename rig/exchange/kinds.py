@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from identification import (
 )
 from identification.channels import MOTION_UNIT
 from identification.nonlinear.nonlinear_modes import QUANTITIES
+from identification.storage import decode, encode
 from rig.exchange.pnlss import pnlss_from, pnlss_parts
 from rig.exchange.structured import structured_from, structured_parts
 from rig.exchange.time_data import TimeData, time_data_from, time_data_parts, transient_from, transient_parts
@@ -29,7 +31,7 @@ from rig.text.contents import Contents, Labels, unit_of
 
 
 def _nonlinear_mode(mode: NonlinearMode) -> Contents:
-    arrays, attributes = mode.to_arrays()
+    arrays, attributes = encode(mode)
     size = len(mode.force_n)
     rows = {name: 0 for name, array in arrays.items() if array.ndim and array.shape[0] == size}
     units = np.array([unit_of(name) for name in QUANTITIES])
@@ -40,7 +42,7 @@ def _nonlinear_mode(mode: NonlinearMode) -> Contents:
 
 
 def _linear_modes(modes: LinearModes) -> Contents:
-    arrays, attributes = modes.to_arrays()
+    arrays, attributes = encode(modes)
     names = tuple(channel.name for channel in modes.channels)
     shapes = {name: 1 for name in arrays if name.startswith("shapes")}
     rows = {name: 0 for name, array in arrays.items() if array.shape == modes.frequency_hz.shape and name not in _SIDES}
@@ -54,7 +56,7 @@ _SIDES = ("lower", "upper")  # one value per channel, not per mode
 
 
 def _response_matrix(matrix: FrequencyResponseMatrix) -> Contents:
-    arrays, attributes = matrix.to_arrays()
+    arrays, attributes = encode(matrix)
     outputs, inputs = (tuple(c.name for c in channels) for channels in (matrix.outputs, matrix.inputs))
     ratio = np.array([[f"{o.unit}/{i.unit}" for i in matrix.inputs] for o in matrix.outputs])
     flat, paths = ratio.ravel(), tuple(f"{o}/{i}" for o in outputs for i in inputs)
@@ -97,10 +99,10 @@ KINDS = (
     ExchangeKind("backbone", Backbone, backbone_parts, backbone_from),
     ExchangeKind("frequency-responses", tuple, _frequency_responses, unpack_frequency_responses),
     ExchangeKind(
-        "frequency-response-matrix", FrequencyResponseMatrix, _response_matrix, FrequencyResponseMatrix.from_arrays
+        "frequency-response-matrix", FrequencyResponseMatrix, _response_matrix, partial(decode, FrequencyResponseMatrix)
     ),
-    ExchangeKind("linear-modes", LinearModes, _linear_modes, LinearModes.from_arrays),
-    ExchangeKind("nonlinear-mode", NonlinearMode, _nonlinear_mode, NonlinearMode.from_arrays),
+    ExchangeKind("linear-modes", LinearModes, _linear_modes, partial(decode, LinearModes)),
+    ExchangeKind("nonlinear-mode", NonlinearMode, _nonlinear_mode, partial(decode, NonlinearMode)),
     ExchangeKind("time-data", TimeData, time_data_parts, time_data_from),
     ExchangeKind("pnlss", PnlssModel, pnlss_parts, pnlss_from),
     ExchangeKind("structured", StructuredModel, structured_parts, structured_from),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import PnlssModel
+from identification.storage import decode, encode
 from rig.text.contents import Contents
 
 _NAMES = {
@@ -28,7 +29,7 @@ def pnlss_parts(model: PnlssModel) -> Contents:
     ``n``, ``m``, ``p``: numbers of states, inputs, outputs; ``nx``, ``ny``: degrees that occur; ``fs``: sample rate. These are
     for readers only.
     """
-    arrays, attributes = model.to_arrays()
+    arrays, attributes = encode(model)
     out: dict[str, Any] = {outside: np.asarray(arrays[name]) for outside, name in _NAMES.items()}
     for powers in ("xpowers", "ypowers"):
         out[powers] = out[powers].astype(float)  # MATLAB's number type
@@ -50,4 +51,4 @@ def pnlss_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Pnls
     inside = {name: np.asarray(arrays[outside]) for outside, name in _NAMES.items()}
     for name in ("state_features/exponents", "output_features/exponents"):
         inside[name] = inside[name].astype(np.int64)
-    return PnlssModel.from_arrays(inside, attributes)
+    return decode(PnlssModel, inside, attributes)

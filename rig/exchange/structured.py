@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from identification import StructuredModel
-from identification.models.structured.arrays import model_arrays, model_from
 from identification.models.structured.laws import Damper, Joint, Spring, UserSpring
+from identification.storage import decode, encode
 from rig.text.contents import Contents
 
 _POINTS = 201
@@ -35,7 +35,7 @@ def structured_parts(model: StructuredModel) -> Contents:
     ``slider_element`` (from 1), ``slider_stiffness_n_m``, ``slider_strength_n``. The laws themselves, from which a file is
     read back, are in the attributes.
     """
-    arrays, attributes = model_arrays(model)
+    arrays, attributes = encode(model)
     out: dict[str, Any] = {**arrays, "fs": np.array([model.sample_rate_hz])}
     unit = np.linspace(-1.0, 1.0, _POINTS)
     springs, dampers, sliders = [], [], [np.zeros((3, 0))]
@@ -67,4 +67,4 @@ def structured_parts(model: StructuredModel) -> Contents:
 def structured_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> StructuredModel:
     """Convert the output of `structured_parts` back to a model."""
     names = ("frequency_hz", "damping_ratio", "input_shapes", "output_shapes", "direct")
-    return model_from({name: np.asarray(arrays[name]) for name in names}, attributes)
+    return decode(StructuredModel, {name: np.asarray(arrays[name]) for name in names}, attributes)

@@ -1,11 +1,8 @@
 """A predicted sweep, and its errors against a recorded one."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import MOTION_ORDER, find_role
 from identification.errors import IdentificationError
@@ -15,9 +12,6 @@ from identification.prediction.comparison import PredictionError
 from identification.signals.transients import Transient
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
-
-_ARRAYS = ("time_s", "frequency_hz", "modal_amplitude", "drive_m", "drive_m_s", "drive_m_s2", "force")
-_ATTRIBUTES = ("largest_identified", "window_periods", "origin", "simulated_range_use", "unbounded_at_s")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -125,20 +119,6 @@ class SweepPrediction(Result):
         if sweep is None or self.origin != BY_ZERO_CROSSINGS:
             return self.frequency_hz
         return np.asarray(np.interp(self.time_s, sweep.time_s, sweep.frequency_hz))
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        attributes = {name: getattr(self, name) for name in _ATTRIBUTES}
-        return {name: getattr(self, name) for name in _ARRAYS}, {**attributes, "notes": list(self.notes)}
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "SweepPrediction":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        try:
-            values: dict[str, Any] = {name: arrays[name] for name in _ARRAYS}
-            return cls(**values, **{**attributes, "notes": tuple(attributes["notes"])})
-        except (KeyError, TypeError) as error:
-            raise IdentificationError(f"sweep prediction: {error} is missing or unknown") from None
 
     def smoothed(self, values: Complex, window_periods: int) -> Complex:
         """Smooth ``values`` (complex[n]) as `identification.demodulate` does: a mean over half the window, twice."""

@@ -5,7 +5,6 @@
 Paduart et al., Automatica 46, 2010; Scheel et al., Eq. (1). `features` lists the features phi and chi.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,15 +17,27 @@ from identification.experiments.simulation import Simulation, use_of
 from identification.linear.subspace import StateSpace
 from identification.models.pnlss.features import Features
 from identification.models.pnlss.kernels import Matrices, simulate, workspace
-from identification.models.pnlss.model_arrays import MATRICES, model_arrays, model_values
+from identification.storage import stored
 from identification.validation import finite_array, positive, read_only
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
+MATRICES = ("a", "b", "e", "c", "d", "f")
+"""Names of the matrices, in the order of the kernels."""
 _UNBOUNDED = 1e4
 """A simulation counts as unbounded once a state exceeds this multiple of its largest value in the training data."""
 
 
+def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Give features a group of attributes; earlier files named their functions beside those of the model."""
+    for name in ("state_features", "output_features"):
+        functions = attributes.pop(f"{name}/functions", [])
+        if {"a", "b"} <= arrays.keys():
+            variables = arrays["a"].shape[0] + arrays["b"].shape[-1]
+            attributes.setdefault(name, {"variables": variables, "functions": functions})
+
+
+@stored(upgrade=_upgrade)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PnlssModel(Result):
     """A nonlinear state-space model, in the units of its channels.
@@ -230,12 +241,3 @@ class PnlssModel(Result):
     def bound(self) -> Float:
         """float[n_states]: magnitude beyond which a run counts as unbounded."""
         return np.where(np.isfinite(self.state_range) & (self.state_range > 0.0), _UNBOUNDED * self.state_range, 1e100)
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        return model_arrays(vars(self))
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any]) -> "PnlssModel":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing."""
-        return cls(**model_values(arrays, attributes))

@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.models.structured.laws import Damper, Joint, Law, Spring
+from identification.storage import stored
 from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 
@@ -19,6 +20,7 @@ _NUDGE = 1e-4
 """Step of the central differences by the numbers of a law; exact where the law is linear in them, else 1e-8."""
 
 
+@stored(inline=("direction",))
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NonlinearElement:
     """Springs, dampers and joints that act on one displacement.

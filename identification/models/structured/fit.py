@@ -89,6 +89,14 @@ class StructuredFit(Result):
     stopped: str
     trials: tuple[ElementTrial, ...] = ()
 
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        if np.shape(self.values) != (count,) or np.shape(self.covariance) != (count, count):
+            raise IdentificationError(
+                f"structured fit: {count} names, but values of shape {np.shape(self.values)} and a covariance of shape "
+                f"{np.shape(self.covariance)}"
+            )
+
 
 def fit_structured(
     modes: LinearModes,

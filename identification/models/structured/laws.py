@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from identification.errors import IdentificationError
+from identification.storage import stored
 from vibrolock.arrays import Float
 
 _LARGEST_SLIP = 0.9
@@ -51,6 +52,7 @@ FROM_ZERO = Way(lambda y: np.where(y >= 0.0, y, np.nan), lambda v: np.maximum(v,
 """A fit goes down to 1e-12: at 0 itself the derivatives by a slider would be those of one that never slips."""
 
 
+@stored(kinds=lambda: LAWS)
 @dataclass(frozen=True, eq=False)
 class Law:
     """A law of force."""
@@ -382,15 +384,3 @@ LAWS: dict[str, type[Law]] = {
     for law in (PolynomialSpring, SplineSpring, Stop, MagnetSpring, UserSpring, PolynomialDamper, Jenkins, Iwan, Masing)
 }
 """All laws by their names."""
-
-
-def law_from_dict(numbers: Mapping[str, Any]) -> Law:
-    """Return the law of `Law.as_dict`; raise `IdentificationError` if there is none like it."""
-    kind = numbers.get("kind")
-    if kind not in LAWS:
-        raise IdentificationError(f"law: kind is {kind!r}, allowed are {', '.join(LAWS)}")
-    given = {name: tuple(v) if isinstance(v, list) else v for name, v in numbers.items() if name != "kind"}
-    try:
-        return LAWS[kind](**given)
-    except TypeError as error:
-        raise IdentificationError(f"law '{kind}': {error}") from None

@@ -1,8 +1,10 @@
 """Files of free decays: modal frequency and damping over the amplitude."""
 
+from functools import partial
 from typing import Any
 
 from identification import DecayBackbone
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -47,8 +49,8 @@ def _say(summary: dict[str, Any]) -> None:
 DECAY = FileKind(
     name="decay-backbone",
     holds=DecayBackbone,
-    pack=DecayBackbone.to_arrays,
-    unpack=DecayBackbone.from_arrays,
+    pack=encode,
+    unpack=partial(decode, DecayBackbone),
     summarise=_summarise,
     say=_say,
     draw="rig.results.decay_backbone.figure:draw_decay",

@@ -1,11 +1,13 @@
 """Files of exciter models."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification import Exciter
 from identification.exciter_coupling.exciter import PARAMETERS
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -54,8 +56,8 @@ def _say(summary: dict[str, Any]) -> None:
 EXCITER = FileKind(
     name="exciter",
     holds=Exciter,
-    pack=Exciter.to_arrays,
-    unpack=Exciter.from_arrays,
+    pack=encode,
+    unpack=partial(decode, Exciter),
     summarise=_summarise,
     say=_say,
     draw="rig.results.exciter.figure:draw_exciter",

@@ -1,10 +1,12 @@
 """Files of frequency response matrices, such as imported ones."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification import FrequencyResponseMatrix
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -53,8 +55,8 @@ def _say(summary: dict[str, Any]) -> None:
 RESPONSE_MATRIX = FileKind(
     name="frequency-response-matrix",
     holds=FrequencyResponseMatrix,
-    pack=FrequencyResponseMatrix.to_arrays,
-    unpack=FrequencyResponseMatrix.from_arrays,
+    pack=encode,
+    unpack=partial(decode, FrequencyResponseMatrix),
     summarise=_summarise,
     say=_say,
     draw="rig.results.frequency_response_matrix.figure:draw_response_matrix",

@@ -1,10 +1,12 @@
 """Files of hammer tests: the hits, and the frequency responses with coherence."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification import HammerTest
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -47,8 +49,8 @@ def _say(summary: dict[str, Any]) -> None:
 HAMMER_TEST = FileKind(
     name="hammer-test",
     holds=HammerTest,
-    pack=HammerTest.to_arrays,
-    unpack=HammerTest.from_arrays,
+    pack=encode,
+    unpack=partial(decode, HammerTest),
     summarise=_summarise,
     say=_say,
     draw="rig.results.hammer_test.figure:draw_hammer_test",

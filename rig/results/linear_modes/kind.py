@@ -1,14 +1,16 @@
 """Files of linear modal analyses: the modes, and the responses in which they were identified."""
 
+from functools import partial
 from typing import Any
 
 from identification import LinearModes, ModalAnalysis
+from identification.storage import decode, encode
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.text.console import number, print_table
 
 
 def _pack(found: ModalAnalysis | LinearModes) -> tuple[Arrays, Attributes]:
-    return (ModalAnalysis(found) if isinstance(found, LinearModes) else found).to_arrays()
+    return encode(ModalAnalysis(found) if isinstance(found, LinearModes) else found)
 
 
 def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
@@ -55,7 +57,7 @@ LINEAR_MODES = FileKind(
     name="linear-modes",
     holds=(ModalAnalysis, LinearModes),
     pack=_pack,
-    unpack=ModalAnalysis.from_arrays,
+    unpack=partial(decode, ModalAnalysis),
     summarise=_summarise,
     say=_say,
     draw="rig.results.linear_modes.figure:draw_linear_modes",

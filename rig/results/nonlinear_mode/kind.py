@@ -1,8 +1,10 @@
 """Files of nonlinear-mode models."""
 
+from functools import partial
 from typing import Any
 
 from identification import NonlinearMode
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -50,8 +52,8 @@ def _say(summary: dict[str, Any]) -> None:
 NONLINEAR_MODE = FileKind(
     name="nonlinear-mode",
     holds=NonlinearMode,
-    pack=NonlinearMode.to_arrays,
-    unpack=NonlinearMode.from_arrays,
+    pack=encode,
+    unpack=partial(decode, NonlinearMode),
     summarise=_summarise,
     say=_say,
     draw="rig.drawing.nonlinear_mode:draw_mode",

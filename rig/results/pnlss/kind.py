@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,21 +10,19 @@ import numpy as np
 
 from identification import (
     Features,
-    IdentificationError,
     PnlssFit,
     PnlssModel,
 )
 from identification.models.pnlss.user_functions import is_users
+from identification.storage import decode, encode
 from rig.errors import ConfigurationError
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.results.simulated.model import (
     SimulatedModel,
     errors_in,
-    packed_errors,
     say_errors,
     say_scatter,
     scatter_in,
-    unpacked_errors,
 )
 from rig.text.console import number
 
@@ -54,25 +53,7 @@ def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attri
         found = IdentifiedPnlss(model=found.model, fit=found)
     elif isinstance(found, PnlssModel):
         found = IdentifiedPnlss(model=found)
-    kept: PnlssFit | PnlssModel = found.model if found.fit is None else found.fit
-    arrays, attributes = kept.to_arrays()
-    head = "model" if found.fit is None else "fit"
-    arrays = {f"{head}/{name}": array for name, array in arrays.items()}
-    errors, out = packed_errors(found)
-    return arrays | errors, {head: attributes} | out
-
-
-def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedPnlss:
-    head = next((name for name in ("fit", "model") if name in attributes), None)
-    if head is None:
-        raise IdentificationError("PNLSS file: holds neither a fit nor a model")
-    inside = {name.removeprefix(f"{head}/"): array for name, array in arrays.items() if name.startswith(f"{head}/")}
-    fit = PnlssFit.from_arrays(inside, attributes[head]) if head == "fit" else None
-    return IdentifiedPnlss(
-        model=PnlssModel.from_arrays(inside, attributes[head]) if fit is None else fit.model,
-        fit=fit,
-        **unpacked_errors(arrays, attributes),
-    )
+    return encode(found)
 
 
 def functions_of(model: PnlssModel) -> list[str]:
@@ -178,7 +159,7 @@ PNLSS = FileKind(
     name="pnlss",
     holds=(IdentifiedPnlss, PnlssFit, PnlssModel),
     pack=_pack,
-    unpack=_unpack,
+    unpack=partial(decode, IdentifiedPnlss),
     summarise=_summarise,
     say=_say,
     draw="rig.results.pnlss.figure:draw_pnlss",

@@ -1,6 +1,7 @@
 """Files of predictions."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from identification import (
     SweepPrediction,
     Transient,
 )
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -200,8 +202,8 @@ def _errors(error: dict[str, Any] | None) -> tuple[str, str, str]:
 PREDICTIONS = FileKind(
     name="predictions",
     holds=Predictions,
-    pack=Predictions.to_arrays,
-    unpack=Predictions.from_arrays,
+    pack=encode,
+    unpack=partial(decode, Predictions),
     summarise=_summarise,
     say=_say,
     draw="rig.results.predictions.figure:draw_predictions",

@@ -10,6 +10,7 @@ import numpy as np
 from identification import (
     ErrorSpectra,
     Experiment,
+    IdentificationError,
     OutputStretch,
     RunScatter,
     SimulatedRun,
@@ -18,12 +19,21 @@ from identification import (
     simulated_run,
 )
 from identification.experiments.simulators import Simulator
-from identification.packing import pack_all, unpack_all
+from identification.storage import stored
 from rig.results.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result
 
 
+def _check_parts(_: Arrays, attributes: Attributes) -> None:
+    """Raise `IdentificationError` if a file holds neither a fit nor a model, or no errors by experiment."""
+    if not {"fit", "model"} & attributes.keys():
+        raise IdentificationError("file of a model: holds neither a fit nor a model")
+    if "runs" not in attributes:
+        raise IdentificationError("runs: is missing")
+
+
+@stored(shared={"model": "fit"}, upgrade=_check_parts)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedModel(Result):
     """A model with its errors on the data with which it was identified.
@@ -164,45 +174,6 @@ def say_scatter(rows: list[dict[str, Any]] | None) -> None:
     )
     if not rows[0]["settled"]:
         print("the shifts had not settled when the fit ended")
-
-
-def packed_errors(found: SimulatedModel) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return arrays and attributes of everything but the model."""
-    arrays: dict[str, Any] = {}
-    attributes = {
-        "seconds": found.seconds,
-        "notes": list(found.notes),
-        "data": found.data,
-        "uses": dict(found.uses),
-    }
-    kept_runs = {"runs": found.runs, "linear_runs": found.linear_runs}
-    ones = {"spectra": found.spectra, "stretch": found.stretch}
-    for name, things in (kept_runs | {name: () if one is None else (one,) for name, one in ones.items()}).items():
-        inside, of_things = pack_all(name, things)
-        arrays, attributes = arrays | inside, attributes | of_things
-    if found.scatter is not None:
-        inside, attributes["scatter"] = found.scatter.to_arrays()
-        arrays |= {f"scatter/{name}": array for name, array in inside.items()}
-    return arrays, attributes
-
-
-def unpacked_errors(arrays: Arrays, attributes: Attributes) -> dict[str, Any]:
-    """Invert `packed_errors`: return the fields of a `SimulatedModel` by name, without the model."""
-    kinds: dict[str, type] = {"runs": SimulatedRun, "linear_runs": SimulatedRun, "spectra": ErrorSpectra}
-    parts: dict[str, Any] = {name: unpack_all(kind, name, arrays, attributes) for name, kind in kinds.items()}
-    spectra = parts.pop("spectra")
-    stretch = unpack_all(OutputStretch, "stretch", arrays, attributes) if "stretch" in attributes else ()
-    if "scatter" in attributes:
-        inside = {name.removeprefix("scatter/"): array for name, array in arrays.items() if name.startswith("scatter/")}
-        parts["scatter"] = RunScatter.from_arrays(inside, attributes["scatter"])
-    return parts | {
-        "spectra": spectra[0] if spectra else None,
-        "stretch": stretch[0] if stretch else None,
-        "seconds": float(attributes["seconds"]),
-        "notes": tuple(attributes["notes"]),
-        "data": str(attributes.get("data", "")),
-        "uses": {str(name): str(use) for name, use in attributes.get("uses", {}).items()},
-    }
 
 
 def errors_in(found: SimulatedModel) -> dict[str, Any]:

@@ -2,23 +2,22 @@
 
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
-from identification.models.structured.arrays import fit_arrays, fit_from, model_arrays, model_from
 from identification.models.structured.laws import Joint, UserSpring
 from identification.models.structured.uncertainty import std_of
+from identification.storage import decode, encode
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.results.simulated.model import (
     SimulatedModel,
     errors_in,
-    packed_errors,
     say_errors,
     say_scatter,
     scatter_in,
-    unpacked_errors,
 )
 from rig.text.console import number, print_table
 
@@ -45,39 +44,12 @@ class IdentifiedStructured(SimulatedModel):
     linear: StructuredModel | None = None
 
 
-_PARTS: dict[str, tuple[Any, Any]] = {
-    "fit": (fit_arrays, fit_from),
-    "model": (model_arrays, model_from),
-    "linear": (model_arrays, model_from),
-}
-"""How the parts of a file are packed and unpacked. A file holds a fit, or a model from elsewhere."""
-
-
 def _pack(found: IdentifiedStructured | StructuredFit | StructuredModel) -> tuple[Arrays, Attributes]:
     if isinstance(found, StructuredFit):
         found = IdentifiedStructured(model=found.model, fit=found)
     elif isinstance(found, StructuredModel):
         found = IdentifiedStructured(model=found)
-    parts = {"fit": found.fit, "model": found.model if found.fit is None else None, "linear": found.linear}
-    arrays, out = packed_errors(found)
-    for name, part in parts.items():
-        if part is not None:
-            inside, out[name] = _PARTS[name][0](part)
-            arrays |= {f"{name}/{key}": array for key, array in inside.items()}
-    return arrays, out
-
-
-def _unpack(arrays: Arrays, attributes: Attributes) -> IdentifiedStructured:
-    parts: dict[str, Any] = {}
-    for name in (name for name in _PARTS if name in attributes):
-        head = f"{name}/"
-        inside = {key.removeprefix(head): array for key, array in arrays.items() if key.startswith(head)}
-        parts[name] = _PARTS[name][1](inside, attributes[name])
-    if "fit" in parts:
-        parts["model"] = parts["fit"].model
-    if "model" not in parts:
-        raise IdentificationError("structured file: holds neither a fit nor a model")
-    return IdentifiedStructured(**parts, **unpacked_errors(arrays, attributes))
+    return encode(found)
 
 
 _Modes = list[dict[str, float | None]]
@@ -248,7 +220,7 @@ STRUCTURED = FileKind(
     name="structured",
     holds=(IdentifiedStructured, StructuredFit, StructuredModel),
     pack=_pack,
-    unpack=_unpack,
+    unpack=partial(decode, IdentifiedStructured),
     summarise=_summarise,
     say=_say,
     draw="rig.results.structured.figure:draw_structured",

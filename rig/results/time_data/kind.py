@@ -1,11 +1,13 @@
 """Files of time records that were measured with other systems."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from identification import TimeRecords
 from identification.experiments.periodicity import period_remark
+from identification.storage import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 
@@ -72,8 +74,8 @@ def _say(summary: dict[str, Any]) -> None:
 TIME_DATA = FileKind(
     name="time-data",
     holds=TimeRecords,
-    pack=TimeRecords.to_arrays,
-    unpack=TimeRecords.from_arrays,
+    pack=encode,
+    unpack=partial(decode, TimeRecords),
     summarise=_summarise,
     say=_say,
     draw="rig.results.time_data.figure:draw_time_data",

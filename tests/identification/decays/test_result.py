@@ -10,6 +10,7 @@ from identification import (
     decay_backbone,
     frequency_response,
 )
+from identification.storage import decode, encode
 from tests.identification.decays.signals import DRIVE, FREQUENCY_HZ, linear
 
 SHAPE = 0.8
@@ -41,17 +42,17 @@ def test_the_force_of_the_nonlinear_mode_holds_the_amplitude_at_resonance(found)
 
 
 def test_arrays_and_attributes_make_the_same_decay_again(found):
-    again = DecayBackbone.from_arrays(*found.to_arrays())
+    again = decode(DecayBackbone, *encode(found))
     assert again.mode().table() == found.mode().table()
     assert again.channels == found.channels
     assert again.specimen == "one mass"
 
 
 def test_what_is_missing_is_named(found):
-    arrays, attributes = found.to_arrays()
+    arrays, attributes = encode(found)
     del arrays["mode_0/time_s"]
-    with pytest.raises(IdentificationError, match="mode_0/time_s"):
-        DecayBackbone.from_arrays(arrays, attributes)
+    with pytest.raises(IdentificationError, match="mode_0: 'time_s' is missing"):
+        decode(DecayBackbone, arrays, attributes)
 
 
 def test_a_decay_shows_itself_as_a_table(found):

@@ -3,6 +3,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from identification import Channel, HammerTest, IdentificationError, hammer_test, linear_modes
+from identification.storage import decode, encode
 from tests.identification.hammer.virtual import (
     CHANNELS,
     DAMPING,
@@ -160,14 +161,14 @@ def test_noise_in_the_force_biases_h1_low_and_noise_in_the_motion_h2_high():
 
 def test_arrays_and_attributes_bring_it_back():
     found = hammer_test(noisy(CLEAN, 40, 1), CHANNELS, RATE_HZ, specimen="plate", **BAND)
-    again = HammerTest.from_arrays(*found.to_arrays())
+    again = decode(HammerTest, *encode(found))
     assert again.hits == found.hits
     assert again.responses.decay_rate_1_s == found.responses.decay_rate_1_s
     np.testing.assert_array_equal(again.responses.deviations, found.responses.deviations)
     np.testing.assert_array_equal(again.coherence, found.coherence)
-    arrays, attributes = found.to_arrays()
+    arrays, attributes = encode(found)
     with pytest.raises(IdentificationError, match="hammer test: 'hits' is missing"):
-        HammerTest.from_arrays(arrays, {name: value for name, value in attributes.items() if name != "hits"})
+        decode(HammerTest, arrays, {name: value for name, value in attributes.items() if name != "hits"})
 
 
 def test_deviations_make_the_total_covariance():

@@ -11,6 +11,7 @@ from identification import (
     linear_modes,
     stabilisation,
 )
+from identification.storage import decode, encode
 from tests.identification.linear.structures import (
     CHANNELS,
     DAMPING,
@@ -77,8 +78,8 @@ def test_complex_residues_are_recovered_and_their_collinearity_told() -> None:
     np.testing.assert_allclose(modes.residues, residues, atol=0.02)
     np.testing.assert_allclose(modes.accelerance(LINES_HZ), modal + 0.3, atol=0.05 * np.max(np.abs(modal)))
     assert np.all(modes.phase_collinearity < 0.97)
-    arrays, attributes = modes.to_arrays()
-    again = LinearModes.from_arrays(arrays, attributes)
+    arrays, attributes = encode(modes)
+    again = decode(LinearModes, arrays, attributes)
     np.testing.assert_array_equal(again.accelerance(LINES_HZ), modes.accelerance(LINES_HZ))
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from identification import Channel, FrequencyResponseMatrix, IdentificationError
+from identification.storage import decode, encode
 
 OUTPUTS = (Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m/s2"))
 INPUTS = (Channel("force", "force", "N"), Channel("second", "force", "N"))
@@ -53,15 +54,15 @@ def test_a_part_keeps_the_covariance_of_its_paths() -> None:
 
 def test_arrays_and_attributes_bring_it_back() -> None:
     whole = matrix()
-    arrays, attributes = whole.to_arrays()
-    back = FrequencyResponseMatrix.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    arrays, attributes = encode(whole)
+    back = decode(FrequencyResponseMatrix, arrays, json.loads(json.dumps(attributes)))
     for name in ("frequency_hz", "value", "noise_covariance"):
         assert np.array_equal(getattr(back, name), getattr(whole, name))
     assert back.total_covariance is None
     assert (back.outputs, back.inputs, back.estimator) == (whole.outputs, whole.inputs, "H1")
     assert (back.input_rms, back.notes) == (whole.input_rms, whole.notes)
-    with pytest.raises(IdentificationError, match="'estimator' is missing or unknown"):
-        FrequencyResponseMatrix.from_arrays(arrays, {k: v for k, v in attributes.items() if k != "estimator"})
+    with pytest.raises(IdentificationError, match="'outputs' is missing or unknown"):
+        decode(FrequencyResponseMatrix, arrays, {k: v for k, v in attributes.items() if k != "outputs"})
 
 
 @pytest.mark.parametrize(

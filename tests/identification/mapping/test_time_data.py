@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from identification import IdentificationError, TimeDataMapping, TimeRecords, map_time_data
+from identification.storage import decode, encode
 
 RATE = 512.0
 SIZE, PERIODS, REALISATIONS, LEVELS = 64, 4, 3, 2
@@ -188,7 +189,7 @@ def test_forces_and_motions_without_a_better_unit_keep_theirs(unit):
 def test_records_come_back_from_arrays_as_they_were():
     data = {"u": FORCE[0].reshape(3, -1).T, "y": MOTION[0].reshape(3, -1).T}
     one = map_time_data(data, told(period_samples=SIZE, lowest_hz=8.0, highest_hz=200.0))
-    two = TimeRecords.from_arrays(*one.to_arrays())
+    two = decode(TimeRecords, *encode(one))
     assert (two.channels, two.excited_hz, two.period_samples) == (one.channels, (8.0, 200.0), SIZE)
     for first, second in zip(one.records, two.records, strict=True):
         np.testing.assert_array_equal(first.samples, second.samples)

@@ -15,6 +15,7 @@ from identification import (
     nonlinear_mode,
     periodic_vibration,
 )
+from identification.storage import decode, encode
 from tests.identification.rigs import CHANNELS, PHI, one_mode_point, sampled
 
 LAGS_DEG = (35.0, 80.0, 90.0, 93.0, 140.0)
@@ -173,15 +174,15 @@ def test_a_reversed_force_or_drive_is_refused_and_polarity_named(signs: list[lis
 def test_a_mode_survives_being_stored_and_its_table_is_json() -> None:
     shapes = ModeShapes(("drive", "tip"), np.array([[PHI], [3.1]]))
     mode = nonlinear_mode(Backbone((two_sensor_point(1.5),), "beam"), mode_shapes=shapes)
-    arrays, attributes = mode.to_arrays()
-    again = NonlinearMode.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    arrays, attributes = encode(mode)
+    again = decode(NonlinearMode, arrays, json.loads(json.dumps(attributes)))
     for name, array in arrays.items():
         np.testing.assert_array_equal(getattr(again, name), array)
     assert (again.source, again.specimen, again.notes) == ("backbone", "beam", mode.notes)
     row = json.loads(json.dumps(mode.table(), allow_nan=False))[0]
     assert {"force_n", "modal_frequency_hz", "damping_ratio", "modal_amplitude", "mac", "amplitude_m"} <= set(row)
-    with pytest.raises(IdentificationError, match="force_n missing"):
-        NonlinearMode.from_arrays({k: v for k, v in arrays.items() if k != "force_n"}, attributes)
+    with pytest.raises(IdentificationError, match="'force_n' is missing"):
+        decode(NonlinearMode, {k: v for k, v in arrays.items() if k != "force_n"}, attributes)
 
 
 def test_mode_shapes_that_channels_cannot_tell_apart_are_refused() -> None:

@@ -11,6 +11,7 @@ from identification import (
 )
 from identification.channels import Motion
 from identification.frequency_responses import Controlled
+from identification.storage import decode, encode
 
 FREQUENCY_HZ = np.arange(79.0, 81.5, 0.05)
 MASS_KG = 1.9
@@ -154,7 +155,7 @@ def test_what_cannot_be_fitted_is_named() -> None:
 
 def test_a_stepped_sine_mode_survives_being_stored() -> None:
     mode = stepped_sine_mode([level(), level(80.1, 0.005)])
-    again = NonlinearMode.from_arrays(*mode.to_arrays())
+    again = decode(NonlinearMode, *encode(mode))
     np.testing.assert_array_equal(again.damping_ratio, mode.damping_ratio)
     assert again.notes == mode.notes
 

@@ -16,6 +16,7 @@ from identification import (
     nonlinear_mode as identify,
 )
 from identification.nonlinear.nonlinear_modes import QUANTITIES, STANDARD_ERRORS
+from identification.storage import decode, encode
 from tests.identification.rigs import PHI, one_mode_point
 
 CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"), Channel("tip", "response", "m/s2"))
@@ -82,7 +83,7 @@ def test_the_standard_error_of_the_drive_shape_is_twice_in_the_damping_and_in_no
     np.testing.assert_allclose(mode.systematic("modal_amplitude") / mode.modal_amplitude, 0.01, rtol=0.1)
     np.testing.assert_allclose(mode.systematic("force_n"), 0.0)
     np.testing.assert_allclose(mode.random_std, known.random_std, rtol=0.2)
-    read = NonlinearMode.from_arrays(*mode.to_arrays())
+    read = decode(NonlinearMode, *encode(mode))
     assert (read.drive_mode_shape, read.drive_mode_shape_std) == (PHI, 0.01 * PHI)
     assert read.drive_mode_shape_source == "x"
 
@@ -111,8 +112,8 @@ def test_the_random_part_is_the_same_however_large_the_systematic_one_is() -> No
     np.testing.assert_allclose(
         np.hypot(skewed.random("damping_ratio"), skewed.systematic("damping_ratio")), skewed.damping_ratio_std, rtol=0.1
     )
-    arrays, attributes = skewed.to_arrays()
-    again = NonlinearMode.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    arrays, attributes = encode(skewed)
+    again = decode(NonlinearMode, arrays, json.loads(json.dumps(attributes)))
     np.testing.assert_array_equal(again.random("damping_ratio"), skewed.random("damping_ratio"))
 
 
@@ -203,12 +204,12 @@ def test_the_same_seed_gives_the_same_numbers_and_unknown_errors_stay_unknown() 
 
 def test_a_file_of_an_earlier_version_is_read_with_a_note() -> None:
     mode = identify(Backbone((noisy_point(),), "beam", PHI))
-    arrays, attributes = mode.to_arrays()
-    again = NonlinearMode.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    arrays, attributes = encode(mode)
+    again = decode(NonlinearMode, arrays, json.loads(json.dumps(attributes)))
     np.testing.assert_array_equal(again.interval("damping_ratio"), mode.interval("damping_ratio"))
     kept = ("modal_frequency_std_hz", "damping_ratio_std")
     old = {k: v for k, v in arrays.items() if k in kept or ("_std" not in k and k != "interval_95")}
-    earlier = NonlinearMode.from_arrays(old, attributes)
+    earlier = decode(NonlinearMode, old, attributes)
     np.testing.assert_array_equal(earlier.damping_ratio_std, mode.damping_ratio_std)
     assert np.isnan(earlier.mac_std).all()
     assert np.isnan(earlier.interval("mac")).all()

@@ -12,6 +12,7 @@ from identification.models.structured.laws import PolynomialDamper, PolynomialSp
 from identification.scatter.fit import fit_with_scatter
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Effect, effects_of, modes_of, shifted
+from identification.storage import decode, encode
 from tests.identification.models.pnlss.systems import experiment as run_of_system, nonlinear_system
 from tests.identification.models.structured.models import beam, linear_modes
 from tests.identification.models.structured.test_fit import experiment
@@ -70,7 +71,7 @@ def test_shifts_of_runs_come_back():
     assert np.log(own.frequency_hz[0] / TRUE.frequency_hz[0]) == pytest.approx(shifts[1], abs=0.05 * WIDTH)
     with pytest.raises(IdentificationError, match=r"^run: is 'run 9', known are run 1, "):
         scatter.model_of(found.model, "run 9")
-    again = RunScatter.from_arrays(*scatter.to_arrays())
+    again = decode(RunScatter, *encode(scatter))
     assert (again.effects, again.widths, again.runs) == (scatter.effects, scatter.widths, scatter.runs)
     np.testing.assert_array_equal(again.shifts, scatter.shifts)
 

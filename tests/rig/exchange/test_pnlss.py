@@ -8,6 +8,7 @@ from scipy.io import loadmat, savemat
 
 from identification import Channel, Features, PnlssModel
 from identification.linear.subspace import StateSpace
+from identification.storage import encode
 from rig.errors import RecordingError
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
@@ -51,7 +52,7 @@ def test_a_model_comes_back_to_the_bit(states, saturating, tmp_path):
     save(sent, tmp_path / "sent.h5")
     export_file(tmp_path / "sent.h5", tmp_path / "m.mat", "mat")
     found = import_file(tmp_path / "m.mat")
-    (arrays, attributes), (wanted, others) = found.to_arrays(), sent.to_arrays()
+    (arrays, attributes), (wanted, others) = encode(found), encode(sent)
     assert attributes == others
     for name, array in wanted.items():
         assert arrays[name].dtype == array.dtype

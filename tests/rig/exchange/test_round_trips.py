@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from identification import NonlinearMode
+from identification.storage import decode, encode
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import KINDS, put_together, taken_apart
 from rig.exchange.mat import read_mat, structures_of_ours
@@ -55,8 +56,8 @@ def test_the_parts_of_an_object_make_it_again(name, request):
 
 
 def test_a_single_point_or_mode_keeps_its_dimensions(mode, tmp_path):
-    arrays, attributes = mode.to_arrays()
-    single = NonlinearMode.from_arrays({name: array[:1] for name, array in arrays.items()}, attributes)
+    arrays, attributes = encode(mode)
+    single = decode(NonlinearMode, {name: array[:1] for name, array in arrays.items()}, attributes)
     for format_ in ("mat", "csv"):
         path = tmp_path / f"one.{format_}"
         write_contents([taken_apart(single)], path, format_)

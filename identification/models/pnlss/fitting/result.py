@@ -1,20 +1,17 @@
 """Result of a fit: the chosen model, the last iterate, and the history of errors."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.errors import IdentificationError
 from identification.models.pnlss.fitting.settings import FitSettings
 from identification.models.pnlss.model import PnlssModel
+from identification.storage import stored
 from identification.validation import read_only
 from vibrolock.arrays import Float
 from vibrolock.results import Result
-
-Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -75,6 +72,12 @@ class FitHistory:
         return 1.0 - float(np.min(self.judged)) / before if 0.0 < before < np.inf else float(np.nan)
 
 
+def _upgrade(_arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Drop a setting of files from before Hessians were always of all samples."""
+    attributes["settings"] = {key: value for key, value in attributes["settings"].items() if key != "every"}
+
+
+@stored(upgrade=_upgrade)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PnlssFit(Result):
     """A fitted model.
@@ -132,49 +135,3 @@ class PnlssFit(Result):
     def validation_error(self) -> float:
         """Relative RMS error of ``model`` on the validation data; NaN without."""
         return float(self.history.validation_error[self.chosen])
-
-    def to_arrays(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Return arrays by name, and the JSON-able attributes that go with them."""
-        arrays: dict[str, NDArray[Any]] = {f"history/{name}": value for name, value in vars(self.history).items()}
-        arrays |= {name: getattr(self, name) for name in ("initial_states", "last_initial_states", "state_scale")}
-        attributes: dict[str, Any] = {"chosen": self.chosen, "stopped": self.stopped}
-        attributes |= {"limited": self.limited, "interrupted": self.interrupted}
-        attributes["settings"] = {
-            key: [list(v) if isinstance(v, tuple) else v for v in value] if isinstance(value, tuple) else value
-            for key, value in asdict(self.settings).items()
-        }
-        for name in ("model", "last", "linear"):
-            model: PnlssModel | None = getattr(self, name)
-            inside, of_model = ({}, None) if model is None else model.to_arrays()
-            arrays |= {f"{name}/{key}": value for key, value in inside.items()}
-            attributes[name] = of_model
-        return arrays, attributes
-
-    @classmethod
-    def from_arrays(cls, arrays: Arrays, attributes: Mapping[str, Any]) -> "PnlssFit":
-        """Invert `to_arrays`; raise `IdentificationError` if something is missing or unknown."""
-        try:
-            models: dict[str, Any] = {}
-            for name in ("model", "last", "linear"):
-                inside = {k.removeprefix(f"{name}/"): v for k, v in arrays.items() if k.startswith(f"{name}/")}
-                of_model = attributes[name]
-                models[name] = None if of_model is None else PnlssModel.from_arrays(inside, of_model)
-            parts = {k.removeprefix("history/"): v for k, v in arrays.items() if k.startswith("history/")}
-            given = dict(attributes["settings"])
-            given.pop("every", None)  # of files from before Hessians were always of all samples
-            given["line_weights"] = tuple(tuple(row) for row in given["line_weights"])
-            given["band_hz"] = None if given["band_hz"] is None else tuple(given["band_hz"])
-            return cls(
-                **models,
-                history=FitHistory(**parts),
-                settings=FitSettings(**given),
-                chosen=int(attributes["chosen"]),
-                stopped=str(attributes["stopped"]),
-                limited=bool(attributes.get("limited", False)),  # not in files of earlier versions
-                interrupted=bool(attributes["interrupted"]),
-                initial_states=arrays["initial_states"],
-                last_initial_states=arrays["last_initial_states"],
-                state_scale=arrays["state_scale"],
-            )
-        except (KeyError, TypeError) as error:
-            raise IdentificationError(f"PNLSS fit: {error} is missing or unknown") from None

@@ -13,6 +13,7 @@ from identification.models.modal.properties import ExtrapolationError, ModalProp
 from identification.models.modal.sweep_inputs import VoltageSweep
 from identification.models.modal.sweep_prediction import SweepPrediction, compare_sweep
 from identification.models.modal.sweeps import predict_sweep
+from identification.storage import decode, encode
 from vibrolock.arrays import Float
 
 W0, Z0, PHI, CUBIC = 2.0 * np.pi * 24.0, 0.004, 0.9, 3.2e9
@@ -235,9 +236,9 @@ def test_bad_input_is_named(recorded: Transient) -> None:
 
 def test_a_prediction_survives_its_arrays(recorded: Transient) -> None:
     prediction = predict_sweep(duffing(), recorded, exciter=EXCITER)
-    arrays, attributes = prediction.to_arrays()
-    again = SweepPrediction.from_arrays(arrays, attributes)
+    arrays, attributes = encode(prediction)
+    again = decode(SweepPrediction, arrays, attributes)
     np.testing.assert_array_equal(again.force, prediction.force)
     assert (again.notes, again.origin, again.range_use) == (prediction.notes, prediction.origin, prediction.range_use)
     with pytest.raises(IdentificationError, match="drive_m_s2"):
-        SweepPrediction.from_arrays({k: v for k, v in arrays.items() if k != "drive_m_s2"}, attributes)
+        decode(SweepPrediction, {k: v for k, v in arrays.items() if k != "drive_m_s2"}, attributes)

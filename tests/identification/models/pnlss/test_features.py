@@ -8,6 +8,7 @@ import pytest
 
 from identification import Features, IdentificationError, PnlssModel
 from identification.models.pnlss.features import FUNCTIONS
+from identification.storage import decode, encode
 from tests.identification.models.pnlss.systems import nonlinear_system
 
 VARIABLES = 3
@@ -70,10 +71,10 @@ def test_features_of_scaled_variables_are_these_but_for_their_factors():
 def test_a_model_keeps_the_names_of_its_functions_in_files(monkeypatch):
     monkeypatch.setitem(FUNCTIONS, "twin", FUNCTIONS["tanh"])
     model = nonlinear_system(2, 1, 1, degrees=(2,), saturating=2)
-    assert not any("functions" in name for name in model.to_arrays()[1])  # all are tanh, as before there were others
+    assert not any("functions" in name for name in encode(model)[1])  # all are tanh, as before there were others
     other = replace(model.state_features, functions=("tanh", "twin"))
-    arrays, attributes = replace(model, state_features=other).to_arrays()
-    again = PnlssModel.from_arrays(arrays, attributes)
+    arrays, attributes = encode(replace(model, state_features=other))
+    again = decode(PnlssModel, arrays, attributes)
     assert again.state_features.functions == ("tanh", "twin")
     assert again.output_features.functions == ()
     assert again.state_features.names(2)[-2:] == ("tanh 1", "twin 2")

@@ -10,6 +10,7 @@ import pytest
 from identification import Features, FitSettings, IdentificationError, PnlssModel, identify_pnlss, pnlss_errors
 from identification.models.pnlss.fitting.fit import fit_pnlss
 from identification.models.pnlss.user_functions import user_function
+from identification.storage import decode, encode
 from tests.identification.models.pnlss.multisines import linear_model, measured, multisine, oscillator
 
 SOURCE = """
@@ -129,8 +130,8 @@ def test_starts_are_found_for_a_users_function_too(own_module):
     found = identify_pnlss(training, states=2, saturating=(2, 0), function=name, settings=FitSettings(iterations=40))
     assert found.model.state_features.functions == (name, name)
     assert found.training_error < 1e-3
-    arrays, attributes = found.to_arrays()
-    assert type(found).from_arrays(arrays, attributes).model.state_features.functions == (name, name)
+    arrays, attributes = encode(found)
+    assert decode(type(found), arrays, attributes).model.state_features.functions == (name, name)
 
 
 def test_nothing_is_imported_before_the_features_are_evaluated(tmp_path, monkeypatch):

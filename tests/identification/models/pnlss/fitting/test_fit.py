@@ -15,6 +15,7 @@ from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.problem import Problem
 from identification.models.pnlss.fitting.records import records_of
 from identification.models.pnlss.fitting.result import FitHistory
+from identification.storage import decode, encode
 from tests.identification.models.pnlss.systems import (
     disturbed,
     experiment,
@@ -105,7 +106,7 @@ def test_a_fit_that_is_stopped_while_it_pays_says_so_and_one_that_has_arrived_do
     assert short.stopped == (
         f"stopped at its limit of 3 iterations while it still paid: the last one lowered the training error by {lowered:.2g} %"
     )
-    assert PnlssFit.from_arrays(*short.to_arrays()).limited
+    assert decode(PnlssFit, *encode(short)).limited
     whole = fit_pnlss(start, experiments, resume=short)
     assert not whole.limited
     assert "limit" not in whole.stopped
@@ -142,8 +143,8 @@ def test_a_resumed_fit_goes_on_as_if_it_had_not_stopped() -> None:
     start = disturbed(system)
     whole = fit_pnlss(start, experiments, settings=FitSettings(iterations=6, tolerance=0.0))
     half = fit_pnlss(start, experiments, settings=FitSettings(iterations=3))
-    arrays, attributes = half.to_arrays()
-    restored = PnlssFit.from_arrays(arrays, json.loads(json.dumps(attributes)))
+    arrays, attributes = encode(half)
+    restored = decode(PnlssFit, arrays, json.loads(json.dumps(attributes)))
     assert restored.settings == half.settings
     both = fit_pnlss(start, experiments, settings=whole.settings, resume=restored)
     np.testing.assert_allclose(both.history.training_error, whole.history.training_error, rtol=1e-7)

@@ -17,6 +17,7 @@ from identification import (
     pnlss_response,
     pnlss_steady_state,
 )
+from identification.storage import decode, encode
 from rig.results.predictions.figure import draw_predictions
 from rig.results.predictions.kind import PREDICTIONS
 from tests.identification.models.pnlss.steady.oscillators import HZ, oscillator, shaker
@@ -60,7 +61,7 @@ def test_predictions_are_compared_packed_shown_and_drawn_like_any_other(capsys: 
         assert comparison.error.peak_error == pytest.approx(0.1, rel=1e-3)
         assert comparison.error.peak_frequency_error == pytest.approx(0.0, abs=1e-6)
     together = Predictions(steady=(found,), steady_references=(reference,), steady_errors=(comparison.error,))
-    again = Predictions.from_arrays(*together.to_arrays())
+    again = decode(Predictions, *encode(together))
     np.testing.assert_array_equal(again.steady[0].displacement_m, found.displacement_m)
     np.testing.assert_array_equal(again.steady[0].modal_amplitude, np.full(found.frequency_hz.size, np.nan))
     assert again.steady[0].notes == found.notes
@@ -143,10 +144,10 @@ def test_a_peak_where_the_curve_was_cut_off_has_no_error() -> None:
         assert "the prediction is largest where it was cut off: it has no peak to compare" in error.notes
         assert (error.row()["peak_error"], error.row()["peak_frequency_error"]) == (None, None)
         assert error_table([error]).splitlines()[1].split()[4:6] == ["-", "-"]
-    arrays, attributes = Predictions(steady=(cut,), steady_references=(None,), steady_errors=(None,)).to_arrays()
-    assert not Predictions.from_arrays(arrays, attributes).steady[0].complete
+    arrays, attributes = encode(Predictions(steady=(cut,), steady_references=(None,), steady_errors=(None,)))
+    assert not decode(Predictions, arrays, attributes).steady[0].complete
     del attributes["steady"][0]["complete"]  # as files without it have it
-    assert Predictions.from_arrays(arrays, attributes).steady[0].complete
+    assert decode(Predictions, arrays, attributes).steady[0].complete
 
 
 def test_a_vibration_beyond_the_range_is_found_nowhere_along_the_way() -> None:
