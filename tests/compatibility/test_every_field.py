@@ -5,9 +5,9 @@ import lzma
 from pathlib import Path
 
 import pytest
-from rig.models.files.files import load, save
 
 from rig.exchange.reading import import_file
+from rig.results.files import load, save
 from tests.flattened import flattened
 
 FOLDER = Path(__file__).parent / "every_field"
