@@ -10,37 +10,9 @@
 enum { STOP_ID = 0x000, BEAT_ID = 0x010, REQUEST_ID = 0x020, ANSWER_ID = 0x030, INDEX_ID = 0x040, PERIOD_ID = 0x050, READBACK_ID = 0x060, OUTPUT_ID = 0x100, SAMPLES_ID = 0x300 };
 enum { FUNCTION = 16, NODE_MASK = 0x00F, HIGHEST_ID = 0x7FF, HIGHEST_NODE = 15 };
 enum { COMMAND_SIZE = 8, INDEX_SIZE = 4, PERIOD_SIZE = 8, FD_HEADER = 2, COUNT_BYTES = 2, READBACK_HEAD = 2, CLASSICAL_READBACK = 3 };
-enum { FD_WRAP = 256, CLASSICAL_SAMPLES = 64, CLASSICAL_OUTPUTS = 32, CLASSICAL_CHANNELS = 4, FD_COUNTS = 31 };
 enum { CONTROL_US = 100000, SHORTEST_EXPIRY_US = 5000, MOST_DROPPED = 255, FRAMES_AT_A_TIME = 16 };
 
 static struct vl_can_shape shape;
-
-struct vl_can_shape vl_can_shape(uint32_t n_channels, bool fd)
-{
-    uint32_t a_frame = fd ? FD_COUNTS : CLASSICAL_CHANNELS;
-    uint32_t parts = (n_channels + a_frame - 1) / a_frame;
-    return (struct vl_can_shape){
-        .fd = fd,
-        .n_channels = n_channels,
-        .parts = parts,
-        .channels = (n_channels + parts - 1) / parts,
-        .rows = fd ? FD_COUNTS / n_channels : 1,
-        .wrap = fd ? FD_WRAP : CLASSICAL_SAMPLES / parts,
-        .output_rows = fd ? FD_COUNTS : CLASSICAL_CHANNELS,
-        .output_wrap = fd ? FD_WRAP : CLASSICAL_OUTPUTS,
-    };
-}
-
-uint8_t vl_can_padded(uint32_t length)
-{
-    static const uint8_t LENGTHS[] = {8, 12, 16, 20, 24, 32, 48, 64};
-    if (length <= 8)
-        return (uint8_t)length;
-    uint32_t i = 0;
-    while (LENGTHS[i] < length)
-        i++;
-    return LENGTHS[i];
-}
 
 /* One direction's frames, for blocks of the size agreed on. */
 struct stream {

@@ -5,6 +5,8 @@
 
 #include "device.h"
 
+enum { FD_WRAP = 256, CLASSICAL_SAMPLES = 64, CLASSICAL_OUTPUTS = 32, CLASSICAL_CHANNELS = 4, FD_COUNTS = 31 };
+
 /* A group is what one sequence number counts: `rows` rows of all channels, in `parts` frames. */
 struct vl_can_shape {
     bool fd;

@@ -6,9 +6,6 @@
 
 enum { CONTROLS = 8 }; /* answers and heartbeats that wait for the wire */
 
-const struct vl_description *vl_about;
-struct vl_counters vl_counters;
-
 static struct vl_command last_request, last_answer;
 static bool has_last;
 
@@ -135,6 +132,7 @@ static enum vl_status start(uint32_t *value)
         vl_in_force = vl_settings;
         vl_about->wire->configure();
         block_is_under_way = false;
+        vl_restart_sampling();
     }
     return vl_start(value);
 }
@@ -142,7 +140,21 @@ static enum vl_status start(uint32_t *value)
 static enum vl_status stop(uint32_t *value)
 {
     block_is_under_way = false;
-    return vl_stop(value);
+    board_lock();
+    vl_stop_locked();
+    vl_end_sampling();
+    board_unlock();
+    board_stop_sampling();
+    *value = vl_state();
+    return VL_DONE;
+}
+
+/* A request that is for a device that does not sample. False: it samples, and the answer is its state. */
+static bool is_at_rest(uint32_t *value)
+{
+    if (vl_is_sampling())
+        *value = vl_state();
+    return !vl_is_sampling();
 }
 
 static enum vl_status carry_out(const struct vl_command *request, uint32_t *value)
@@ -150,17 +162,12 @@ static enum vl_status carry_out(const struct vl_command *request, uint32_t *valu
     *value = request->value;
     switch (request->code) {
     case VL_GET: return vl_get(request->parameter, request->item, value);
-    case VL_SET:
-        if (vl_is_sampling()) {
-            *value = vl_state();
-            return VL_WRONG_STATE;
-        }
-        return vl_set(request->parameter, request->item, value);
+    case VL_SET: return is_at_rest(value) ? vl_set(request->parameter, request->item, value) : VL_WRONG_STATE;
     case VL_START: return start(value);
     case VL_STOP: return stop(value);
     case VL_ARM: return vl_arm(request->value, value);
     case VL_DISARM: return vl_disarm(value);
-    case VL_CLEAR: return vl_clear(value);
+    case VL_CLEAR: return is_at_rest(value) ? vl_clear(value) : VL_WRONG_STATE;
     default: *value = 0; return VL_UNKNOWN;
     }
 }

@@ -77,9 +77,21 @@ struct vl_samples {
     const uint8_t *put_out; /* counts of the converter, where an output was missing; NULL: as handed over */
 };
 
-/* -- device.c: what happens to it, and when ------------------------------------------------------------------------- */
+/* -- state.c: what all parts know ------------------------------------------------------------------------------------- */
+
+struct vl_settings {
+    uint32_t version, rate_mhz, block, queue, watchdog_us, ramp_us;
+};
 
 extern const struct vl_description *vl_about;
+extern struct vl_settings vl_settings;
+extern struct vl_settings vl_in_force; /* those of the last START; the ones above may be set anew once sampling has ended */
+extern uint32_t vl_boot;
+extern int32_t vl_held; /* the count on the converter */
+
+uint32_t vl_count_bytes(void);
+
+/* -- device.c: what happens to it, and when ------------------------------------------------------------------------- */
 
 void vl_take_request(const struct vl_command *request);
 /* The outputs of a block, what period they are the last of (1/65536 sample; 0: none), and how many samples their end is away from the
@@ -89,17 +101,8 @@ void vl_take_emergency_stop(void);
 
 /* -- parameters.c: the dictionary ------------------------------------------------------------------------------------ */
 
-struct vl_settings {
-    uint32_t version, rate_mhz, block, queue, watchdog_us, ramp_us;
-};
-
-extern struct vl_settings vl_settings;
-extern struct vl_settings vl_in_force; /* those of the last START; the ones above may be set anew once sampling has ended */
-extern uint32_t vl_boot;
-
 void vl_begin_parameters(uint32_t boot);
 uint32_t vl_largest_block(void);
-uint32_t vl_count_bytes(void);
 enum vl_status vl_get(uint8_t parameter, uint8_t item, uint32_t *value);
 enum vl_status vl_set(uint8_t parameter, uint8_t item, uint32_t *value);
 
@@ -109,7 +112,7 @@ void vl_begin_life(void);
 enum vl_state vl_state(void);
 uint8_t vl_latched(void);
 enum vl_status vl_start(uint32_t *value);
-enum vl_status vl_stop(uint32_t *value);
+void vl_stop_locked(void);
 enum vl_status vl_arm(uint32_t key, uint32_t *value);
 enum vl_status vl_disarm(uint32_t *value);
 enum vl_status vl_clear(uint32_t *value);
@@ -150,8 +153,6 @@ void vl_restart_sampling(void);
 void vl_end_sampling(void);
 bool vl_is_sampling(void);
 void vl_note_an_output(void);        /* a first output has come */
-void vl_hold_zero(void);             /* the converter is at 0 V */
-int32_t vl_held(void);               /* the count on the converter */
 uint32_t vl_instants(void);          /* sample instants since the reset, as a sign of life */
 uint32_t vl_dropped(void);           /* samples since START */
 uint64_t vl_handed_over(void);       /* samples since START that were sent or dropped */

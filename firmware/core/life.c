@@ -68,7 +68,7 @@ static void go_down_locked(uint64_t samples)
 static void drop_locked(enum vl_state next)
 {
     is_ramping = false;
-    vl_hold_zero();
+    vl_held = 0;
     board_output(0);
     go_down_locked(0);
     become_locked(next);
@@ -85,7 +85,6 @@ enum vl_status vl_start(uint32_t *value)
         return VL_WRONG_STATE;
     }
     *value = 0;
-    vl_restart_sampling();
     board_lock();
     is_down = false;
     become_locked(VL_RUNNING);
@@ -94,15 +93,9 @@ enum vl_status vl_start(uint32_t *value)
     return VL_DONE;
 }
 
-enum vl_status vl_stop(uint32_t *value)
+void vl_stop_locked(void)
 {
-    board_lock();
     drop_locked(state == VL_LATCHED ? VL_LATCHED : VL_IDLE);
-    vl_end_sampling();
-    board_unlock();
-    board_stop_sampling();
-    *value = state;
-    return VL_DONE;
 }
 
 enum vl_status vl_arm(uint32_t key, uint32_t *value)
@@ -139,10 +132,6 @@ enum vl_status vl_disarm(uint32_t *value)
 
 enum vl_status vl_clear(uint32_t *value)
 {
-    if (vl_is_sampling()) {
-        *value = state;
-        return VL_WRONG_STATE;
-    }
     if (latch && board_stop_is_pressed()) {
         *value = latch;
         return VL_IS_LATCHED;
@@ -190,7 +179,7 @@ void vl_watch(void)
         return;
     }
     bitten_us = fed_us + vl_in_force.watchdog_us;
-    ramp_from = vl_held();
+    ramp_from = vl_held;
     ramp_instants = 0;
     is_ramping = true;
     go_down_locked(instants_in(vl_in_force.ramp_us));

@@ -5,15 +5,7 @@
 
 enum { TEXT_WORDS = 8 };
 
-struct vl_settings vl_settings, vl_in_force;
-uint32_t vl_boot;
-
 static uint32_t layout_crcs[1 + VL_VERSION]; /* by version */
-
-uint32_t vl_count_bytes(void)
-{
-    return vl_about->bits / 8;
-}
 
 uint32_t vl_largest_block(void)
 {

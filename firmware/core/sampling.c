@@ -9,7 +9,6 @@ static volatile bool is_on;
 static volatile bool has_output; /* an output has come since START */
 static volatile uint32_t instants;
 
-static int32_t held;             /* count on the converter */
 static int32_t lowest_count, highest_count; /* of the converter's range */
 static uint64_t first_expected;  /* no output exists for samples before it */
 static uint8_t seen;             /* flags of the block under way */
@@ -41,7 +40,7 @@ static void find_range(void)
 void vl_begin_sampling(void)
 {
     is_on = false;
-    held = 0;
+    vl_held = 0;
     handed_over = 0;
     atomic_store(&dropped, 0);
     atomic_store(&written, 0);
@@ -52,7 +51,7 @@ void vl_begin_sampling(void)
 void vl_restart_sampling(void)
 {
     vl_clear_outputs();
-    held = 0;
+    vl_held = 0;
     has_output = false;
     first_expected = (uint64_t)vl_in_force.queue * vl_in_force.block;
     seen = 0;
@@ -84,16 +83,6 @@ bool vl_is_sampling(void)
 void vl_note_an_output(void)
 {
     has_output = true;
-}
-
-void vl_hold_zero(void)
-{
-    held = 0;
-}
-
-int32_t vl_held(void)
-{
-    return held;
 }
 
 uint32_t vl_instants(void)
@@ -137,7 +126,7 @@ static int32_t armed_output(bool has_come, int32_t count, uint64_t index)
     bool goes_on = vl_continue(index, &count);
     if (has_output && index >= first_expected)
         seen |= goes_on ? VL_OUTPUT_CONTINUED : VL_OUTPUT_HELD;
-    return goes_on ? clipped(count) : held;
+    return goes_on ? clipped(count) : vl_held;
 }
 
 /* The counts of a block that was put out, for the host if an output was missing. */
@@ -145,7 +134,7 @@ static void note_put_out(uint64_t index)
 {
     const uint32_t n_bytes = vl_count_bytes();
     if (readback_bytes && index - first < vl_in_force.block)
-        vl_put_count(put_out + (uint32_t)(index - first) * n_bytes, held, n_bytes);
+        vl_put_count(put_out + (uint32_t)(index - first) * n_bytes, vl_held, n_bytes);
 }
 
 int32_t vl_output(void)
@@ -160,11 +149,11 @@ int32_t vl_output(void)
     int32_t count = 0;
     bool has_come = vl_next_output(&count);
     if (vl_state() == VL_ARMED)
-        held = armed_output(has_come, count, index);
+        vl_held = armed_output(has_come, count, index);
     else
-        held = vl_ramp(&count) ? count : 0;
+        vl_held = vl_ramp(&count) ? count : 0;
     note_put_out(index);
-    return held;
+    return vl_held;
 }
 
 static uint32_t after(uint32_t place)

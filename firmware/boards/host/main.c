@@ -12,8 +12,6 @@
 
 #define LOOKS 3 /* at a press, at most: one that has latched already does so no more */
 
-struct plant host_structure;
-
 static volatile sig_atomic_t told_to_end, looks_left;
 static uint32_t stops_before; /* emergency stops that had latched before the press */
 

@@ -15,14 +15,6 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the structure's count
 
 static int32_t answer[1 + VL_LARGEST_BLOCK * VL_MOST_CHANNELS];
 
-void plant_complain(const char *what, const char *about)
-{
-    const char *const texts[] = {what, about, "\n"};
-    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++)
-        if (write(STDERR_FILENO, texts[i], strlen(texts[i])) < 0)
-            return;
-}
-
 /* All n bytes; false at the end of the file. */
 static bool read_all(int from, void *into, size_t n)
 {
