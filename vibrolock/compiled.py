@@ -1,30 +1,18 @@
-"""Decorators for the compiled kernels of the distribution, and a cache of machine code by content.
+"""Decorators for the compiled kernels of the distribution, whose machine code is found by their content.
 
 A kernel is a module-level function. It takes and returns plain arrays, structured arrays and scalars, allocates nothing per
 sample and never raises. It returns codes; its caller raises.
 
 numba's own cache identifies a kernel by its file. It does not notice changes in other files, of a called kernel or of a
-constant that is compiled in. Here machine code is found by a digest of everything that determines it (`content_digest`).
+constant that is compiled in. Here machine code is found by a digest of all that determines it (`vibrolock.content_digest`).
 
 numba itself is loaded when a kernel is first called, so that a module may declare kernels at no cost to those who call none.
 """
 
-import contextlib
-import enum
 import functools
-import glob
-import hashlib
-import os
-import re
-import tempfile
 import threading
-import time
-import types
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, ParamSpec, TypeAlias, TypeVar, cast
-
-import numpy as np
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -35,11 +23,6 @@ Record: TypeAlias = Any
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "_nrt": False}
 """Options of numba: IEEE arithmetic only, so that runs repeat bit for bit. Kernels allocate nothing, so that arrays inside them
 need no reference counts, which would cost a third of the time of a sample."""
-
-_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
-_UNUSED_AFTER_DAYS = 30
-_DAY_S = 86400.0
-_INDEX = re.compile(r".+-[0-9a-f]{24}\.py\d+\w*\.nbi")  # numba's name, with the kernel's digest
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -121,114 +104,3 @@ class _Kernel:
             if self._dispatcher is None:
                 self._dispatcher = dispatcher(self.py_func, self._options)
             return self._dispatcher
-
-
-def content_digest(kernel: Any) -> str:
-    """Return a digest of everything that determines a kernel's machine code, as hexadecimal text.
-
-    It covers code and options of the kernel and of all kernels that it calls, and the constants that they name. The types of
-    the arguments, the processor and numba's version are further keys of the cache. Comments and docstrings do not count.
-    Module-level names are looked up when the digest is made, so that a kernel may call one that is defined below it.
-    """
-    known: str | None = getattr(kernel, "_content_digest", None)
-    if known is None:
-        digest = hashlib.sha256(b"2")  # machine code of digests without it may lack the entry for Python
-        for part in _content(kernel, set()):
-            digest.update(part.encode())
-            digest.update(b"\0")
-        known = kernel._content_digest = digest.hexdigest()
-    return known
-
-
-def _content(value: Any, seen: set[int]) -> Iterator[str]:
-    """Yield texts for a value that a kernel names; they differ if the machine code may differ."""
-    inner = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel; of a numba intrinsic
-    if isinstance(value, types.FunctionType):
-        inner = value
-    if inner is not None:
-        yield f"{inner.__module__}.{inner.__qualname__} {sorted(getattr(value, 'targetoptions', {}).items())}"
-        if id(inner) in seen:
-            return
-        seen.add(id(inner))
-        cells = [cell.cell_contents for cell in inner.__closure__ or ()]
-        for part in (*cells, *(inner.__defaults__ or ())):
-            yield from _content(part, seen)
-        yield from _code(inner.__code__, inner.__globals__, seen, inner.__doc__)
-    elif isinstance(value, np.ndarray):
-        yield f"{value.dtype!r} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
-    elif isinstance(value, types.ModuleType):
-        yield value.__name__
-    elif isinstance(value, type) and issubclass(value, enum.Enum):
-        yield f"{value.__qualname__} {[(one.name, one.value) for one in value]}"
-    elif isinstance(value, type | types.BuiltinFunctionType):
-        yield f"{value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
-    else:
-        yield _ADDRESS.sub("", f"{type(value).__qualname__} {value!r}")  # addresses differ between processes
-
-
-def _code(code: types.CodeType, names: dict[str, Any], seen: set[int], doc: str | None) -> Iterator[str]:
-    yield code.co_code.hex()
-    yield f"{code.co_names} {code.co_varnames} {code.co_freevars}"
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from _code(constant, names, seen, None)
-        elif constant != doc or doc is None:
-            yield repr(constant)
-    for name in code.co_names:
-        if name in names:
-            yield name
-            yield from _content(names[name], seen)
-
-
-_folder: Path | None = None
-
-
-def kernel_cache_folder() -> Path:
-    """Return the folder with the machine code of all kernels; create it if necessary.
-
-    It lies below ``NUMBA_CACHE_DIR``, ``XDG_CACHE_HOME`` or ``~/.cache``, the first that can be written. Otherwise it is a
-    temporary folder of this process alone, because machine code is loaded from it and no other user may place code there.
-    """
-    global _folder
-    if _folder is None:
-        _folder = _first_writable() or Path(tempfile.mkdtemp(prefix="vibrolock-"))
-    return _folder
-
-
-def _first_writable() -> Path | None:
-    for parent in _possible_parents():
-        folder = parent / "kernels"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            os.utime(folder)
-        except OSError:
-            continue
-        _remove_unused(folder)
-        return folder
-    return None
-
-
-def _possible_parents() -> Iterator[Path]:
-    for variable in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
-        if os.environ.get(variable):
-            yield Path(os.environ[variable]) / "vibrolock"
-    with contextlib.suppress(RuntimeError):  # a user without a home
-        yield Path.home() / ".cache" / "vibrolock"
-
-
-def note_use(index: Path) -> None:
-    """Note that the machine code of an index was used, so that it is kept for another month."""
-    with contextlib.suppress(OSError):
-        if index.stat().st_mtime < time.time() - _DAY_S:
-            os.utime(index)
-
-
-def _remove_unused(folder: Path) -> None:
-    """Remove machine code that was not used for a month. The folder may be one with files of the user's beside it."""
-    oldest = time.time() - _UNUSED_AFTER_DAYS * _DAY_S
-    with contextlib.suppress(OSError):
-        for index in folder.glob("*.nbi"):
-            if _INDEX.fullmatch(index.name) and index.stat().st_mtime < oldest:
-                for file in folder.glob(f"{glob.escape(index.stem)}.*"):
-                    if file.suffix in (".nbi", ".nbc", ".lock"):
-                        file.unlink(missing_ok=True)

@@ -17,8 +17,9 @@ import llvmlite.binding
 import numba
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
-from vibrolock.compiled import content_digest, kernel_cache_folder, note_use
 from vibrolock.compiling import on_compiling
+from vibrolock.content_digest import content_digest
+from vibrolock.kernel_cache import kernel_cache_folder, note_use
 
 if sys.platform != "win32":
     import fcntl

@@ -25,7 +25,7 @@ def examine(folder: Path) -> dict[str, Any]:
     from rig.bench import shipped_benches
     from rig.drivers import driver_names
     from rig.wire.serial.port import port_names
-    from vibrolock.compiled import kernel_cache_folder
+    from vibrolock.kernel_cache import kernel_cache_folder
 
     with_it, without_it = _probed(privileged=True), _probed(privileged=False)
     return {

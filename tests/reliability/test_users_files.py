@@ -13,13 +13,13 @@ from rig.emulator.ports import named
 from rig.errors import ConfigurationError, RecordingError
 from rig.hil.results import Results
 from rig.rehearsal.rehearsal import discard_draws
-from rig.reproduce.folder import prepare
-from rig.reproduce.options import Options
-from rig.reproduce.references.output import prepared
-from rig.reproduce.specimens import specimen_of
+from studies.reproduce.folder import prepare
+from studies.reproduce.options import Options
+from studies.reproduce.references.output import prepared
+from studies.reproduce.specimens import specimen_of
 from tests.recorded import recorded
 from tests.rig.rigs import bench_with
-from vibrolock import compiled
+from vibrolock import kernel_cache
 
 TEXT = "years of work"
 
@@ -142,6 +142,6 @@ def test_the_cache_of_machine_code_loses_nothing_but_machine_code(users, tmp_pat
     for path in (*ours, *files, *(path.parent for path in files)):
         os.utime(path, (1e9, 1e9))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(compiled, "_folder", None)
-    assert compiled.kernel_cache_folder() == tmp_path / "vibrolock" / "kernels"
+    monkeypatch.setattr(kernel_cache, "_folder", None)
+    assert kernel_cache.kernel_cache_folder() == tmp_path / "vibrolock" / "kernels"
     assert not any(path.exists() for path in ours)

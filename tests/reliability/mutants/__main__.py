@@ -16,7 +16,7 @@ import vibrolock
 from tests.reliability.mutants.choosing import EQUIVALENT, PACKAGES, Mutant, chosen
 from tests.reliability.mutants.running import LIMIT_S, Verdict, judged
 from tests.reliability.mutants.telling import compared, read, survivors, table, told, write
-from vibrolock.compiled import kernel_cache_folder
+from vibrolock.kernel_cache import kernel_cache_folder
 
 ROOT = Path(__file__).parents[3]
 
