@@ -15,10 +15,12 @@ from joblib.externals.loky import reusable_executor
 
 from tests.running import first_those_that_wait, keep_bytecode, use_memory_for_files, workers
 from tests.sharing import shared_folder
+from tests.studies.installed import install_studies
 
 keep_bytecode()
 use_memory_for_files()
 shared_folder()  # before workers are started, which then share it
+install_studies()
 
 pytest_plugins = ["tests.changed.plugin", "tests.command"]
 

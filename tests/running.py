@@ -16,7 +16,7 @@ WAITING = tuple(
     f"tests/{place}"
     for place in (
         *("contract/", "firmware/", "hardware/", "reliability/kills/", "reliability/mutations/", "reliability/places/"),
-        *("rig/emulator/", "rig/live/", "rig/loop/worker/", "rig/matrix/", "rig/monitor/"),
+        *("rig/emulator/", "rig/live/", "rig/loop/worker/", "studies/matrix/", "rig/monitor/"),
         *("rig/campaigns/running/test_runs.py", "rig/check/test_on_emulators.py", "rig/cli/test_imports.py"),
         *("rig/cli/test_replay_command.py", "rig/cli/test_stop.py", "rig/recording/test_kill_and_full_disk.py"),
         *(

@@ -70,7 +70,7 @@ def test_a_wheel_holds_all_modules_benches_plans_specimens_the_page_templates_an
     template = {name.replace("docs/", "rig/authoring/") for name in tracked("docs/driver-template")}
     assert template
     assert template - names == set()
-    assert not [name for name in names if name.startswith(("tests/", "benchmarks/", "docs/"))]
+    assert not [name for name in names if name.startswith(("tests/", "benchmarks/", "docs/", "studies/"))]
 
 
 def test_an_sdist_also_holds_tests_documentation_and_what_a_contributor_reads(built):
@@ -124,10 +124,24 @@ def test_new_files_and_shipped_ones_come_from_the_wheel(empty, tmp_path):
     assert schema["properties"]["name"]["description"] == "Name, used in messages and files."
 
 
+def test_studies_are_a_wheel_of_their_own_that_brings_their_commands(empty, tmp_path):
+    assert "pip install ./studies" in _in(empty, tmp_path, "rig", "reproduce", "--help")
+    _run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)], ROOT / "studies")
+    (wheel,) = tmp_path.glob("*.whl")
+    names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    assert names == set(tracked("studies")) - {"studies/pyproject.toml", "studies/README.md"}
+    install = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", str(wheel)]
+    _run([sys.executable, "-m", "pip", "--python", str(empty / "python"), *install], tmp_path)
+    assert "--realisations" in _in(empty, tmp_path, "rig", "reproduce", "--help")
+
+
 def test_the_version_and_the_licence_are_those_of_the_citation():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {project['version']}\n" in citation
+    studies = tomllib.loads((ROOT / "studies" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert studies["version"] == project["version"]
+    assert studies["dependencies"] == [f"vibrolock=={project['version']}"]
     assert f"\nlicense: {project['license']}\n" in citation
     assert f"\n  - name: {project['authors'][0]['name']}\n" in citation
     assert f"\n## [{project['version']}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")

@@ -26,11 +26,11 @@ from rig.cli.predict import predict
 from rig.cli.rehearse import rehearse_
 from rig.cli.replay import replay_
 from rig.cli.report import report_
-from rig.cli.reproduce import reproduce_
 from rig.cli.run import resume, run
 from rig.cli.schema import new, schema
 from rig.cli.show import plot_, show
 from rig.cli.stop import stop
+from rig.cli.studies import StudyCommand, reproduce_
 from rig.cli.tune import tune_
 from rig.cli.watch import watch_
 
@@ -67,7 +67,9 @@ app.command()(emulate)
 app.command()(conformance)
 app.command("check")(check_)
 app.command("rehearse")(rehearse_)
-app.command("reproduce")(reproduce_)
+app.command("reproduce", cls=StudyCommand, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})(
+    reproduce_
+)
 app.command()(run)
 app.command()(resume)
 app.command()(monitor)

@@ -1,6 +1,5 @@
 """``rig doctor``: what this machine and a bench's device can promise, which settings hold, and all ways to run side by side."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -8,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rig.cli.options import Json
+from rig.system.studies import load_study
 
 if TYPE_CHECKING:
     from rig.bench import Bench
 
 UNITS = {"block": "samples", "queue_blocks": "blocks", "watchdog_s": "s", "largest_rate_hz": "Hz"}
-MATRIX_BENCH = "magnet-beam"
 
 
 def doctor(
@@ -52,13 +51,10 @@ def doctor(
     _check_options(daq, matrix, [*(others or ()), *(firmware or ()), *([Path("--verify")] if verify else ())], output)
     device = None if daq is None else _examined(daq, seconds)
     if matrix:
-        _matrix(device, others or [], firmware or [], verify, output, json)
+        load_study("matrix", "--matrix").compare(device, others or [], firmware or [], verify, output, json)
         return
     if device is not None and output is not None:
-        from rig.matrix import write_rows
-        from rig.matrix.measuring import device_row
-
-        write_rows(output, [device_row(*device)])
+        load_study("matrix", "-o").write_device(device, output)
     _show(device[1] if device else examine(Path.cwd()), json)
 
 
@@ -82,37 +78,7 @@ def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], out
     if output is not None and output.suffix not in (".toml", ".json"):
         raise ConfigurationError(f"-o {output}: allowed is a file .toml or .json")
     if output is not None and output.exists():
-        from rig.matrix import read_rows
-
-        read_rows(output)  # only rows of a matrix are replaced
-
-
-def _matrix(
-    device: tuple["Bench", dict[str, Any]] | None,
-    others: list[Path],
-    firmware: list[Path],
-    verify: bool,
-    output: Path | None,
-    json: bool,
-) -> None:
-    """Measure every way, and show it with what others have measured; ``device``: a bench and what was found of its device."""
-    from rig.bench import load_bench
-    from rig.matrix import read_rows, write_rows
-    from rig.matrix.measuring import device_row, matrix_rows
-    from rig.matrix.table import print_matrix
-    from rig.text.console import print_json
-
-    theirs = [row for path in others for row in read_rows(path)]
-    rows = [] if device is None else [device_row(*device)]
-    for row in matrix_rows(load_bench(MATRIX_BENCH), firmware, verify=verify):
-        rows.append(row)
-        print(f"measured: {row.way}", file=sys.stderr, flush=True)
-    if output is not None:
-        write_rows(output, rows)
-    if json:
-        print_json({"row": [row.model_dump(mode="json", exclude_none=True) for row in [*rows, *theirs]]})
-    else:
-        print_matrix([*rows, *theirs])
+        load_study("matrix", "-o").read_rows(output)  # only rows of a matrix are replaced
 
 
 def _show(facts: dict[str, Any], json: bool) -> None:

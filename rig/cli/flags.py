@@ -11,13 +11,15 @@ from typing import Any
 import typer
 from typer.main import get_command
 
+from rig.cli.studies import installed_command
+
 
 def flags(app: typer.Typer) -> dict[str, str]:
     """Return the option for each field name, over all commands."""
     found: dict[str, str] = {}
     waiting: list[Any] = [get_command(app)]
     while waiting:
-        command = waiting.pop()
+        command = installed_command(waiting.pop())
         waiting += getattr(command, "commands", {}).values()
         for parameter in command.params:
             options = [option for option in parameter.opts if option.startswith("--")]

@@ -32,7 +32,7 @@ def commands_of(group: Any, name: str = "rig") -> Iterator[Command]:
     """Yield the commands of a group, and those of the groups in it; ``typer.main.get_command`` returns a group."""
     for word, command in group.commands.items():
         full = f"{name} {word}"
-        yield _command(command, full)
+        yield _command(getattr(command, "installed", command), full)  # what the studies bring
         if hasattr(command, "commands"):
             yield from commands_of(command, full)
 

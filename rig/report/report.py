@@ -13,9 +13,9 @@ from rig.report.document import Chapter, typeset
 from rig.report.models import model_chapter
 from rig.report.pictures import Pictures
 from rig.report.recordings import recording_chapter
-from rig.report.study import study_chapters
 from rig.results.files import understood
 from rig.results.kinds import KINDS
+from rig.system.studies import load_study
 from rig.system.whole_file import whole_file
 from vibrolock import __version__
 
@@ -35,7 +35,7 @@ def write_report(sources: Sequence[Path], output: Path, title: str = "") -> None
     files = [source for source in sources if not source.is_dir()]
     chapters = comparisons(files, pictures) if len(files) > 1 else []
     for source in sources:
-        chapters += study_chapters(source) if source.is_dir() else [_chapter(source, pictures)]
+        chapters += _study(source) if source.is_dir() else [_chapter(source, pictures)]
     text = _rendered(title or _usual_title(chapters, sources), chapters, sources, output)
     with whole_file(output) as path:
         path.write_text(text, encoding="utf-8")
@@ -47,6 +47,11 @@ def _chapter(path: Path, pictures: Pictures) -> Chapter:
         return model_chapter(path, pictures)
     with understood(path, f"recording of kind {kind}"):
         return recording_chapter(path, pictures)
+
+
+def _study(folder: Path) -> list[Chapter]:
+    found: list[Chapter] = load_study("report", str(folder)).study_chapters(folder)
+    return found
 
 
 def _usual_title(chapters: Sequence[Chapter], sources: Sequence[Path]) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import grimp
 
 PRODUCT = ("vibrolock", "rig", "controller", "simulators", "identification")
-PACKAGES = (*PRODUCT, "benchmarks", "tests")
+PACKAGES = (*PRODUCT, "benchmarks", "studies", "tests")
 
 _OF_RESULTS = ("rig.figures", "rig.show")
 """What `vibrolock.results` imports when a result is drawn or shown."""
@@ -71,7 +71,7 @@ def complete(graph: grimp.ImportGraph, text: Mapping[str, str], drivers: list[st
                 hidden.append((module, f"{package}.conftest"))
         if module == "vibrolock.results" or module.startswith("tests.changed."):
             continue
-        testing = module.startswith(("tests.", "benchmarks."))
+        testing = module.startswith(("tests.", "benchmarks.", "studies."))
         hidden += [(module, name) for name in _named(_NAMED if testing else _ADDRESS, own, modules, graph)]
         if testing and any(word in own for word in _SHOWN):
             hidden += [(module, name) for name in _OF_RESULTS]

@@ -23,7 +23,7 @@ def test_every_room_of_the_bench_is_on_the_map():
 
 
 @pytest.mark.parametrize(
-    "package", ["rig", "controller", "simulators", "identification", "vibrolock", "tests", "benchmarks"]
+    "package", ["rig", "controller", "simulators", "identification", "vibrolock", "tests", "benchmarks", "studies"]
 )
 def test_every_package_is_on_the_map(package):
     assert re.search(rf"^    {package}/ ", MAP, re.MULTILINE)

@@ -1,7 +1,7 @@
 """The page of ways to run is what its rows say, and all rows can be read."""
 
-from rig.matrix import read_rows
-from rig.matrix.ways import way_benches
+from studies.matrix.rows import read_rows
+from studies.matrix.ways import way_benches
 from tests.docs.ways_to_run import ROWS, made, parts
 
 

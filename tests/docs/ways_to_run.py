@@ -3,9 +3,9 @@
 import re
 import sys
 
-from rig.matrix import read_rows
-from rig.matrix.table import print_matrix
 from rig.text.console import PrintedTable, collected
+from studies.matrix.rows import read_rows
+from studies.matrix.table import print_matrix
 from tests.docs.pages import ROOT
 
 ROWS = ROOT / "docs" / "reference" / "ways-to-run.toml"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from tests.reliability.mutants.operators import Change, changes
 
-PACKAGES = ("rig", "controller", "simulators", "identification", "vibrolock")
+PACKAGES = ("rig", "controller", "simulators", "identification", "vibrolock", "studies")
 EQUIVALENT: dict[str, str] = tomllib.loads(Path(__file__).with_name("equivalent.toml").read_text(encoding="utf-8"))
 """Names of mutants that mean the same as the product, and the reason."""
 LEAST = 20

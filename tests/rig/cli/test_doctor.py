@@ -1,13 +1,13 @@
-"""`rig doctor --daq` and `--matrix` as a person sees them; what they measure is tested beside rig.loop and rig.matrix."""
+"""`rig doctor --daq` and `--matrix` as a person sees them; what they measure is tested beside rig.loop and studies.matrix."""
 
 import json
 
 import pytest
 
 from rig.emulator.emulated import emulated
-from rig.matrix import read_rows, write_rows
-from tests.rig.matrix.test_rows import THEIRS, row
+from studies.matrix.rows import read_rows, write_rows
 from tests.rig.rigs import bench_with
+from tests.studies.matrix.test_rows import THEIRS, row
 
 FOUND = {
     "driver": "serial",
@@ -82,7 +82,7 @@ def test_rows_of_others_are_shown_beside_those_that_are_measured_and_are_not_wri
         asked.append((bench.name, firmware, verify))
         return iter([row("virtual"), row("serial")])
 
-    monkeypatch.setattr("rig.matrix.measuring.matrix_rows", measured)
+    monkeypatch.setattr("studies.matrix.command.matrix_rows", measured)
     write_rows(tmp_path / "theirs.json", [row("a board", **THEIRS)])
     status, out, err = command("doctor --matrix theirs.json --firmware fw.elf --verify -o ours.toml")
     assert status == 0
@@ -108,7 +108,7 @@ def test_rows_of_others_are_shown_beside_those_that_are_measured_and_are_not_wri
     ],
 )
 def test_what_has_no_effect_or_cannot_be_read_is_refused_before_anything_is_measured(command, monkeypatch, line, named):
-    monkeypatch.setattr("rig.matrix.measuring.matrix_rows", lambda *arguments, **keys: pytest.fail("was measured"))
+    monkeypatch.setattr("studies.matrix.command.matrix_rows", lambda *arguments, **keys: pytest.fail("was measured"))
     status, _, err = command(line)
     assert status == 1
     assert named in " ".join(err.split())

@@ -5,7 +5,6 @@ import pytest
 from rig.arming.run_options import RunOptions
 from rig.cli.app import app
 from rig.cli.flags import flags, with_flags
-from rig.reproduce.options import Options
 from rig.results.decay_backbone.options import DecayOptions
 from rig.results.identify_request import Request
 from rig.results.pnlss.options import PnlssOptions
@@ -13,6 +12,7 @@ from rig.results.predictions.request import PredictionRequest
 from rig.results.simulated.options import DataOptions
 from rig.results.structured.options import StructuredOptions
 from rig.tuning import TuningRequest
+from studies.reproduce.options import Options
 
 FILLED_OTHERWISE = {"pnlss", "structured", "decay", "data", "specimen", "folder", "progress", "about"}
 """Fields that no single option fills."""

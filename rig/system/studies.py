@@ -1,0 +1,28 @@
+"""What the distribution `vibrolock-studies` adds to the commands. It is installed apart and found by entry point."""
+
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from rig.errors import ConfigurationError
+
+GROUP = "vibrolock.studies"
+"""Group of entry points under which the studies are installed."""
+HOW_TO_INSTALL = "pip install ./studies (in a clone of this repository)"
+
+
+def find_study(name: str) -> EntryPoint | None:
+    """Return the entry point of a study; None if the studies are not installed."""
+    return next(iter(entry_points(group=GROUP, name=name)), None)
+
+
+def load_study(name: str, user: str) -> Any:
+    """Return what a study brings; ``user``: what needs it, with which the message begins.
+
+    Raises `rig.errors.ConfigurationError`, with the command that installs the studies, if they are not installed.
+    """
+    entry = find_study(name)
+    if entry is None:
+        raise ConfigurationError(
+            f"{user}: needs the distribution vibrolock-studies, which is not installed; {HOW_TO_INSTALL}"
+        )
+    return entry.load()

@@ -1,0 +1,1 @@
+"""Studies with the product: papers reproduced, ways to run and methods compared. A distribution of its own."""

@@ -1,0 +1,221 @@
+"""The chapters on a folder of `rig reproduce`: for each kind of models its errors beside the paper's, peaks, sweeps."""
+
+import json
+import shlex
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rig.errors import RecordingError
+from rig.report.document import Block, Chapter, Facts, Picture, Section, Table, Text
+from rig.report.files import table_of_files
+from rig.results.files import understood
+from rig.system.text_files import read_bytes, read_text
+from rig.text.console import number
+from studies.report.paper import SAME_LEVEL, agreement
+
+_OWN_LEVEL = "same level"
+_LARGEST_BYTES = 10_000_000
+_FIGURES = {
+    "errors.png": "Every test of every model; the line is the mean of the bounded ones.",
+    "steady.png": "Steady responses of the selected models, and of the rig itself.",
+    "sweeps.png": "Sweeps simulated by the selected models, and as recorded.",
+}
+
+
+def study_chapters(folder: Path) -> list[Chapter]:
+    """Return a chapter for each kind of models in a folder.
+
+    Raises `RecordingError` if the folder holds no study, or a damaged one.
+    """
+    if not (folder / "study.json").is_file():
+        raise RecordingError(
+            f"{folder}: is a folder without study.json; allowed is a file, or a folder of rig reproduce"
+        )
+    study = _read(folder / "study.json")
+    tables = sorted(folder.glob("*/table.json"))
+    if not tables:
+        raise RecordingError(f"{folder}: holds no results yet; the same rig reproduce again takes it up")
+    with understood(folder, "study"):
+        return [_chapter(folder, study, path.parent) for path in tables]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(read_text(path, _LARGEST_BYTES, RecordingError))
+    except (ValueError, RecursionError) as error:
+        raise RecordingError(f"{path}: damaged: is no JSON ({error})") from None
+    if not isinstance(found, dict):
+        raise RecordingError(f"{path}: damaged: holds no table")
+    return found
+
+
+def _chapter(folder: Path, study: Mapping[str, Any], results: Path) -> Chapter:
+    table = _read(results / "table.json")
+    errors = {name: list(rows) for name, rows in table["errors"].items()}
+    own = [row for row in errors[next(iter(errors))] if row["model"] is None and row["test"] == _OWN_LEVEL]
+    files = [
+        folder / "study.json",
+        *(results / name for name in ("models.json", "table.json") if (results / name).is_file()),
+    ]
+    return Chapter(
+        f"The paper's campaign on {study['specimen']}: models {results.name}",
+        str(results),
+        [
+            Text(
+                "Multisines were recorded on a virtual rig. Polynomial nonlinear state-space models were identified from them, "
+                "tested on realisations that they were not trained on, and asked for steady responses and sweeps, which are "
+                "held against the rig's own."
+            )
+        ],
+        [
+            Section("How it was made", _made(study, table, _levels(results))),
+            Section("Errors beside the paper's", _beside_the_paper(str(study["specimen"]), own)),
+            Section("Figures", _figures(results)),
+            Section("Errors of all models and tests", [_errors(rows, name) for name, rows in errors.items() if rows]),
+            Section("Steady peaks", _steady(table["steady"])),
+            Section("Sweeps", _sweeps(table["sweeps"])),
+            Section("Models that failed", [Text(f"{name}: {why}", "note") for name, why in table["failures"].items()]),
+            Section("Files", [table_of_files(files)]),
+        ],
+    )
+
+
+def _levels(results: Path) -> int | None:
+    path = results / "models.json"
+    return len(_read(path)["levels"]) if path.is_file() else None
+
+
+def _made(study: Mapping[str, Any], table: Mapping[str, Any], levels: int | None) -> list[Block]:
+    """Return the command that makes the same study, its settings, and how long the fits took."""
+    counts = [row["models"] for row in table["times"]]
+    words = ["rig", "reproduce", str(study["specimen"]), "-o", "FOLDER", "--iterations", str(table["iterations"])]
+    words += ["--models", str(max(counts, default=1))]
+    for name, plain in (("scatter", 0.0), ("seed", 0), ("saturating", 0), ("input", "force")):
+        words += [] if table[name] == plain else [f"--{name}", str(table[name])]
+    words += ["--states", str(table["states"]), "--channel", str(table["output"])]
+    for name in table.get("beside", ["backbone-fine"] if table.get("with_backbone") else []):
+        words += ["--beside", name]
+    words += [] if table["realisations"] is None else ["--realisations", str(table["realisations"])]
+    words += [] if levels is None else ["--levels", str(levels)]
+    for part in ("steady", "sweeps"):
+        words += [] if table[part] else ["--without", part]
+    rows = [
+        (
+            row["training_set"],
+            str(row["models"]),
+            number(row["seconds_mean"], ".1f"),
+            number(row["seconds_most"], ".1f"),
+            number(row["iterations_mean"], ".0f"),
+            number(row["chosen_mean"], ".0f"),
+        )
+        for row in table["times"]
+    ]
+    facts = [
+        ("command", shlex.join(words)),
+        ("bench", str(study["bench"]["name"])),
+        ("seed", str(study["seed"])),
+        ("scatter of modal frequencies", f"{100 * float(study['scatter']):g} %"),
+    ]
+    headings = ("trained at", "models", "time a model\ns", "longest\ns", "iterations", "iterate chosen")
+    return [Facts("", facts), Table("Fits", headings, rows)]
+
+
+def _beside_the_paper(specimen: str, own: Sequence[Mapping[str, Any]]) -> list[Block]:
+    paper = SAME_LEVEL.get(specimen, {})
+    rows = [
+        (
+            row["training_set"],
+            str(row["models"]),
+            _error(row),
+            str(paper.get(row["training_set"], "-")),
+            agreement(row, paper.get(row["training_set"])),
+        )
+        for row in own
+    ]
+    headings = ("trained at", "models", "here", "paper", "agreement")
+    caption = "Relative error at the level of the training: mean and, in brackets, standard deviation over the models"
+    return [
+        Table(caption, headings, rows),
+        Text(
+            "The paper's numbers are of one accelerometer of a real rig; those here are of a virtual one, which is the same in "
+            "every run unless there is scatter.",
+            "note",
+        ),
+    ]
+
+
+def _error(row: Mapping[str, Any]) -> str:
+    text = f"{number(row['mean'], '.2f', 100.0)} %" if row["mean"] is not None else ""
+    if row["standard_deviation"] is not None:
+        text += f" ({number(row['standard_deviation'], '.2f', 100.0)} %)"
+    if row["unbounded_runs"]:
+        text = "; ".join(filter(None, (f"unbounded {row['unbounded_runs']} of {row['runs']}", text)))
+    return text or "-"
+
+
+def _errors(rows: Sequence[Mapping[str, Any]], name: str) -> Table:
+    """Return the error table of a variant: one row for each test, one column for each training set."""
+    of_all = [row for row in rows if row["model"] is None]
+    sets = list(dict.fromkeys(row["training_set"] for row in of_all))
+    cells = {(row["test"], row["training_set"]): _error(row) for row in of_all}
+    tests = list(dict.fromkeys(row["test"] for row in of_all))
+    body = [(test, *(cells.get((test, trained), "") for trained in sets)) for test in tests]
+    return Table(f"Relative errors: {name}", ("tested at", *(f"trained at\n{one}" for one in sets)), body)
+
+
+def _steady(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
+    if not rows:
+        return []
+    body = [
+        (
+            row["training_set"],
+            f"{row['force_n']:g} N" if row["force_n"] is not None else "-",
+            row["held"],
+            number(row["truth_m"], ".4f", 1e3),
+            number(row["peak_m"], ".4f", 1e3),
+            number(row["error"], "+.1f", 100.0),
+            number(row.get("frequency_error"), "+.3f", 100.0),
+            number(row["range_use"], ".2f"),
+        )
+        for row in rows
+    ]
+    headings = ("trained at", "force", "held", "rig\nmm", "model\nmm", "error\n%", "frequency\n%", "range use")
+    lost = [
+        f"trained at {row['training_set']}, {row['held']}: {row['notes'][-1]}" for row in rows if not row["complete"]
+    ]
+    return [
+        Table("Peaks of the selected models against the rig's own", headings, body),
+        *(Text(one, "note") for one in lost),
+    ]
+
+
+def _sweeps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
+    if not rows:
+        return []
+    body = [
+        (
+            row["sweep"],
+            row["training_set"],
+            row["from"],
+            number(row["peak_measured"], ".3f"),
+            "unbounded" if row["unbounded"] else number(row["peak_error"], "+.1f", 100.0),
+            number(row["rms_error"], ".1f", 100.0),
+            number(row["range_use"], ".2f"),
+        )
+        for row in rows
+    ]
+    headings = ("sweep", "trained at", "from", "peak\nm/s^2", "peak error\n%", "RMS error\n%", "range use")
+    return [Table("Sweeps simulated by the selected models", headings, body)]
+
+
+def _figures(results: Path) -> list[Block]:
+    found = [(results / name, caption) for name, caption in _FIGURES.items() if (results / name).is_file()]
+    return [
+        Picture(
+            caption,
+            source=f"data:image/png;base64,{b64encode(read_bytes(path, _LARGEST_BYTES, RecordingError)).decode()}",
+        )
+        for path, caption in found
+    ]
