@@ -87,17 +87,25 @@ def empty(built, tmp_path_factory):
     folder = tmp_path_factory.mktemp("empty")
     venv.create(folder, with_pip=False)
     scripts = folder / ("Scripts" if os.name == "nt" else "bin")
-    install = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", str(built[0])]
-    _run([sys.executable, "-m", "pip", "--python", str(scripts / "python"), *install], folder)
+    _install(built[0], scripts / "python")
     paths = sysconfig.get_paths(vars={"base": str(folder), "platbase": str(folder)})
     libraries = dict.fromkeys(Path(str(one.__file__)).parents[1] for one in map(import_module, ("numpy", "typer")))
     (Path(paths["purelib"]) / "libraries.pth").write_text("\n".join(map(str, libraries)))
     return scripts
 
 
+def _alone():
+    """The environment of a process that finds nothing by itself but what is installed for it."""
+    return {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
+
+
+def _install(wheel, python):
+    install = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", str(wheel)]
+    _run([sys.executable, "-m", "pip", "--python", str(python), *install], wheel.parent, env=_alone())
+
+
 def _in(empty, folder, name, *arguments):
-    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    return _run([str(empty / name), *arguments], folder, env=environment)
+    return _run([str(empty / name), *arguments], folder, env=_alone())
 
 
 def test_commands_and_their_help_work_from_the_wheel(empty, tmp_path):
@@ -130,8 +138,7 @@ def test_studies_are_a_wheel_of_their_own_that_brings_their_commands(empty, tmp_
     (wheel,) = tmp_path.glob("*.whl")
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     assert names == set(tracked("studies")) - {"studies/pyproject.toml", "studies/README.md"}
-    install = ["install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-index", str(wheel)]
-    _run([sys.executable, "-m", "pip", "--python", str(empty / "python"), *install], tmp_path)
+    _install(wheel, empty / "python")
     assert "--realisations" in _in(empty, tmp_path, "rig", "reproduce", "--help")
 
 

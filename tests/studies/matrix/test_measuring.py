@@ -9,8 +9,8 @@ import pytest
 from rig.conformance.run import Finding
 from rig.drivers import make_daq
 from rig.wire.messages import EmergencyStop
+from studies.matrix import measuring
 from studies.matrix.measuring import device_row, matrix_rows
-from studies.matrix.rows import measuring
 from studies.matrix.ways import Way, is_arm, way_benches
 from tests.rig.rigs import bench_with
 
