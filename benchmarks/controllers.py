@@ -21,8 +21,8 @@ from controller.tuning import PlantModel, complex_response_law, exact_phase_law,
 from rig.bench import Bench, load_bench
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.plans import load_plan
+from simulators import VirtualRig
 from simulators.analysis import PeriodicResponses, frequency_response, phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 
 HELD_PERIODS = 20
 RULE = {

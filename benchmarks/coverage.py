@@ -36,9 +36,8 @@ from rig.campaigns.evaluation.vibrations import within_periods
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers import make_daq
 from rig.recording.reader import Recording
+from simulators import Simulation, VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.simulation import Simulation
-from simulators.virtual_rig import VirtualRig
 
 PLANS = ("magnet-beam/backbone", "magnet-beam-symmetric/backbone", "friction-beam/backbone")
 MODAL = ("modal_frequency_hz", "damping_ratio")

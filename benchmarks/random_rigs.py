@@ -71,8 +71,8 @@ def drawn(seed: int) -> dict[str, Any]:
 
 
 def _drawn(draws: Draws) -> dict[str, Any] | None:
+    from simulators import VirtualRig
     from simulators.analysis import phase_resonance_backbone
-    from simulators.virtual_rig import VirtualRig
 
     hertz, damping = draws.log(8.0, 400.0), draws.log(0.0005, 0.03)
     omega = 2.0 * math.pi * hertz

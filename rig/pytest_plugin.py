@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.daq import DAQ
     from rig.hil.subject import ArmedRig, Subject
-    from simulators.virtual_rig import VirtualRig
+    from simulators import VirtualRig
 
 DEFAULT_BENCH = "magnet-beam"
 FACTS: "pytest.StashKey[dict[str, object]]" = pytest.StashKey()

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simulators.kernels import run_observed
 from simulators.layout import Flag, RigArrays, RigState
 from simulators.plant.compilation import pad
+from simulators.stepping import run_observed
 from simulators.virtual_rig import VirtualRig
 
 

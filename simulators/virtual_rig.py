@@ -27,7 +27,7 @@ _OPEN, _LOOSE_N_M = 1e4, 1e-6
 
 
 class VirtualRig(Part):
-    """Everything a virtual rig is; `build` turns it into the arrays that `simulators.kernels.sample` runs on.
+    """Everything a virtual rig is; `build` turns it into the arrays that `simulators.stepping.sample` runs on.
 
     ``VirtualRig.shipped("magnet-beam")`` is a shipped one, ``{"specimen": "magnet-beam"}`` the same as a table. Further
     tables change it key by key: ``VirtualRig.shipped("magnet-beam", converter={"substeps": 4})``; a list is replaced

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.layout import RigArrays, RigState
-from simulators.plant.kernels import advance
+from simulators.kernels import RigArrays, RigState, advance
 from vibrolock.compiled import kernel
 
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.plant.compilation import aligned, pad
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
+from simulators.kernels import aligned, pad
 
 
 class Rk4Arrays(NamedTuple):

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.rk4.arrays import Rk4Arrays, Rk4State
-from simulators.plant.kernels import joint_forces, local_forces
-from simulators.products import combine
+from simulators.kernels import combine, joint_forces, local_forces
 from vibrolock.compiled import kernel
 
 

@@ -14,3 +14,25 @@ structure's nonlinearity; the integral laws take that for a disturbance.
 
 The idea to make an exciter's force a sine by feedback through adaptive filters is that of arXiv 2410.17830.
 """
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from controller.adaptive_filter import MOST_HARMONICS as MOST_HARMONICS
+    from controller.harmonics.law import (
+        drive_harmonics as drive_harmonics,
+        harmonics_at as harmonics_at,
+        measure_harmonics as measure_harmonics,
+        want_harmonics as want_harmonics,
+    )
+    from controller.harmonics.periods import end_harmonics_period as end_harmonics_period, left_alone as left_alone
+    from controller.harmonics.records import ORDERS as ORDERS, HarmonicStage as HarmonicStage
+    from controller.harmonics.settings import (
+        HarmonicsSettings as HarmonicsSettings,
+        check_wanted as check_wanted,
+        harmonic_ratios as harmonic_ratios,
+    )
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)

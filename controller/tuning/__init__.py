@@ -5,66 +5,56 @@
 gains of a phase law.
 """
 
-from controller.tuning.design import Design, Settling, Steps, assess, design_phase_law, worst
-from controller.tuning.exact import complex_response_law, exact_phase_law, exact_scheduled_law, frequency_error_law
-from controller.tuning.hippold import HippoldGains, hippold_gains
-from controller.tuning.laws import (
-    ComplexResponseLaw,
-    ForceLaw,
-    FrequencyErrorLaw,
-    LogForceLaw,
-    LogResponseLaw,
-    PhaseLaw,
-)
-from controller.tuning.loop import ControlLoop, control_loop, lag_per_frequency
-from controller.tuning.noise import LowPassChoice, low_pass_from_densities, low_pass_from_noise
-from controller.tuning.plant import PlantModel
-from controller.tuning.stability import (
-    LARGEST_AT_HALF,
-    Margins,
-    changes_of_hardening,
-    closed_loop_poles,
-    gains_at_half,
-    hardening_margins,
-    margins,
-    unstable_poles,
-)
-from controller.tuning.steps import settling_s, step_response
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "LARGEST_AT_HALF",
-    "ComplexResponseLaw",
-    "ControlLoop",
-    "Design",
-    "ForceLaw",
-    "FrequencyErrorLaw",
-    "HippoldGains",
-    "LogForceLaw",
-    "LogResponseLaw",
-    "LowPassChoice",
-    "Margins",
-    "PhaseLaw",
-    "PlantModel",
-    "Settling",
-    "Steps",
-    "assess",
-    "changes_of_hardening",
-    "closed_loop_poles",
-    "complex_response_law",
-    "control_loop",
-    "design_phase_law",
-    "exact_phase_law",
-    "exact_scheduled_law",
-    "frequency_error_law",
-    "gains_at_half",
-    "hardening_margins",
-    "hippold_gains",
-    "lag_per_frequency",
-    "low_pass_from_densities",
-    "low_pass_from_noise",
-    "margins",
-    "settling_s",
-    "step_response",
-    "unstable_poles",
-    "worst",
-]
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from controller.tuning.design import (
+        Design as Design,
+        Settling as Settling,
+        Steps as Steps,
+        assess as assess,
+        design_phase_law as design_phase_law,
+        worst as worst,
+    )
+    from controller.tuning.exact import (
+        complex_response_law as complex_response_law,
+        exact_phase_law as exact_phase_law,
+        exact_scheduled_law as exact_scheduled_law,
+        frequencies_for as frequencies_for,
+        frequency_error_law as frequency_error_law,
+    )
+    from controller.tuning.hippold import HippoldGains as HippoldGains, hippold_gains as hippold_gains
+    from controller.tuning.laws import (
+        ComplexResponseLaw as ComplexResponseLaw,
+        ForceLaw as ForceLaw,
+        FrequencyErrorLaw as FrequencyErrorLaw,
+        LogForceLaw as LogForceLaw,
+        LogResponseLaw as LogResponseLaw,
+        PhaseLaw as PhaseLaw,
+    )
+    from controller.tuning.loop import (
+        ControlLoop as ControlLoop,
+        control_loop as control_loop,
+        lag_per_frequency as lag_per_frequency,
+    )
+    from controller.tuning.noise import (
+        LowPassChoice as LowPassChoice,
+        low_pass_from_densities as low_pass_from_densities,
+        low_pass_from_noise as low_pass_from_noise,
+    )
+    from controller.tuning.plant import PlantModel as PlantModel
+    from controller.tuning.stability import (
+        LARGEST_AT_HALF as LARGEST_AT_HALF,
+        Margins as Margins,
+        changes_of_hardening as changes_of_hardening,
+        closed_loop_poles as closed_loop_poles,
+        gains_at_half as gains_at_half,
+        hardening_margins as hardening_margins,
+        margins as margins,
+        unstable_poles as unstable_poles,
+    )
+    from controller.tuning.steps import settling_s as settling_s, step_response as step_response
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)

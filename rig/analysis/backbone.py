@@ -20,7 +20,7 @@ from simulators.analysis import (
     hysteresis_loops,
     phase_resonance_backbone,
 )
-from simulators.sites.friction import FrictionSite
+from simulators.parts import FrictionSite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

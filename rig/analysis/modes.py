@@ -10,9 +10,9 @@ from rig.analysis.subject import Subject
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MAIN, REJECTED
 from rig.text.console import number, print_table
-from simulators.modes import LinearModes
-from simulators.structures.meshed import MeshedBeam
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
+from simulators.analysis import LinearModes
+from simulators.parts import MeshedBeam
 from vibrolock.arrays import Float
 
 if TYPE_CHECKING:

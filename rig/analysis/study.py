@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
 from simulators.analysis import PeriodicResponses
-from simulators.layout import Flag
+from simulators.kernels import Flag
 from vibrolock.printable import printable
 from vibrolock.results import Result
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from rig.bench import Bench, load_bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
+from simulators import VirtualRig
 from simulators.analysis import PeriodicResponses
-from simulators.layout import Flag
-from simulators.virtual_rig import VirtualRig
+from simulators.kernels import Flag
 from vibrolock.arrays import Float
 
 _TOLERANCE = 1.0 + 1e-6

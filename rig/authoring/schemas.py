@@ -133,7 +133,7 @@ def _of(model: type[BaseModel]) -> Schema:
 
 
 def _of_rig() -> Schema:
-    from simulators.virtual_rig import VirtualRig
+    from simulators import VirtualRig
 
     return _of(VirtualRig)
 

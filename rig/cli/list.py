@@ -27,7 +27,7 @@ def list_(
 def _everything() -> dict[str, Any]:
     from rig.drivers import driver_names
     from rig.drivers.virtual.parts import parts, specimens
-    from simulators.shipped import shaker_descriptions
+    from simulators.parts import shaker_descriptions
 
     shakers = [{"name": name, "description": text} for name, text in shaker_descriptions().items()]
     return {

@@ -16,7 +16,7 @@ from rig.drivers.virtual.faults import OUTPUT_HELD
 from rig.drivers.virtual.kernels import exchange_block, loopback_of
 from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
-from simulators.layout import Flag
+from simulators.kernels import Flag
 
 WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
 

@@ -17,7 +17,7 @@ from rig.daq import Capabilities
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, NotArmed
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 
 EMULATED_BLOCK_S = 0.004  # a wire carries blocks, no single samples at the rate of a virtual rig
 

@@ -9,8 +9,8 @@ from rig.campaigns.evaluation.point import vibration_of
 from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.hil.conftest import backbone_plan
 from rig.hil.subject import ArmedRig
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 
 REPEATS = {"frequency_hz": 1e-3, "damping_ratio": 0.1, "force_n": 0.1}
 """How well a bench is expected to agree with itself, relative."""

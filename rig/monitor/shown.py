@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.lock import LockState
+from controller import LockState
 from rig.live.reader import Frame
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind

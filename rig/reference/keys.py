@@ -44,7 +44,7 @@ class Key:
 def tables() -> dict[str, type[BaseModel]]:
     """Return the model of every table by the name under which the reference has it."""
     from controller import LockRule, OpenLoop, PhaseLockedLoop
-    from controller.harmonics.settings import HarmonicsSettings
+    from controller.harmonics import HarmonicsSettings
     from identification.mapping.csv_layout import CsvLayout
     from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
     from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
@@ -89,15 +89,29 @@ def tables() -> dict[str, type[BaseModel]]:
 
 
 def _parts_of_a_virtual_rig() -> dict[str, type[BaseModel]]:
-    from simulators.exciter import Exciter, Stinger
-    from simulators.scatter import Deviation, Scatter
-    from simulators.sensing.parts import Converter, Sensor
-    from simulators.sites.elements import Clearance, Cubic, DampingTable, ForceTable, Magnet, User
-    from simulators.sites.friction import IwanSite, JenkinsSite
-    from simulators.structures.meshed import LumpedMass, Support
-    from simulators.structures.structure import BeamStructure, LapJointedBeam, ModalStructure
-    from simulators.virtual_rig import VirtualRig
-    from simulators.wear import Wear
+    from simulators import VirtualRig
+    from simulators.parts import (
+        BeamStructure,
+        Clearance,
+        Converter,
+        Cubic,
+        DampingTable,
+        Deviation,
+        Exciter,
+        ForceTable,
+        IwanSite,
+        JenkinsSite,
+        LapJointedBeam,
+        LumpedMass,
+        Magnet,
+        ModalStructure,
+        Scatter,
+        Sensor,
+        Stinger,
+        Support,
+        User,
+        Wear,
+    )
 
     return {
         "virtual-rig": VirtualRig,

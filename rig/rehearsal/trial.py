@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import scipy
 
-from controller.settings import Settings
 from rig.arming.run_options import Silent
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point
@@ -20,6 +19,7 @@ from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
+from vibrolock.described import Described
 
 FURTHER_PART = 1 << 32  # between the seeds of the parts of a run: other noise in each
 REFUSED = "REFUSED"
@@ -196,7 +196,7 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
 
 def _measuring_harmonics(plan: Plan) -> Plan:
     law, loop = plan.law, plan.law.harmonics
-    if loop is None or not loop.force_per_v or not isinstance(law, Settings):
+    if loop is None or not loop.force_per_v or not isinstance(law, Described):
         return plan
     unknown = loop.model_copy(update={"force_per_v": {}})
     return plan.model_copy(update={"controller": law.model_copy(update={"harmonics": unknown})})

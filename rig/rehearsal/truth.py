@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.harmonics.settings import HarmonicsSettings
+from controller.harmonics import HarmonicsSettings
 from rig.bench import Bench
 from rig.drivers.virtual import VirtualDAQ
 from rig.rehearsal.trial import Trial

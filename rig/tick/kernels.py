@@ -8,14 +8,25 @@ import math
 
 import numpy as np
 
-from controller.amplitude import FORCE_RMS, VOLTAGE, demand, held_size, see_output, take_over
-from controller.detector import ADAPTIVE, detect, force_rms
-from controller.frequency import follow
-from controller.harmonics.law import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
-from controller.law import measure_phase
-from controller.lock import LOST as LOST_LOCK
-from controller.period import add_sample
-from controller.primitives import TWO_PI, advance_phase, size
+from controller.harmonics import drive_harmonics, harmonics_at, measure_harmonics, want_harmonics
+from controller.kernels import (
+    ADAPTIVE,
+    FORCE_RMS,
+    LOST as LOST_LOCK,
+    TWO_PI,
+    VOLTAGE,
+    add_sample,
+    advance_phase,
+    demand,
+    detect,
+    follow,
+    force_rms,
+    held_size,
+    measure_phase,
+    see_output,
+    size,
+    take_over,
+)
 from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
 from rig.tick.measure import bridge_lost_sample, read_inputs

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from controller.primitives import track
+from controller.kernels import track
 from rig.tick.layout import SENSOR_AT_RANGE, TickArrays
 from rig.tick.safety.kernels import SENSOR_OVERLOAD, check_gap, extrapolate_motion, watch_input, watch_motion
 from rig.tick.safety.layout import ARMED

@@ -2,11 +2,8 @@
 
 import math
 
-from controller.amplitude import RESPONSE, VOLTAGE
-from controller.harmonics.periods import end_harmonics_period, left_alone
-from controller.lock import LOCKED, next_lock_state
-from controller.period import end_period
-from controller.primitives import size
+from controller.harmonics import end_harmonics_period, left_alone
+from controller.kernels import LOCKED, RESPONSE, VOLTAGE, end_period, next_lock_state, size
 from rig.tick.layout import TickArrays
 from rig.tick.safety.keeping import begin_level, foretold_level, gain_has_changed, is_far_above
 from rig.tick.safety.kernels import GAIN_CHANGED, LEVEL_NOT_FOLLOWED, OVER_LEVEL, SENSOR_STUCK, shut_down

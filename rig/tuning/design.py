@@ -21,13 +21,13 @@ from controller.tuning import (
     changes_of_hardening,
     complex_response_law,
     design_phase_law,
+    frequencies_for,
     gains_at_half,
     hardening_margins,
     hippold_gains,
     margins,
     unstable_poles,
 )
-from controller.tuning.exact import frequencies_for
 from identification import FrequencyResponseMatrix
 from rig.tuning.plant import TuningError, largest_outside
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.adaptive_filter import MOST_HARMONICS
-from controller.harmonics.settings import HarmonicsSettings
+from controller.harmonics import MOST_HARMONICS, HarmonicsSettings
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 from rig.errors import ConfigurationError

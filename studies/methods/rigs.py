@@ -8,8 +8,8 @@ from scipy.interpolate import PchipInterpolator
 
 from rig.bench import Bench, load_bench
 from rig.drivers.virtual.driver import VirtualDAQ
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from vibrolock.arrays import Float
 
 SHIPPED = ("magnet-beam", "magnet-beam-symmetric", "friction-beam")

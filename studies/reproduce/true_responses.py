@@ -6,13 +6,13 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.subject import subject_of
+from simulators import VirtualRig
 from simulators.analysis import (
     PeriodicResponses,
     constant_force_response,
     forced_response,
     phase_resonance_backbone,
 )
-from simulators.virtual_rig import VirtualRig
 from studies.reproduce.options import Options
 
 Held = Literal["fundamental", "pure-sine", "voltage"]

@@ -8,7 +8,7 @@ from identification import nonlinear_mode
 from rig.bench import load_bench
 from rig.drivers import make_daq
 from rig.show.summary import summarise_recording
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 from tests.reference.harmonic_balance import backbone, backbone_at_voltages
 from tests.reference.parameters import ONE_SIDED, SYMMETRIC
 from tests.reference.sign_detector import sign_lock

@@ -7,8 +7,8 @@ import rig
 from identification import nonlinear_mode
 from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 

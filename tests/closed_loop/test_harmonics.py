@@ -10,8 +10,7 @@ import pytest
 
 import rig
 from controller import AmplitudeLaw
-from controller.harmonics.records import HarmonicStage
-from controller.harmonics.settings import harmonic_ratios
+from controller.harmonics import HarmonicStage, harmonic_ratios
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan
@@ -22,8 +21,8 @@ from rig.recording.reader import Recording
 from rig.tick.safety.layout import GuardMode
 from rig.tick.sequencer.segments import SettleRule
 from rig.tick.tick import Tick
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response, phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.closed_loop.true_force import TruePoint, true_points
 from tests.rig.rigs import bench_with, point_segments
 

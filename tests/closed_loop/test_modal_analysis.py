@@ -4,7 +4,7 @@ import pytest
 import rig
 from identification import LinearModes, best_linear_approximation, linear_modes
 from rig.campaigns.plans import load_plan
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 from tests.rig.rigs import bench_with
 
 NEAR_HZ = {"magnet-beam": [24.37, 134.06, 380.9], "friction-beam": [149.0, 564.3, 1138.3, 1496.5]}

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import rig
-from controller.lock import LOCK, LockState
+from controller import LockState
+from controller.kernels import LOCK
 from rig.campaigns.plans import load_plan
 from rig.tick.sequencer.judgement import CLAMPED_PERIODS, FAR_PERIODS, SETTLING, start_verdict
 from rig.tick.sequencer.layout import Outcome

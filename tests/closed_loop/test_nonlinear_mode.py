@@ -8,8 +8,8 @@ import rig
 from identification import Backbone, LinearModes, NonlinearMode, nonlinear_mode, repeatability
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.plans import load_plan
+from simulators import VirtualRig
 from simulators.analysis import PeriodicResponses, phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 MODES = {"magnet-beam": 0, "magnet-beam-symmetric": 0, "friction-beam": 2}

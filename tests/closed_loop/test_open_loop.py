@@ -19,7 +19,7 @@ from rig.measurements import point_rows
 from rig.show.progress import RunProgress
 from rig.show.summary import summarise_recording as show
 from rig.tick.safety.layout import GuardMode
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 from tests.reference.harmonic_balance import response_to_voltage
 from tests.reference.parameters import ONE_SIDED
 from tests.rig.campaigns.made_points import made_point

@@ -5,8 +5,8 @@ import pytest
 
 import rig
 from rig.campaigns.plans import load_plan
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 
 STEPPED = {
     # plan: level (N), frequencies on one branch (Hz), largest errors of frequency and amplitude

@@ -5,8 +5,8 @@ import pytest
 
 import rig
 from rig.campaigns.plans import load_plan
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 
 
 def _truth(specimen, level_n, lags, rms):

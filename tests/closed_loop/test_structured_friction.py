@@ -7,7 +7,7 @@ import identification
 import rig
 from identification.models.structured.laws import Masing
 from rig.campaigns.plans import load_plan
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 
 pytestmark = pytest.mark.slow
 

@@ -27,7 +27,7 @@ from identification.models.modal.sweep_prediction import compare_sweep
 from identification.models.modal.sweeps import predict_sweep
 from rig.campaigns.plans import plan_from
 from rig.measurements import point_rows
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 from tests.rig.rigs import bench_with
 
 STINGER_N_M = {"magnet-beam": 6283185.0, "friction-beam": 9666439.0}

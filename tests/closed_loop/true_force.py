@@ -11,8 +11,7 @@ from rig.drivers.virtual.driver import Queue
 from rig.measurements import bench_of_recording
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from simulators.simulation import Simulation
-from simulators.virtual_rig import VirtualRig
+from simulators import Simulation, VirtualRig
 
 HIGHEST = 31
 BELOW_NYQUIST = 0.45  # of the sample rate: highest harmonic of the fit

@@ -9,7 +9,7 @@ from rig.reference.keys import keys_of, parts_of, roots, tables
 from rig.tick.layout import DEVICE_SHIFT
 from rig.wire.can.link import CanLink
 from rig.wire.can.slcan import SlcanBus
-from simulators.layout import Flag
+from simulators.kernels import Flag
 from tests.docs.pages import ROOT, blocks, table_under
 
 KEYS = ROOT / "docs" / "reference" / "keys"

@@ -14,7 +14,7 @@ from rig.drivers import make_daq
 from rig.results.files import load
 from rig.tick.layout import DEVICE_SHIFT
 from simulators.analysis import phase_resonance_backbone
-from simulators.layout import Flag
+from simulators.kernels import Flag
 from tests.command import Ended, run_command
 from tests.docs.pages import ROOT, blocks, write
 

@@ -7,12 +7,12 @@ from pydantic import ValidationError
 from scipy import signal
 
 from simulators.analysis.frequency_responses import frequency_response
-from simulators.kernels import run_open_loop
 from simulators.layout import Flag, RigState
 from simulators.sensing.filters import dc_delay, lagrange_taps, low_pass_sections
 from simulators.sensing.kernels import condition, filter_output
 from simulators.shipped import shipped_specimens
 from simulators.simulation import Simulation
+from simulators.stepping import run_open_loop
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import UNFILTERED, ideal
 

@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import integrate, stats
 
-from simulators.kernels import run_open_loop, sample
 from simulators.layout import RigArrays, RigState
 from simulators.plant.compilation import at_rest
 from simulators.sensing.noise.kernels import EDGES, HEIGHTS, TAIL, normal
+from simulators.stepping import run_open_loop, sample
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
-from simulators.kernels import run_open_loop
 from simulators.scatter import Deviation
 from simulators.sites.elements import Magnet
+from simulators.stepping import run_open_loop
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 

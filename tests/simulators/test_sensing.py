@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from simulators.kernels import run_open_loop, sample
 from simulators.layout import CHANNEL, CONVERTER, Flag
 from simulators.sensing.kernels import condition, quantise
 from simulators.sensing.parts import Sensor
 from simulators.simulation import Simulation
+from simulators.stepping import run_open_loop, sample
 from simulators.virtual_rig import VirtualRig
 from tests.simulators.references import ideal
 

@@ -12,11 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from controller import AmplitudeLaw, PhaseLockedLoop, control_state
-from controller.amplitude import demand, see_output, take_over
-from controller.detector import detect
-from controller.frequency import follow
-from controller.law import measure_phase
-from controller.primitives import advance_phase
+from controller.kernels import advance_phase, demand, detect, follow, measure_phase, see_output, take_over
 
 M, C, K, K3 = 1.0, 2.5, 15800.0, 1e9  # kg, N s/m, N/m, N/m^3; the exciter makes 1 N per volt
 DT, LAG = 1 / 5000, -0.5 * math.pi  # s; rad, phase resonance

@@ -13,9 +13,9 @@ import numpy as np
 from distributed import Client, LocalCluster
 from joblib import parallel_config
 
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
 from simulators.ensemble import ensemble
-from simulators.virtual_rig import VirtualRig
 
 GAPS_M = np.array([9e-3, 10e-3, 11e-3, 12e-3, 13e-3])
 STRENGTHS_N_M4 = 8.353e-8 * np.array([0.6, 0.8, 1.0, 1.2])

@@ -11,8 +11,8 @@ import math
 import matplotlib.pyplot as plt
 import numba
 
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 
 
 @numba.cfunc("float64(float64, CPointer(float64))")

@@ -8,9 +8,9 @@ Sixteen rigs whose frequencies and damping scatter, drawn from a seed, on two pr
 import matplotlib.pyplot as plt
 import numpy as np
 
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
 from simulators.ensemble import ensemble
-from simulators.virtual_rig import VirtualRig
 
 AMPLITUDES_M = np.array([2e-4, 6e-4, 1.2e-3, 2e-3])
 scatter = {"frequency": 0.002, "damping": 0.03, "magnet_strength": 0.03}

@@ -5,8 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from controller.adaptive_filter import MOST_HARMONICS
-from controller.harmonics.settings import check_wanted
+from controller.harmonics import MOST_HARMONICS, check_wanted
 from rig.bench import Bench
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target, with_first_repeated

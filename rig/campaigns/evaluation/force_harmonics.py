@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controller.harmonics.settings import harmonic_ratios
+from controller.harmonics import harmonic_ratios
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.planning.plan import Plan, Target

@@ -15,9 +15,9 @@ from rig.drivers.virtual.kernels import Converters, Loopback, exchange_block, fu
 from rig.errors import ConfigurationError, DaqRefused
 from rig.tick.layout import TickArrays
 from rig.tick.safety.kernels import is_over
-from simulators.layout import Flag, RigArrays
-from simulators.sensing.parts import LOWEST_INTERNAL_RATE_HZ
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
+from simulators.kernels import Flag, RigArrays
+from simulators.parts import LOWEST_INTERNAL_RATE_HZ
 from vibrolock.compiled import bound
 from vibrolock.one_thread import one_thread
 

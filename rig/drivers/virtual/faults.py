@@ -13,8 +13,7 @@ from pydantic import Field
 from rig.bench.configuration import Configured
 from rig.continuation import SOURCE, begin, count_at, keep, period_steps, ramp_length, ring_for
 from rig.daq import CONTINUATION, CONTINUED, HELD, LOST
-from simulators.layout import Flag
-from simulators.sensing.noise.kernels import mix, unit
+from simulators.kernels import Flag, mix, unit
 from vibrolock.compiled import kernel
 from vibrolock.described import Described
 

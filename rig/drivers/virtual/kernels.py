@@ -11,8 +11,7 @@ from rig.drivers.virtual.faults import FaultArrays, convert
 from rig.tick.kernels import note_faults, note_put_out, tell_continuation, tick
 from rig.tick.layout import DEVICE_SHIFT, TickArrays
 from rig.tick.safety.kernels import is_over
-from simulators.kernels import sample
-from simulators.layout import RigArrays, RigState
+from simulators.kernels import RigArrays, RigState, sample
 from vibrolock.compiled import kernel
 
 

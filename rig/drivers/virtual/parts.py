@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.errors import ConfigurationError
 from rig.text.units import unit_of
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 
 Schema = dict[str, Any]
 
@@ -17,7 +17,8 @@ _FEW = 4
 
 def specimens() -> list[dict[str, str]]:
     """The shipped specimens: name, kind of structure and local elements."""
-    from simulators.shipped import shipped_specimens, specimen_table
+    from simulators import shipped_specimens
+    from simulators.parts import specimen_table
 
     rows = []
     for name in shipped_specimens():

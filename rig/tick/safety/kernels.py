@@ -2,7 +2,7 @@
 
 import math
 
-from controller.primitives import wrap
+from controller.kernels import wrap
 from rig.bench.cross_checks import OVERTRAVEL_FACTOR
 from rig.tick.safety.layout import ARMED, DISARMED, OFF, RAMPING, EndReason
 from vibrolock.compiled import Record, kernel

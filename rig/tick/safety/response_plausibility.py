@@ -10,8 +10,7 @@ import math
 
 import numpy as np
 
-from controller.amplitude import RESPONSE
-from controller.primitives import TWO_PI, size
+from controller.kernels import RESPONSE, TWO_PI, size
 from rig.tick.safety.keeping import FAR, KEPT
 from vibrolock.compiled import Record, kernel
 

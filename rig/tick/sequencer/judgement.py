@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from controller.lock import LOCKED, LOST, SEARCHING
+from controller.kernels import LOCKED, LOST, SEARCHING
 from rig.tick.sequencer.layout import RECORD, SETTLE, Outcome
 from vibrolock.compiled import Record, kernel
 

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from controller.amplitude import VOLTAGE
-from controller.lock import LOCKED, LOST, reacquire
+from controller.kernels import LOCKED, LOST, VOLTAGE, reacquire
 from rig.tick.safety.kernels import shut_down
 from rig.tick.safety.layout import ARMED, EndReason
 from rig.tick.sequencer.judgement import (

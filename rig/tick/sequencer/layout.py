@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from controller.harmonics.records import ORDERS
+from controller.harmonics import ORDERS
 
 
 class SegmentKind(IntEnum):

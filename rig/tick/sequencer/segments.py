@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from controller import AmplitudeLaw, Law
-from controller.harmonics.settings import harmonic_ratios
+from controller.harmonics import harmonic_ratios
 from rig.bench.configuration import Configured
 from rig.tick.sequencer.judgement import LONGEST_AVERAGE, SETTLE_RULE
 from rig.tick.sequencer.layout import OUTCOME, SEGMENT, Drive, OnFailure, SegmentKind

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from controller.tuning import ComplexResponseLaw, PhaseLaw, PlantModel
+from simulators import VirtualRig
 from simulators.analysis import frequency_response
-from simulators.virtual_rig import VirtualRig
 
 LINEAR_HZ = {"magnet-beam": 24.37, "friction-beam": 149.0}
 RATE_HZ = 5000.0

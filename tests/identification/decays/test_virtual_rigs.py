@@ -6,8 +6,7 @@ import pytest
 from identification import Channel, decay_backbone
 from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.kernels import run_observed
-from simulators.plant.compilation import pad
+from simulators.kernels import pad, run_observed
 
 
 def free_decay(specimen, start_m, seconds, mode):

@@ -7,8 +7,8 @@ import rig
 from identification import best_linear_approximation, distortion_levels
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.errors import ConfigurationError
+from simulators import VirtualRig
 from simulators.analysis import frequency_response
-from simulators.virtual_rig import VirtualRig
 
 PLAN = MultisinePlan(
     bench="magnet-beam",

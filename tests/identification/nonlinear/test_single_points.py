@@ -5,8 +5,8 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from identification import FrequencyResponse, IdentificationError, NonlinearMode, single_point_mode
+from simulators import VirtualRig
 from simulators.analysis import PeriodicResponses, constant_force_response, phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.identification.nonlinear.test_stepped_sine import MASS_KG, level
 
 

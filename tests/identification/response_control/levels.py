@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification import FrequencyResponse
+from simulators import VirtualRig
 from simulators.analysis import PeriodicResponses, constant_displacement_response, constant_force_response
-from simulators.virtual_rig import VirtualRig
 
 OMEGA, ZETA, SHAPE, CUBIC = 2 * np.pi * 40.0, 0.004, 1.3, 3e8
 LAGS_DEG = np.arange(30.0, 151.0, 10.0)

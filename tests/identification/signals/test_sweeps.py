@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from identification import Channel, IdentificationError, Transient, demodulate, force_drop_out
-from simulators.simulation import Simulation
-from simulators.virtual_rig import VirtualRig
+from simulators import Simulation, VirtualRig
 
 CHANNELS = (
     Channel("voltage", "monitor", "V"),

@@ -5,9 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from identification import Channel, IdentificationError, SlowFlow, slow_flow
+from simulators import Simulation, VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.simulation import Simulation
-from simulators.virtual_rig import VirtualRig
 from tests.identification.slow_flows.ramps import (
     CHANNELS,
     PHI,

@@ -5,11 +5,9 @@ from functools import cache
 import numpy as np
 
 from rig.bench import Bench
-from simulators.kernels import run_observed
-from simulators.layout import RigArrays
-from simulators.plant.compilation import aligned, pad
-from simulators.scatter import Deviation
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
+from simulators.kernels import RigArrays, aligned, pad, run_observed
+from simulators.parts import Deviation
 from tests.reliability.faults.spoiling import AMPLIFIER, SENSOR
 from tests.reliability.faults.table import Fault
 from vibrolock.compiled import bound
@@ -34,7 +32,7 @@ def softened(specimen: str, rate_hz: float, range_v: float, stiffness: float, se
 
 
 class BrokenRig:
-    """Voltages in, readings out, sample by sample as `simulators.kernels.sample`; ``fault`` acts from sample ``onset`` on.
+    """Voltages in, readings out, sample by sample as `simulators.stepping.sample`; ``fault`` acts from sample ``onset`` on.
 
     ``needed_v``: largest output of the run without a fault. ``sent``: voltages [n] as they came from the device, before the
     amplifier; ``true``: readings [n, n_channels] (V) before the sensors' fault; ``motion`` [n, 2]: force (N) and

@@ -15,7 +15,7 @@ from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.tick.tick import TickSettings
-from simulators.shipped import specimen_table
+from simulators.parts import specimen_table
 from tests.reliability.mutations.byte_mutations import BYTE_MUTATIONS
 from tests.reliability.mutations.judging import Verdict, judged
 from tests.reliability.mutations.table_mutations import TABLE_MUTATIONS, Table

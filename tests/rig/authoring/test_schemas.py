@@ -14,7 +14,7 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.plans import plan_from, shipped_plans
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError
-from simulators.shipped import shipped_specimens
+from simulators import shipped_specimens
 from tests.docs.pages import ROOT, blocks, pages
 
 jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed (pip install 'vibrolock[dev]')")

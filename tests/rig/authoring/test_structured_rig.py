@@ -15,8 +15,8 @@ from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
 from rig.results.files import save
+from simulators import Simulation
 from simulators.analysis import phase_resonance_backbone
-from simulators.simulation import Simulation
 from tests.identification.models.structured.models import beam
 from tests.rig.authoring.test_schemas import of, read
 from tests.simulators.references import UNFILTERED

@@ -33,7 +33,7 @@ def test_benches_that_start_from_each_other_are_refused(tmp_path):
 )
 def test_faults_inside_parts_are_named_by_their_keys_alone(tmp_path, changes, fault):
     from rig.bench.configuration import read_toml, validated
-    from simulators.virtual_rig import VirtualRig
+    from simulators import VirtualRig
 
     (tmp_path / "rig.toml").write_text('specimen = "magnet-beam"\n' + changes)
     with pytest.raises(ConfigurationError) as caught:

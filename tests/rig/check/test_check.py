@@ -11,7 +11,7 @@ from rig.check.report import say, summary
 from rig.check.run import check
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 from tests.rig.check.rewired import constant, flipped, noise_only, rewire, scaled, swapped
 from tests.rig.rigs import bench_with
 

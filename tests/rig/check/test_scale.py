@@ -10,8 +10,8 @@ from rig.check.responses import Mode, Responses
 from rig.check.run import check
 from rig.check.scale import scale_of
 from rig.errors import RecordingError
+from simulators import VirtualRig
 from simulators.analysis import frequency_response
-from simulators.virtual_rig import VirtualRig
 from tests.recorded import recorded
 from tests.rig.rigs import bench_with
 

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 import scipy.io
 
-from simulators.sensing.parts import Converter, Sensor
-from simulators.sites.friction import IwanSite
-from simulators.structures.structure import BeamStructure
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
+from simulators.parts import BeamStructure, Converter, IwanSite, Sensor
 from tests.recorded import recorded_at
 
 PLAN = """

@@ -22,8 +22,8 @@ from rig import figures
 from rig.figures.results import RESULTS
 from rig.results.files import save
 from rig.results.kinds import KINDS
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 from tests.identification.rigs import CHANNELS, one_mode_point
 
 

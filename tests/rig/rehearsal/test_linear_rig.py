@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rig.rehearsal.linear_rig import POSSIBLE, LinearRig, Prior, Responses, known_rig
+from simulators import VirtualRig
 from simulators.analysis import frequency_response
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rehearsal.known import EXCITER, MODE, RATIOS
 
 RATE_HZ = 5000.0

@@ -10,8 +10,8 @@ from identification.exciter_coupling.exciter import PARAMETERS
 from rig.campaigns.plans import load_plan, plan_from
 from rig.recording.reader import Recording
 from rig.results.files import load
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.recorded import recorded_at
 
 

@@ -14,8 +14,8 @@ from rig.results.files import load, save
 from rig.results.pnlss.figure import draw_pnlss
 from rig.results.pnlss.options import PnlssOptions
 from rig.show.progress import FitLines
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 from tests.recorded import recorded_at
 
 BENCH = {"bench": "magnet-beam"}

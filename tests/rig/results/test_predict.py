@@ -13,8 +13,8 @@ from rig.measurements import sweeps
 from rig.recording.reader import Recording
 from rig.results.files import load, save
 from rig.results.identify import modes_in
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 
 ALL = (
     "NM.h5 --frequency-response 0.1 --frequency-response 0.15 --sweep sweep.h5 --exciter EX.h5 --modes LIN.h5 "

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rig.campaigns.plans import plan_from
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response, phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.recorded import recorded_at
 
 LINES = {"bench": "magnet-beam", "kind": "multisine", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}

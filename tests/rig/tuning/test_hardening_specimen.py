@@ -7,8 +7,8 @@ import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
 from rig.tuning import tune
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 
 SENSORS = {"force": 0.1124, "drive": 0.0102, "tip": 0.0102}
 OPTIONS = {

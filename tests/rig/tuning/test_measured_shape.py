@@ -15,8 +15,8 @@ from rig.recording.reader import Recording
 from rig.results.files import load
 from rig.show.summary import summarise_recording
 from rig.tuning import tune
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 WRONG = 1.3

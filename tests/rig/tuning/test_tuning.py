@@ -20,8 +20,8 @@ from rig.tuning import TuningError, TuningRequest, tune
 from rig.tuning.figure import draw_on
 from rig.tuning.plant import compared_with_bench
 from rig.tuning.report import summary
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 NAMES = ("magnet-beam", "friction-beam")

@@ -260,7 +260,7 @@ def test_a_users_function_needs_no_compilation_of_the_plant_in_another_process(t
         "import numba\n@numba.cfunc('float64(float64, CPointer(float64))')\ndef spring(z, p):\n    return -p[0] * z**3\n"
     )
     script = (
-        "from simulators.kernels import run_observed\nfrom simulators.simulation import Simulation\n"
+        "from simulators.stepping import run_observed\nfrom simulators.simulation import Simulation\n"
         "from simulators.virtual_rig import VirtualRig\n"
         "user = {'kind': 'user', 'at': 'tip', 'function': 'my_springs:spring', 'parameters': [1e6]}\n"
         "print(Simulation(VirtualRig.shipped('magnet-beam', elements=[user])).run([5.0] * 100).force_n[-1])\n"

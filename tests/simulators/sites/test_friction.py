@@ -3,12 +3,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from simulators.kernels import run_open_loop
 from simulators.layout import CHANNEL, CONVERTER, PLANT, SITE, RigArrays, RigState
 from simulators.plant.compilation import at_rest, jenkins_elements
 from simulators.plant.kernels import advance
 from simulators.simulation import Simulation
 from simulators.sites.friction import JenkinsSite
+from simulators.stepping import run_open_loop
 from tests.simulators.references import ideal
 
 STIFFNESS = np.array([3.0, 2.0, 1.5, 0.7, 0.4])

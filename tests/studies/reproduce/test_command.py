@@ -13,8 +13,8 @@ from rig.bench import load_bench
 from rig.results.files import load
 from rig.results.pnlss.figure import draw_pnlss
 from rig.results.pnlss.kind import IdentifiedPnlss
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 from studies.reproduce.options import Options
 from studies.reproduce.specimens import specimen_of
 from studies.reproduce.steady import steady

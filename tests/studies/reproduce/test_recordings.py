@@ -9,7 +9,7 @@ from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
-from simulators.virtual_rig import VirtualRig
+from simulators import VirtualRig
 from studies.reproduce.folder import prepare
 from studies.reproduce.options import Options
 from studies.reproduce.recordings import multisines

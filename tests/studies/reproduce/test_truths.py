@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rig.bench import load_bench
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from studies.reproduce.options import Options
 from studies.reproduce.specimens import SPECIMENS
 from studies.reproduce.true_responses import truths

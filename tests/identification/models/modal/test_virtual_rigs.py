@@ -7,8 +7,8 @@ import pytest
 
 import rig
 from identification import Comparison, FrequencyResponse, NonlinearMode, compare, frequency_response, nonlinear_mode
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 
 LEVELS = [
     ("magnet-beam", 0.25),

@@ -9,8 +9,8 @@ from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
 from rig.measurements import point_rows
 from rig.tick.sequencer.layout import SegmentKind
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 PERIODS = {"magnet-beam": 15, "friction-beam": 30}

@@ -20,8 +20,8 @@ from rig.results.identify import identify_model
 from rig.results.identify_request import Request
 from rig.show.summary import summarise
 from rig.tick.sequencer.layout import Outcome, SegmentKind
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 PLAN = load_plan("magnet-beam/continuous-backbone")

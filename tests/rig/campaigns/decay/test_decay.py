@@ -14,8 +14,8 @@ from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
 from rig.measurements import backbone, decays, point_rows
 from rig.tick.safety.layout import GuardMode
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.tick.blocks import nothing_told
 
 

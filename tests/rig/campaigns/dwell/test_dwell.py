@@ -16,8 +16,8 @@ from rig.campaigns.plans import load_plan
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import point_rows
+from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
-from simulators.virtual_rig import VirtualRig
 from tests.rig.campaigns.made_points import made_modal, made_point, made_vibration
 
 SHORT = {"cycles": 750, "mean_s": 0.5, "record_every": 4, "telemetry_s": 0.02, "ramp_periods": 20.0}

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rig.campaigns.evaluation.vibrations import channel_factors, recorded_vibration, skew_turn
-from simulators.simulation import Simulation
-from simulators.virtual_rig import VirtualRig
+from simulators import Simulation, VirtualRig
 from tests.rig.rigs import bench_with
 
 CORNER_HZ = 2.0

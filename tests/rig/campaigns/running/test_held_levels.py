@@ -7,8 +7,8 @@ import rig
 from identification import IdentificationError
 from rig.campaigns.plans import load_plan, plan_from
 from rig.errors import RecordingError
+from simulators import VirtualRig
 from simulators.analysis import constant_force_response
-from simulators.virtual_rig import VirtualRig
 
 FORCE_N = 0.25
 LAGS_DEG = np.arange(-150.0, -29.0, 30.0)

@@ -5,8 +5,8 @@ import rig
 from identification import nonlinear_mode
 from rig.bench import Bench
 from rig.campaigns.plans import load_plan
+from simulators import VirtualRig
 from simulators.ensemble import ensemble
-from simulators.virtual_rig import VirtualRig
 from tests.rig.rigs import bench_with
 
 

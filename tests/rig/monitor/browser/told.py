@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.lock import LockState
+from controller import LockState
 from rig.campaigns.plans import bench_of, load_plan
 from rig.campaigns.running.watched import watched_facts
 from rig.live.layout import FRAME, bin_dtype

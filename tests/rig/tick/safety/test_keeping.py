@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from controller.amplitude import FORCE, VOLTAGE
-from controller.period import PERIOD
+from controller.kernels import FORCE, PERIOD, VOLTAGE
 from rig.arming.checked_scale import CheckedScale
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.runner import tick_settings

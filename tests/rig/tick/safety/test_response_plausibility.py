@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from controller.amplitude import FORCE, RESPONSE
-from controller.period import PERIOD
+from controller.kernels import FORCE, PERIOD, RESPONSE
 from controller.tuning import PlantModel
 from rig.campaigns.plans import bench_of, load_plan
 from rig.drivers.virtual import VirtualDAQ

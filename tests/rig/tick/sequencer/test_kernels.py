@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from controller import AmplitudeLaw, LockState
-from controller.lock import LOCK
-from controller.period import PERIOD
+from controller.kernels import LOCK, PERIOD
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import guard_record
 from rig.tick.sequencer.judgement import SETTLING, forget_periods, judge_period

@@ -1,0 +1,38 @@
+"""What steps the law sample by sample, for compiled callers: kernels, codes of modes and states, and records of a period."""
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from controller.amplitude import (
+        FORCE as FORCE,
+        FORCE_RMS as FORCE_RMS,
+        RESPONSE as RESPONSE,
+        VOLTAGE as VOLTAGE,
+        demand as demand,
+        held_size as held_size,
+        see_output as see_output,
+        take_over as take_over,
+    )
+    from controller.detector import ADAPTIVE as ADAPTIVE, detect as detect, force_rms as force_rms
+    from controller.frequency import follow as follow
+    from controller.law import measure_phase as measure_phase
+    from controller.lock import (
+        LOCK as LOCK,
+        LOCKED as LOCKED,
+        LOST as LOST,
+        SEARCHING as SEARCHING,
+        next_lock_state as next_lock_state,
+        reacquire as reacquire,
+    )
+    from controller.period import PERIOD as PERIOD, add_sample as add_sample, end_period as end_period
+    from controller.primitives import (
+        TWO_PI as TWO_PI,
+        advance_phase as advance_phase,
+        size as size,
+        track as track,
+        wrap as wrap,
+    )
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)
