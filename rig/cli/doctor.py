@@ -11,6 +11,7 @@ from rig.system.studies import load_study
 
 if TYPE_CHECKING:
     from rig.bench import Bench
+    from rig.loop.worker.probe import DeviceReport
 
 UNITS = {"block": "samples", "queue_blocks": "blocks", "watchdog_s": "s", "largest_rate_hz": "Hz"}
 
@@ -58,7 +59,7 @@ def doctor(
     _show(device[1] if device else examine(Path.cwd()), json)
 
 
-def _examined(daq: str, seconds: float) -> tuple["Bench", dict[str, Any]]:
+def _examined(daq: str, seconds: float) -> tuple["Bench", "DeviceReport"]:
     """Return a bench, and what was found of its device."""
     from rig.bench import load_bench
     from rig.loop.doctor import examine_bench
@@ -81,7 +82,7 @@ def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], out
         load_study("matrix", "-o").read_rows(output)  # only rows of a matrix are replaced
 
 
-def _show(facts: dict[str, Any], json: bool) -> None:
+def _show(facts: Mapping[str, Any], json: bool) -> None:
     """Print what was found of this machine, or of a device."""
     from rig.text.console import print_json
     from vibrolock.printable import printable_strings

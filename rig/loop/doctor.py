@@ -5,17 +5,40 @@ import platform
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict, cast
 
 from rig.bench import Bench
 from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from rig.loop.worker.probe import DeviceReport, WakeUps
 
 RATE_HZ = 1000.0
 SECONDS = 1.0
 MEASURED_S = 1.5  # of a device, before settings are recommended and tried
 
 
-def examine(folder: Path) -> dict[str, Any]:
+class MachineReport(TypedDict):
+    """Facts on this machine."""
+
+    vibrolock: str
+    python: str
+    system: str
+    processors: int
+    realtime_scheduling: str
+    memory_lock: str
+    timer_slack: str
+    wake_up_lateness_us: dict[str, float]
+    without_privilege_us: dict[str, float]
+    kernel_cache: str
+    free_disk_gb: float
+    drivers: list[str]
+    benches: list[str]
+    serial_ports: list[str]
+    wall_clock_rigs: str
+
+
+def examine(folder: Path) -> MachineReport:
     """Return facts on processor, clock, privileges, kernels, disk, drivers and serial ports; ``folder`` holds recordings.
 
     The wake-up lateness is measured in a process like that of a wall-clock loop, woken a thousand times in a second, with and
@@ -47,7 +70,7 @@ def examine(folder: Path) -> dict[str, Any]:
     }
 
 
-def examine_bench(bench: Bench, seed: int = 0, seconds: float = MEASURED_S) -> dict[str, Any]:
+def examine_bench(bench: Bench, seed: int = 0, seconds: float = MEASURED_S) -> "DeviceReport":
     """Exchange 0 V with a bench's device; return timing, measured for some ``seconds``, and recommended settings, tried.
 
     What is done and returned: `rig.loop.worker.examination.examine_device`. Nothing is driven.
@@ -57,10 +80,14 @@ def examine_bench(bench: Bench, seed: int = 0, seconds: float = MEASURED_S) -> d
     from rig.loop.worker.examination import examine_device
     from rig.loop.worker.spawn import ask, supported
 
-    return dict(ask("examination", bench, seed, seconds)) if supported() else examine_device(bench, seed, seconds)
+    return (
+        cast("DeviceReport", ask("examination", bench, seed, seconds))
+        if supported()
+        else examine_device(bench, seed, seconds)
+    )
 
 
-def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str, Any]:
+def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> "DeviceReport":
     """Exchange 0 V with a bench's device as the bench has it for some seconds; return the timing. Nothing is driven.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the device cannot be opened.
@@ -68,21 +95,25 @@ def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> dict[str
     from rig.loop.worker.probe import round_trips
     from rig.loop.worker.spawn import ask, supported
 
-    return dict(ask("round trips", bench, seed, seconds)) if supported() else round_trips(bench, seed, seconds)
+    return (
+        cast("DeviceReport", ask("round trips", bench, seed, seconds))
+        if supported()
+        else round_trips(bench, seed, seconds)
+    )
 
 
-def _probed(*, privileged: bool) -> dict[str, Any]:
+def _probed(*, privileged: bool) -> "WakeUps":
     from rig.loop.worker.spawn import ask, supported
 
     if not supported():
         return {}
     try:
-        return dict(ask("probe", RATE_HZ, SECONDS, privileged))
+        return cast("WakeUps", ask("probe", RATE_HZ, SECONDS, privileged))
     except RigError as error:
         return {"scheduling": str(error)}
 
 
-def _promise(probed: dict[str, Any]) -> str:
+def _promise(probed: "WakeUps") -> str:
     """Return one sentence on the timing that a wall-clock loop can rely on here."""
     if "wake_up_us" not in probed:
         return "in the campaign's own process, and nothing is promised on this system"

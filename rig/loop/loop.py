@@ -4,13 +4,14 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from rig.daq import DAQ
 from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
+from rig.text.json_values import JsonObject
 from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
@@ -47,9 +48,9 @@ class LoopStatistics:
         """Seconds of rig time per second in total, including recording."""
         return self.samples / self.sample_rate_hz / self.wall_s if self.wall_s > 0 else 0.0
 
-    def report(self, periods: int) -> dict[str, Any]:
+    def report(self, periods: int) -> dict[str, float]:
         """Return the loop's statistics as plain data. ``periods``: number of oscillator periods in all."""
-        factors = {name: getattr(self, name) for name in ("realtime_factor", "end_to_end_factor")}
+        factors = {"realtime_factor": self.realtime_factor, "end_to_end_factor": self.end_to_end_factor}
         return {**asdict(self), "periods": periods, **factors}
 
 
@@ -100,7 +101,7 @@ class RunningLoop(Protocol):
         """The driver's remarks on the bench."""
 
     @property
-    def report(self) -> dict[str, Any]:
+    def report(self) -> JsonObject:
         """Timing statistics of the loop as plain data, for the recording."""
 
 
@@ -180,7 +181,7 @@ class Loop(DrivenLoop):
         return (*self.daq.remarks, *self.notes)
 
     @property
-    def report(self) -> dict[str, Any]:
+    def report(self) -> JsonObject:
         """Timing statistics of the loop as plain data, for the recording."""
         return {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self.daq.statistics}
 

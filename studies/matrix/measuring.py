@@ -4,7 +4,7 @@ import os
 import platform
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ def matrix_rows(bench: Bench, firmware: Sequence[Path] = (), *, verify: bool = F
             yield _row(way, bench, Path(folder) / "output.log", verify)
 
 
-def device_row(bench: Bench, facts: dict[str, Any]) -> Row:
+def device_row(bench: Bench, facts: Mapping[str, Any]) -> Row:
     """Return the row of a bench's device from the report of `rig.loop.doctor.examine_bench`; nothing else is done with it."""
     identity = facts.get("identity", {})
     name = " ".join(filter(None, (facts["driver"], identity.get("model", ""))))
@@ -52,7 +52,7 @@ def machine() -> str:
     return f"{platform.system()} {platform.release()}, {os.cpu_count() or 1} x {_processor()}"
 
 
-def row_from(way: str, bench: Bench, facts: dict[str, Any]) -> Row:
+def row_from(way: str, bench: Bench, facts: Mapping[str, Any]) -> Row:
     """Return a row with what stands in the report of an examination."""
     identity, advice = facts.get("identity", {}), facts.get("recommendation", {})
     known: dict[str, Any] = {
@@ -93,7 +93,7 @@ def _row(way: Way, bench: Bench, log: Path, verify: bool) -> Row:
         return row.model_copy(update={"failure": f"{type(error).__name__}: {error}"})
 
 
-def _with_settings_that_hold(bench: Bench) -> tuple[Bench, dict[str, Any]]:
+def _with_settings_that_hold(bench: Bench) -> tuple[Bench, Mapping[str, Any]]:
     """Return the bench with the settings that are recommended here, and the report of `rig.loop.doctor` with them."""
     facts = examine_bench(bench)
     _clear_if_virtual(bench)  # the settings that the bench had may have ended with the watchdog

@@ -3,14 +3,14 @@
 import contextlib
 import math
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 from rig.bench import Bench, DriverChoice
 from rig.daq import Adjustable
 from rig.drivers import make_daq
 from rig.errors import DaqRefused, DaqWatchdog, RigError
 from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, complaints, recommend
-from rig.loop.worker.probe import round_trips, timing_of
+from rig.loop.worker.probe import Advice, DeviceReport, Settable, Tried, round_trips, timing_of
 from rig.loop.worker.queue_choice import covering_queue
 
 LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
@@ -23,7 +23,7 @@ LONGEST_BLOCK_S = 0.2  # as `rig.bench.Bench` allows
 HIGHER = 1.05  # a largest rate that is not more than this many times the bench's is not tried
 
 
-def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> dict[str, Any]:
+def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> DeviceReport:
     """Exchange 0 V with a bench's device for some seconds; return the timing and a ``recommendation`` with its reasons.
 
     For ``seconds`` the device has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the
@@ -70,7 +70,7 @@ class _Asked(NamedTuple):
     """Whether the device has a clock of its own."""
 
 
-def bench_lines(differs: dict[str, Any]) -> list[str]:
+def bench_lines(differs: Settable) -> list[str]:
     """Return lines of a bench file with the settings that differ from those of the bench; empty if none do."""
     options = [f"{name} = {differs[name]:g}" for name in ("queue_blocks", "watchdog_s") if name in differs]
     block = [f"block = {differs['block']}"] if "block" in differs else []
@@ -107,25 +107,23 @@ def _patient(now: Settings, allowed: Adjustable | None) -> Settings:
     return Settings(now.block, allowed.largest_queue, max(now.watchdog_s or 0.0, allowed.watchdog_range_s[1]))
 
 
-def _without_clock(facts: dict[str, Any]) -> dict[str, Any]:
+def _without_clock(facts: DeviceReport) -> DeviceReport:
     """Return the report on a device that waits for the host: no output can be late."""
     why = "the device waits for the host: no output is late, and neither queue nor watchdog needs to be changed"
-    told = {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": [], "bench_lines": []}
+    told: Advice = {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": [], "bench_lines": []}
     return facts | {"recommendation": told}
 
 
 class _Examination:
     """What follows the first measurement of a device with a clock."""
 
-    def __init__(
-        self, bench: Bench, seed: int, now: Settings, allowed: Adjustable | None, facts: dict[str, Any]
-    ) -> None:
+    def __init__(self, bench: Bench, seed: int, now: Settings, allowed: Adjustable | None, facts: DeviceReport) -> None:
         self._bench, self._seed, self._now, self._allowed, self._facts = bench, seed, now, allowed, facts
         self._timing, self._rate_hz = timing_of(facts), bench.sample_rate_hz
-        self._tried: list[dict[str, Any]] = []
-        self._as_is: dict[str, Any] | None = None  # report with the settings of the bench
+        self._tried: list[Tried] = []
+        self._as_is: DeviceReport | None = None  # report with the settings of the bench
 
-    def report(self, refusal: str) -> dict[str, Any]:
+    def report(self, refusal: str) -> DeviceReport:
         """Try settings and rates; return the whole report. ``refusal``: of the settings of the bench, empty without one."""
         advice = recommend(self._timing, self._now, self._rate_hz, self._allowed, self._facts["largest_block"])
         advice = self._try_settings(advice)
@@ -134,19 +132,20 @@ class _Examination:
         remarks = complaints(self._timing, self._now, self._rate_hz, self._allowed, facts["reached_hz"])
         remarks = [*facts["remarks"], *([refusal] if refusal else _said(self._as_is)), *remarks]
         remarks += [LATCHED] if self._has_latched() else []
-        chosen = advice.settings._asdict() | {"largest_rate_hz": rate_hz}
+        chosen = {**advice.settings._asdict(), "largest_rate_hz": rate_hz}
         reasons = dict(advice.reasons)
         reasons["largest_rate_hz"] += "; tried" if rate_was_tried else ""
-        differs = {
-            name: value for name, value in advice.settings._asdict().items() if value != getattr(self._now, name)
-        }
+        now = self._now._asdict()
+        differs = cast(
+            Settable, {name: value for name, value in advice.settings._asdict().items() if value != now[name]}
+        )
         if self._allowed is not None and self._allowed.automatic:
             if "block" in differs:
                 differs.pop("queue_blocks", None)
             if "queue_blocks" not in differs:
                 reasons["queue_blocks"] = f'as "auto" takes it before a run: {reasons["queue_blocks"]}'
-        told = {
-            "settings": {name: value for name, value in chosen.items() if value is not None},
+        told: Advice = {
+            "settings": cast(Settable, {name: value for name, value in chosen.items() if value is not None}),
             "differs": differs,
             "reasons": reasons,
             "measured": {name: round(value, 7) for name, value in self._timing._asdict().items()},
@@ -161,7 +160,7 @@ class _Examination:
         """Time from the middle of a block to that of the block of outputs that it leads to, s."""
         return round((1 + settings.queue_blocks) * settings.block / self._rate_hz, 7)
 
-    def _attempt(self, settings: Settings, rate_hz: float, seconds: float) -> dict[str, Any]:
+    def _attempt(self, settings: Settings, rate_hz: float, seconds: float) -> DeviceReport:
         """Try settings at 0 V; return the report, or what was refused."""
         try:
             facts = round_trips(with_settings(self._bench, settings, rate_hz), self._seed, seconds)
@@ -169,13 +168,14 @@ class _Examination:
             facts = {"failure": f"{type(error).__name__}: {error}"}
         if settings == self._now and rate_hz == self._rate_hz and "block_us" in facts:
             self._as_is = facts
+        known = dict(facts)
         counts = ("blocks", "held_blocks", "lost_blocks", "reached_hz", "failure", "latched")
         told = {
-            **settings._asdict(),
+            **{name: value for name, value in settings._asdict().items() if value is not None},
             "sample_rate_hz": rate_hz,
-            **{name: facts[name] for name in counts if name in facts},
+            **{name: known[name] for name in counts if name in known},
         }
-        self._tried.append({name: value for name, value in told.items() if value is not None})
+        self._tried.append(cast(Tried, told))
         return facts
 
     def _holds(self, settings: Settings) -> bool:
@@ -200,7 +200,7 @@ class _Examination:
             advice = advice._replace(settings=longer, reasons=advice.reasons | {name: why})
         return advice
 
-    def _longer(self, settings: Settings, told: dict[str, Any]) -> Settings | None:
+    def _longer(self, settings: Settings, told: Tried) -> Settings | None:
         """Return settings with twice the queue, or with a longer block where the queue has no room or the rate is not reached.
 
         A longer block takes a queue of the same duration. None if there is nothing longer.
@@ -234,7 +234,7 @@ class _Examination:
             rate_hz = float(f"{math.sqrt(rate_hz * self._rate_hz):.2g}")
         return self._rate_hz, True
 
-    def _try_bench(self) -> dict[str, Any]:
+    def _try_bench(self) -> DeviceReport:
         """Return the report with the settings of the bench; that of the first measurement if they are not tried."""
         if self._as_is is None and not self._has_latched() and not self._would_trip():
             self._attempt(self._now, self._rate_hz, AS_IS_S)
@@ -252,26 +252,26 @@ class _Examination:
         return self._now.watchdog_s < self._timing.gap_s or lasts_us < self._facts["late_us"]["p50"]
 
 
-def _is_good(told: dict[str, Any]) -> bool:
+def _is_good(told: Tried) -> bool:
     """Whether settings that were tried hold: nothing failed, no output was held, no block lost, and the rate was reached."""
     return not _has_ended(told) and told["held_blocks"] == told["lost_blocks"] == 0 and _is_quick(told)
 
 
-def _is_quick(told: dict[str, Any]) -> bool:
+def _is_quick(told: Tried) -> bool:
     return bool(told["reached_hz"] >= REACHED * told["sample_rate_hz"])
 
 
-def _has_ended(told: dict[str, Any]) -> bool:
+def _has_ended(told: Tried) -> bool:
     """Whether nothing more can be tried: the device has failed, or its watchdog has latched."""
     return "failure" in told or "latched" in told
 
 
-def _count(told: dict[str, Any]) -> str:
+def _count(told: Tried) -> str:
     held = f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
     return f"{held}, {told['reached_hz']:g} Hz reached"
 
 
-def _said(facts: dict[str, Any] | None) -> list[str]:
+def _said(facts: DeviceReport | None) -> list[str]:
     """Return what is wrong in the report with the settings of the bench."""
     if facts is None:
         return [

@@ -10,7 +10,6 @@ import mmap
 import os
 import tempfile
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -47,7 +46,7 @@ def packed(arrays: TickArrays) -> tuple[TickArrays, np.ndarray]:
     sizes = [_aligned(getattr(arrays, name).nbytes) for name in SNAPSHOT]
     memory = np.zeros(sum(sizes) + ALIGNMENT, np.uint8)
     memory = memory[-memory.ctypes.data % ALIGNMENT :][: sum(sizes)]
-    moved: dict[str, Any] = {}
+    moved: dict[str, np.ndarray] = {}
     first = 0
     for name, size in zip(SNAPSHOT, sizes, strict=True):
         old = getattr(arrays, name)

@@ -3,7 +3,7 @@
 import gc
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict, cast
 
 import numpy as np
 
@@ -22,7 +22,96 @@ ROUNDING = 1e-9  # of the largest reading: a smaller difference is none
 KEPT_ROWS = 20_000  # of readings, for the smallest step between two
 
 
-def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
+class Settable(TypedDict, total=False):
+    """Settings that a recommendation names."""
+
+    block: int
+    queue_blocks: int
+    watchdog_s: float
+    largest_rate_hz: float
+
+
+class Tried(TypedDict, total=False):
+    """Settings that were tried, and what came of it."""
+
+    block: int
+    queue_blocks: int
+    watchdog_s: float
+    sample_rate_hz: float
+    blocks: int
+    held_blocks: int
+    lost_blocks: int
+    reached_hz: float
+    failure: str
+    latched: str
+
+
+class Advice(TypedDict, total=False):
+    """A recommendation in the report on a device."""
+
+    settings: Settable
+    differs: Settable
+    """Those that differ from the bench's."""
+    reasons: dict[str, str]
+    """One line for each setting."""
+    measured: dict[str, float]
+    """Times on which it stands, s (`rig.loop.recommendation.Timing`)."""
+    delay_s: float
+    """Time from the middle of a block to that of the block of outputs that it leads to, s."""
+    holds: bool
+    """Whether the settings were tried, and held."""
+    tried: list[Tried]
+    bench_lines: list[str]
+    """Lines of a bench file with the settings that differ."""
+
+
+class DeviceReport(TypedDict, total=False):
+    """Report on a bench's device to which 0 V was put out."""
+
+    driver: str
+    identity: dict[str, str]
+    sample_rate_hz: float
+    block: int
+    largest_block: int
+    paced_by: str
+    virtual: bool
+    latched: str
+    """What the device had latched; only then."""
+    remarks: list[str]
+    block_us: dict[str, float]
+    """Time between two blocks: quantiles."""
+    late_us: dict[str, float]
+    """How late blocks came (`rig.loop.arrivals.lateness_s`), of a device with a clock: quantiles."""
+    latency_samples: float
+    driver_us: float
+    """Computing time of the driver a block."""
+    reached_hz: float
+    """Samples received per second."""
+    queue_blocks: int
+    blocks: int
+    held_blocks: int
+    lost_blocks: int
+    smallest_step_v: dict[str, float]
+    """Smallest step between two readings, by channel."""
+    failure: str
+    """Error that ended it; only then."""
+    statistics: dict[str, float]
+    """Measurements of the driver itself."""
+    counters: dict[str, int]
+    recommendation: Advice
+    examined_s: float
+
+
+class WakeUps(TypedDict, total=False):
+    """Lateness of a process that is woken at a rate, and the privileges that it was granted."""
+
+    wake_up_us: dict[str, float]
+    scheduling: str
+    memory: str
+    timer_slack: str
+
+
+def probe(rate_hz: float, seconds: float, privileged: bool) -> WakeUps:
     """Measure the lateness of wake-ups at a rate (Hz); return it with the privileges that were granted."""
     said = prepare(privileged=privileged)
     histogram = Histogram()
@@ -32,22 +121,20 @@ def probe(rate_hz: float, seconds: float, privileged: bool) -> dict[str, Any]:
         now = pace.wait()
         histogram.add(now - pace.release(now))
     gc.enable()
-    return {"wake_up_us": histogram.report(), **said}
+    return cast(WakeUps, {"wake_up_us": histogram.report(), **said})
 
 
-def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
+def round_trips(bench: Bench, seed: int, seconds: float) -> DeviceReport:
     """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the timing.
 
-    ``block_us``: time between two blocks; ``late_us``: how late blocks came (`rig.loop.arrivals.lateness_s`; of a device
-    with a clock); ``driver_us``: computing time of the driver a block; ``rate_hz``: samples received per second;
-    ``statistics``: measurements of the driver itself. A device that is armed by its driver is armed, at 0 V, so that it tells
+    A device that is armed by its driver is armed, at 0 V, so that it tells
     which outputs it has held. No blocks are exchanged with a device that has something ``latched``.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """
     with make_daq(bench, seed) as daq:
         capabilities = daq.capabilities
-        out: dict[str, Any] = {
+        out: DeviceReport = {
             "driver": bench.driver.name,
             "identity": dict(daq.identity),
             "sample_rate_hz": bench.sample_rate_hz,
@@ -63,7 +150,7 @@ def round_trips(bench: Bench, seed: int, seconds: float) -> dict[str, Any]:
         return out | _report(daq, _exchanged(daq, seconds), out["paced_by"] == "device")
 
 
-def timing_of(facts: dict[str, Any]) -> Timing:
+def timing_of(facts: DeviceReport) -> Timing:
     """Return what the recommendation needs of the report of `round_trips`."""
     return Timing(
         late_s=1e-6 * facts["late_us"]["largest"],
@@ -137,9 +224,9 @@ def _exchanged(daq: DAQ, seconds: float, asked: Callable[[], str] = str) -> _Exc
     return _Exchanged(times, time.thread_time() - computed_s, held, lost, kept, failure)
 
 
-def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> dict[str, Any]:
+def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> DeviceReport:
     times, blocks = seen.arrivals_s, seen.arrivals_s.size - 1
-    out: dict[str, Any] = {"block_us": _quantiles_us(np.diff(times)), "latency_samples": daq.latency_samples}
+    out: DeviceReport = {"block_us": _quantiles_us(np.diff(times)), "latency_samples": daq.latency_samples}
     if by_device:
         out["late_us"] = _quantiles_us(lateness_s(times[1:], daq.block / daq.sample_rate_hz))
     out["driver_us"] = round(1e6 * seen.busy_s / max(1, blocks), 2)
@@ -148,7 +235,8 @@ def _report(daq: DAQ, seen: _Exchanged, by_device: bool) -> dict[str, Any]:
     )
     out |= {"queue_blocks": daq.queue_blocks, "blocks": blocks, "held_blocks": seen.held, "lost_blocks": seen.lost}
     out["smallest_step_v"] = smallest_steps_v([channel.name for channel in daq.channels], seen.readings_v)
-    out |= {"failure": f"{type(seen.failure).__name__}: {seen.failure}"} if seen.failure else {}
+    if seen.failure:
+        out["failure"] = f"{type(seen.failure).__name__}: {seen.failure}"
     out |= {"statistics": dict(daq.statistics), "counters": dict(daq.counters)}
     out["remarks"] = [*daq.remarks]
     return out

@@ -4,6 +4,7 @@ import select
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from multiprocessing.connection import Connection
 from types import FrameType
 from typing import Any
@@ -19,8 +20,9 @@ from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, packed
 from rig.loop.worker.pace import pacing_of
 from rig.loop.worker.probe import probe, round_trips
-from rig.loop.worker.queue_choice import QueueChoice, presumed_latency, settle_queue
+from rig.loop.worker.queue_choice import DelayBounds, QueueChoice, presumed_latency, settle_queue
 from rig.system.privileges import ordinary_scheduling, prepare
+from rig.text.json_values import JsonObject
 from rig.tick.kernels import tick_block
 from rig.tick.tick import TickSettings
 
@@ -35,7 +37,7 @@ def main() -> None:
     try:
         name, *arguments = _told(commands)
         if name == "probe":
-            facts.send(("probed", probe(*arguments)))
+            facts.send(("probe", probe(*arguments)))
         elif name == "round trips":
             facts.send(("round trips", round_trips(*arguments)))
         elif name == "examination":
@@ -98,11 +100,11 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
 
 
 def _queue_choice(
-    daq: DAQ, bench: Bench, commands: Connection, of_plan: dict[str, Any], privileged: bool
+    daq: DAQ, bench: Bench, commands: Connection, of_plan: DelayBounds, privileged: bool
 ) -> QueueChoice | None:
     """Settle the queue under the loop's own priority; a signal, or a campaign that is gone, ends the measurement.
 
-    ``of_plan``: ``feedback`` and ``delay_s`` of `settle_queue`.
+    ``of_plan``: arguments of `settle_queue` that the plan gives.
     """
     daq.clear()
     allowed = daq.adjustable
@@ -115,8 +117,8 @@ def _queue_choice(
         return settle_queue(daq, bench, **of_plan, asked=lambda: _asked(came, released))
     finally:
         ordinary_scheduling()  # kernels may have to be compiled before the loop begins
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for restore in before:
+            restore()
 
 
 def _presumed_latency(daq: DAQ, bench: Bench, choice: QueueChoice | None = None) -> float:
@@ -159,10 +161,10 @@ def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
         daq.stop()
 
 
-def _listen() -> tuple[list[str], dict[int, Any]]:
-    """Let signals only be noted from now on; return a list that collects their names, and the handlers of before."""
+def _listen() -> tuple[list[str], list[Callable[[], object]]]:
+    """Let signals only be noted from now on; return a list that collects their names, and what restores the handlers."""
     came: list[str] = []
-    before: dict[int, Any] = {}
+    before: list[Callable[[], object]] = []
 
     def note(number: int, frame: FrameType | None) -> None:
         came.append(signal.Signals(number).name)
@@ -170,7 +172,7 @@ def _listen() -> tuple[list[str], dict[int, Any]]:
     for name in SIGNALS:
         if hasattr(signal, name):
             number = getattr(signal, name)
-            before[number] = signal.signal(number, note)
+            before.append(partial(signal.signal, number, signal.signal(number, note)))
     return came, before
 
 
@@ -188,7 +190,7 @@ def _asked(came: list[str], released: select.poll) -> str:
     return "the campaign has let go of the loop" if released.poll(0) else ""  # readable: it was closed
 
 
-def _statistics(loop: WallClockLoop, said: dict[str, str]) -> dict[str, Any]:
+def _statistics(loop: WallClockLoop, said: dict[str, str]) -> JsonObject:
     """Return the statistics that only the loop process knows, as plain data for the recording."""
     counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
     real_time = {**said, **{name: str(value) for name, value in counted.items()}}

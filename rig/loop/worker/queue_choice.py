@@ -10,7 +10,7 @@ by its gains and by `usual_delay_s`.
 
 import math
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypedDict
 
 from rig.bench import Bench
 from rig.daq import DAQ, Adjustable
@@ -22,6 +22,15 @@ LONGEST_S = 0.1
 """Longest queue that is chosen, s, unless a block lasts longer."""
 SHORT_S = 0.01  # a delay that is allowed at any frequency
 HOLD_SAMPLES = 1.0  # of the converter, at most
+
+
+class DelayBounds(TypedDict):
+    """What a plan says of the delay of its loop."""
+
+    feedback: bool
+    """Whether the outputs of the plan answer what is measured."""
+    delay_s: float
+    """Longest delay from output to input that the gains bear, s."""
 
 
 class QueueChoice(NamedTuple):

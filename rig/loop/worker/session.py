@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from rig.loop.worker.loop import CHUNK_DONE
 from rig.loop.worker.memory import TIMES, Layout, SharedMemory, packed
 from rig.loop.worker.queue_choice import QueueChoice
 from rig.loop.worker.spawn import Worker, rebuilt
+from rig.text.json_values import JsonObject
 from rig.tick.tick import TickSettings
 
 RING_S = 10.0
@@ -53,7 +54,7 @@ class WorkerLoop:
         self._worker, self._memory = worker, SharedMemory(worker.memory, layout)
         self._ramp_down_s = bench.limits.ramp_down_s
         self._silence_s = max(LONGEST_SILENCE_S, 50 * bench.block / bench.sample_rate_hz)
-        self._said: dict[str, Any] = {}
+        self._said: JsonObject = {}
 
     def run(self) -> Iterator[np.ndarray]:
         """Telemetry in chunks of about 20 ms, until the output is off or the loop's process is gone."""
@@ -99,13 +100,15 @@ class WorkerLoop:
         return told["p50"], told["p99"], told["p99_9"], told["largest"]
 
     @property
-    def report(self) -> dict[str, Any]:
+    def report(self) -> JsonObject:
         """Statistics for the record: how late each block began, how long it took, and both together, us."""
-        periods = int(self.tick.arrays.loop["cycles"][0])
-        out = {**self.statistics.report(periods), **self._said}
         histograms = self._memory.histograms
-        out |= {f"{name}_us": histograms[name].report() for name in TIMES}
-        return out | {"histograms": {name: histograms[name].bins() for name in TIMES}}
+        return {
+            **self.statistics.report(int(self.tick.arrays.loop["cycles"][0])),
+            **self._said,
+            **{f"{name}_us": histograms[name].report() for name in TIMES},
+            "histograms": {name: histograms[name].bins() for name in TIMES},
+        }
 
     def _wait(self) -> Callable[[], None] | None:
         """Wait for a chunk; if the loop has ended instead, return the function to call after the last chunk."""

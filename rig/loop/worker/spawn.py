@@ -53,7 +53,7 @@ class Worker:
         """Number of the process."""
         return self._process.pid
 
-    def send(self, *command: Any) -> None:
+    def send(self, *command: object) -> None:
         """Send an order; if the process is gone, the next `receive` raises."""
         with contextlib.suppress(BrokenPipeError):
             self._commands.send(command)
@@ -111,11 +111,11 @@ def rebuilt(names: tuple[str, ...], message: str) -> RigError:
     return DaqError(message)
 
 
-def ask(*command: Any) -> Any:
+def ask(command: str, *arguments: object) -> Any:
     """Run a loop process for one order, ``probe``, ``round trips`` or ``examination``, and return its answer."""
     worker = Worker()
     try:
-        worker.send(*command)
-        return worker.receive({"probe": "probed"}.get(command[0], command[0]))[0]
+        worker.send(command, *arguments)
+        return worker.receive(command)[0]
     finally:
         worker.close(2.0)
