@@ -1,6 +1,6 @@
 """Declaration of a kind of campaign: everything that the rest of the program needs to know about it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -16,10 +16,13 @@ class Campaign:
 
     plan: type[Plan]
     """Class of its plans."""
-    result: type
+    result: type[object]
     """Class of `Point.result`: the results that only points of this kind have."""
-    measure: Callable[..., Any]
+    measure: Callable[..., Point[object]] | None = None
     """``(bench, plan, target, rows, settling) -> point``: evaluates the rows of one point, including the quality."""
+    measure_batch: Callable[..., list[Point[object]]] | None = None
+    """``(bench, plan, targets, rows, passages, ended) -> points``: evaluates the points that are measured together, in place of
+    ``measure``."""
     columns: tuple[Column, ...]
     """Columns that tables show of a point."""
     draw: str
@@ -27,19 +30,16 @@ class Campaign:
     drawn."""
     figure_in: tuple[float, float] = (9.0, 6.4)
     """Width and height of the page of its figure, inches."""
-    batched: bool = False
-    """Whether several points are measured together; then ``measure`` is ``(bench, plan, targets, rows, passages, ended) ->
-    points``."""
-    watch: Callable[[Any, Sequence[Point[object]], Point[object]], tuple[Point[object], str]] | None = None
+    watch: Callable[..., tuple[Point[object], str]] | None = None
     """``(plan, points so far, point) -> (point, why to stop)``: completes a new point with the help of the points before it. If
     the text is not empty, the output is ramped down and the run ends."""
     identity: tuple[str, ...] = ()
     """Keys of a plan that define its vibrations. If one of them changes, no recorded point counts for the new plan."""
     fixed: tuple[str, ...] = ()
     """Keys of a plan that must not change when a recording is resumed, because all points must be evaluated in the same way."""
-    measurements: Mapping[type, Callable[[Recording], Any]] = field(default_factory=dict)
+    measurements: Mapping[type, Callable[..., Any]] = field(default_factory=dict)
     """Measurements that a recording yields: the function that reads each of them, by the type of the measurement."""
-    exchanged: Callable[[Recording], list[Any]] = lambda _: []
+    exchanged: Callable[[Recording], list[object]] = lambda _: []
     """Returns the objects of a recording that are exported to other programs."""
     experiments: Literal["realisations", "sweeps", "segments"] | None = None
     """How a recording becomes data for nonlinear state-space models: whole realisations of a multisine, whole sweeps, or

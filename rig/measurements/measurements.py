@@ -1,7 +1,7 @@
 """Read recordings as measurements in memory, in the form that `identification` takes."""
 
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from identification import (
     Backbone,
@@ -112,7 +112,7 @@ def load_backbone(path: Path) -> Backbone:
         return backbone(recording)
 
 
-def _measured(recording: Recording, measurement: type, **options: Any) -> Any:
+def _measured(recording: Recording, measurement: type, **options: object) -> object:
     campaign = KINDS.get(recording.kind)
     if campaign is None or measurement not in campaign.measurements:
         wanted = " or a ".join(kinds_that_yield(measurement))

@@ -212,7 +212,7 @@ def _part(
         loop = session.start(settings)
         notes.peaks = notes.peaks or _Peaks(bench, loop.tick.arrays.limits)
         execution = Execution(plan, bench, loop, notes, Silent(), before)
-        execution.go({})
+        execution.run({})
         return execution, loop.statistics.samples
 
 

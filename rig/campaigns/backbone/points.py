@@ -1,9 +1,8 @@
 """Points of a backbone: their contents, their evaluation from recorded rows, and the backbone made of them."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -46,6 +45,7 @@ from rig.campaigns.evaluation.vibrations import (
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
+from rig.recording.stored import ChannelTable
 from rig.text.column import Column
 
 NEAR = 0.1  # a point counts as reached within this distance of its final amplitude, as a logarithm
@@ -95,7 +95,7 @@ def measure_backbone_point(
     return with_settling(replace(point, modal=modal), settling)
 
 
-def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) -> Point[object]:
+def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -> Point[object]:
     """Evaluate a point from its ramp and the time at the point, whether or not the vibration settled."""
     try:
         flow = recorded_flow(bench, rows, plan.harmonics, plan.plant, other_modes=False)
@@ -133,7 +133,7 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Any) ->
     )
 
 
-def _flagged_objection(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> str:
+def _flagged_objection(bench: Bench, rows: Rows, flow: SlowFlow) -> str:
     """Object if anything was at a limit at any instant, or too many samples of the whole record were lost."""
     at_limit = {why: at for why, at in flagged(bench, rows, flow).items() if why != SAMPLES_LOST}
     lost = int(np.count_nonzero(lost_rows(rows)))
@@ -162,7 +162,7 @@ def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, no
 
 def backbone_of(
     points: Iterable[Point[object]],
-    channels: Sequence[Mapping[str, Any]],
+    channels: Sequence[ChannelTable],
     shape: DriveShape,
     phase_lag_target_deg: float,
 ) -> Backbone:

@@ -180,13 +180,18 @@ def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[t
     log_axis(axis, "x")
 
 
-def _band(axis: "Axes", points: Sequence[Measured], scale_m: float, mean: Any, std: Any) -> None:
+def _band(axis: "Axes", points: Sequence[Measured], scale_m: float, mean: np.ndarray, std: np.ndarray) -> None:
     x = [scale_m * vibration_of(point).amplitude_m for point in points]
     axis.fill_between(x, mean - 1.96 * std, mean + 1.96 * std, color=MAIN, alpha=0.2, lw=0)
 
 
 def _line(
-    axis: "Axes", points: Sequence[Measured], scale_m: float, values: Any, label: str | None, **style: Any
+    axis: "Axes",
+    points: Sequence[Measured],
+    scale_m: float,
+    values: Sequence[float] | np.ndarray,
+    label: str | None,
+    **style: Any,
 ) -> None:
     if points:
         x = [scale_m * vibration_of(point).amplitude_m for point in points]

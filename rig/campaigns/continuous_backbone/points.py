@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -41,6 +40,7 @@ from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
+from rig.recording.stored import ChannelTable
 from rig.text.column import Column
 
 CONTINUOUS_BACKBONE_COLUMNS = (
@@ -234,7 +234,7 @@ def _one_way(found: ContinuousBackbone, way: int, index: int) -> OneWay:
 
 def continuous_backbones_of(
     points: Iterable[Point[ContinuousBackboneResult]],
-    channels: Sequence[Mapping[str, Any]],
+    channels: Sequence[ChannelTable],
     shape: DriveShape,
 ) -> tuple[ContinuousBackbone, ...]:
     """Return the accepted points as one continuous backbone per repeat; raise `IdentificationError` if there are none."""
@@ -294,8 +294,7 @@ def recorded_mean_backbone(recording: Recording) -> Backbone:
 CONTINUOUS_BACKBONE = Campaign(
     plan=ContinuousBackbonePlan,
     result=ContinuousBackboneResult,
-    measure=measure_continuous_backbone,
-    batched=True,
+    measure_batch=measure_continuous_backbone,
     columns=CONTINUOUS_BACKBONE_COLUMNS,
     draw="rig.campaigns.continuous_backbone.figure:draw",
     figure_in=(9.0, 9.6),

@@ -1,7 +1,6 @@
 """Points of a decay campaign: a settled vibration and its decay, evaluated side by side."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -169,7 +168,7 @@ def recorded_settled(recording: Recording) -> Backbone:
     return replace(backbone, specimen=specimen_of(recording))
 
 
-def _exchanged(recording: Recording) -> list[Any]:
+def _exchanged(recording: Recording) -> list[object]:
     return [recorded_settled(recording)]
 
 

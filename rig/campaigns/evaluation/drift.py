@@ -1,11 +1,23 @@
 """Drift of a specimen over a run: compare the first point with its repetition at the end of the run."""
 
 from collections.abc import Iterable
-from typing import Any, TypeVar
+from typing import TypedDict, TypeVar, cast
 
 from rig.campaigns.evaluation.point import Point
 
 Result = TypeVar("Result")
+
+
+class Drift(TypedDict):
+    """Relative changes from the first point to its repetition; None if one of the two lacks the quantity."""
+
+    first: int
+    """Number of the first point."""
+    again: int
+    """Number of its repetition."""
+    frequency: float | None
+    damping: float | None
+    amplitude: float | None
 
 
 def without_repetition(points: Iterable[Point[Result]]) -> list[Point[Result]]:
@@ -13,7 +25,7 @@ def without_repetition(points: Iterable[Point[Result]]) -> list[Point[Result]]:
     return [point for point in points if not point.repeats_first]
 
 
-def drift_of(points: Iterable[Point[object]]) -> dict[str, Any] | None:
+def drift_of(points: Iterable[Point[object]]) -> Drift | None:
     """Return the relative changes from the first point to its repetition, with the numbers of both points.
 
     The changes are those of frequency, damping and amplitude. ``points`` are in the order of the plan. Returns None if the plan
@@ -26,11 +38,8 @@ def drift_of(points: Iterable[Point[object]]) -> dict[str, Any] | None:
     if first is None or again is None or not (first.accepted and again.accepted):
         return None
     before, now = _quantities(first), _quantities(again)
-    return {
-        "first": first.number,
-        "again": again.number,
-        **{name: _change(before.get(name), now.get(name)) for name in ("frequency", "damping", "amplitude")},
-    }
+    changes = {name: _change(before.get(name), now.get(name)) for name in ("frequency", "damping", "amplitude")}
+    return cast(Drift, {"first": first.number, "again": again.number, **changes})
 
 
 def _quantities(point: Point[object]) -> dict[str, float | None]:

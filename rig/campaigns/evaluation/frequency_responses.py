@@ -1,7 +1,6 @@
 """Frequency responses from the points of a recording, for every kind of campaign that steps through frequencies or lags."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
+from rig.recording.stored import ChannelTable
 
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
 """The controlled quantity, by the unit of the levels."""
@@ -22,7 +22,7 @@ def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyRespons
 
 
 def frequency_responses_of(
-    points: Iterable[Point[object]], channels: Sequence[Mapping[str, Any]], specimen: str
+    points: Iterable[Point[object]], channels: Sequence[ChannelTable], specimen: str
 ) -> tuple[FrequencyResponse, ...]:
     """Return the accepted points of a recording as one frequency response per level and pass.
 
@@ -71,7 +71,7 @@ def passes_of(points: Iterable[Point[object]]) -> list[tuple[str, list[Point[obj
     ]
 
 
-def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[Any, ...]]) -> str:
+def _label(level: float, unit: str, direction: str, repeat: int, alike: Sequence[tuple[float, str, int, str]]) -> str:
     """Return the level as text, with direction and repeat where other passes at the same level differ in them."""
     size = f"{1e3 * level:.4g} mm" if unit == "m" else f"{level:g} {unit}"
     size += f" {direction}" if len({other[1] for other in alike}) > 1 else ""

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -54,7 +53,7 @@ def _sums(bench: Bench, pieces: Sequence[Rows]) -> tuple[float, float] | None:
     return float(lines.sum()), float(power.sum())
 
 
-def _spectrum(bench: Bench, rows: Rows) -> tuple[np.ndarray, Any] | None:
+def _spectrum(bench: Bench, rows: Rows) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the force's power in bins from half the output frequency, and a mask of bins between harmonics.
 
     Returns None if the rows are too short.

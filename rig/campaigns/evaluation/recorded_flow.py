@@ -5,6 +5,7 @@ import numpy as np
 from identification import SlowFlow, slow_flow
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, too_many_lost
+from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibrations import channels_of
 from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plant import PlantFacts
@@ -18,7 +19,7 @@ HALF_WINDOW_PERIODS = 1.5  # of the demodulation: how far its window reaches to 
 
 def recorded_flow(
     bench: Bench,
-    rows: np.ndarray,
+    rows: Rows,
     harmonics: int,
     plant: PlantFacts | None,
     *,
@@ -45,7 +46,7 @@ def recorded_flow(
     )
 
 
-def flagged(bench: Bench, rows: np.ndarray, flow: SlowFlow) -> dict[str, np.ndarray]:
+def flagged(bench: Bench, rows: Rows, flow: SlowFlow) -> dict[str, np.ndarray]:
     """Return the unusable instants by reason, bool[n] each.
 
     An instant is unusable if, within its window, the output, the frequency or a sensor was at a limit, or more than 2 % of the

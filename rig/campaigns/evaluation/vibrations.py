@@ -1,9 +1,9 @@
 """Evaluation shared by all campaigns: failed points, channels, periodic vibrations."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point,
 from rig.campaigns.evaluation.rows import Rows, phases
 from rig.campaigns.planning.drive_shape import DriveShape
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
+from rig.recording.stored import ChannelTable
 from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD, LARGEST_LOST
@@ -148,12 +149,12 @@ def modal_part(vibration: PeriodicVibration, shape: DriveShape) -> Modal:
     )
 
 
-def measured_with(shape: DriveShape) -> dict[str, Any]:
+def measured_with(shape: DriveShape) -> dict[str, float | None]:
     """Return the fields of `Modal` that say with which measured mode shape it was evaluated; empty for that of the bench."""
     return {"drive_mode_shape": shape.value, "drive_mode_shape_std": shape.std} if shape.measured else {}
 
 
-def channels_from(rows: Sequence[Mapping[str, Any]]) -> tuple[Channel, ...]:
+def channels_from(rows: Sequence[ChannelTable]) -> tuple[Channel, ...]:
     """Convert a recording's table of channels to the channels of measurements."""
     return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
 

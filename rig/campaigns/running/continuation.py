@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
@@ -20,6 +20,7 @@ from rig.campaigns.planning.plan import Plan, Target
 from rig.campaigns.plans import bench_of, plan_from
 from rig.errors import ConfigurationError
 from rig.recording.reader import Recording
+from rig.recording.stored import Information, PlanTable
 
 Identity = tuple[object, ...]
 
@@ -44,9 +45,11 @@ class Continuation:
         """Targets that are not done."""
         return tuple(target for place, target in enumerate(self.plan.targets()) if place not in self.done)
 
-    def information(self) -> dict[str, Any]:
+    def information(self) -> Information:
         """Return the table that a part records about a new plan; an empty table if the plan is unchanged."""
-        return {"plan": self.plan.model_dump(mode="json"), "numbers": list(self.numbers)} if self.changed else {}
+        if not self.changed:
+            return {}
+        return {"plan": cast(PlanTable, self.plan.model_dump(mode="json")), "numbers": list(self.numbers)}
 
 
 def remaining(recording: Recording, change: Plan | None = None, source: str | Path = "") -> Continuation:
@@ -55,7 +58,7 @@ def remaining(recording: Recording, change: Plan | None = None, source: str | Pa
     Raises `ConfigurationError` if the changed plan cannot follow the current one or does not fit the bench.
     """
     name = recording.path.name
-    plans = [(plan_from(dict(said.plan), f"{name}: plan"), said.numbers) for said in recording.plans]
+    plans = [(plan_from(said.plan, f"{name}: plan"), said.numbers) for said in recording.plans]
     bench = validated(Bench, recording.configuration["bench"], f"{name}: bench")
     plan, numbers = plans[-1]
     changed = change is not None and change != plan
@@ -80,17 +83,17 @@ def identities(plan: Plan) -> tuple[Identity, ...]:
     return tuple(out)
 
 
-def _controlled(plan: Plan) -> tuple[Any, ...]:
+def _controlled(plan: Plan) -> Identity:
     """Return what the harmonics loop makes of the force, nothing without the loop."""
     loop = plan.law.harmonics
     return () if loop is None else (loop.channel, loop.highest, loop.left_alone, loop.wanted)
 
 
-def _rounded(values: Iterable[Any]) -> Identity:
+def _rounded(values: Iterable[object]) -> Identity:
     return tuple(_comparable(value) for value in values)
 
 
-def _comparable(value: Any) -> Any:
+def _comparable(value: object) -> object:
     if isinstance(value, float):
         return f"{value + 0.0:.9g}"
     if isinstance(value, Mapping):
@@ -150,7 +153,7 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
         raise ConfigurationError(f"{head}{error}") from None
 
 
-def changed_keys(before: dict[str, Any], after: dict[str, Any], path: str = "") -> list[str]:
+def changed_keys(before: Mapping[str, object], after: Mapping[str, object], path: str = "") -> list[str]:
     """Return the dotted paths of the keys in which two tables differ, in alphabetical order."""
     out = []
     for key in sorted({*before, *after}):

@@ -1,6 +1,6 @@
 """The queue of a run's device: settled before the run is armed, checked against the plan's gains, recorded."""
 
-from typing import Any
+from typing import cast
 
 from rig.arming.arming import armed
 from rig.arming.run_options import RunOptions
@@ -8,11 +8,12 @@ from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.loop.session import Session
 from rig.loop.worker.queue_choice import QueueChoice, usual_delay_s
+from rig.recording.stored import About, ArmingTable
 
 
 def armed_with_queue(
     plan: Plan, bench: Bench, session: Session, options: RunOptions
-) -> tuple[dict[str, Any], QueueChoice | None]:
+) -> tuple[ArmingTable, QueueChoice | None]:
     """Arm the bench and settle the queue of its device; return both.
 
     The queue is settled before, so that a person arms what will run; where the device has something latched, which only an
@@ -20,7 +21,7 @@ def armed_with_queue(
     """
     first = not session.latched
     choice = settled_queue(plan, bench, session, options) if first else None
-    arming = armed(bench, session, options.about.purpose or plan.kind, options.arm)
+    arming = cast(ArmingTable, armed(bench, session, options.about.purpose or plan.kind, options.arm))
     return arming, choice if first else settled_queue(plan, bench, session, options)
 
 
@@ -40,7 +41,7 @@ def settled_queue(plan: Plan, bench: Bench, session: Session, options: RunOption
     return choice
 
 
-def with_queue(facts: dict[str, Any], choice: QueueChoice | None) -> dict[str, Any]:
+def with_queue(facts: About, choice: QueueChoice | None) -> About:
     """Return what is recorded of a part, with the queue and the line on it in place of those of an earlier part."""
     if choice is None:
         return facts

@@ -3,10 +3,11 @@
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import ParamSpec
 
 from rig.campaigns.evaluation.point import Point
 
+Arguments = ParamSpec("Arguments")
 Points = list[Point[object]]
 
 
@@ -17,9 +18,9 @@ class EvaluationThread:
         self._thread = ThreadPoolExecutor(1, "evaluation")
         self._asked: deque[Future[Points]] = deque()
 
-    def ask(self, step: Callable[..., Points], *arguments: Any) -> None:
+    def ask(self, step: Callable[Arguments, Points], *arguments: Arguments.args, **named: Arguments.kwargs) -> None:
         """Request an evaluation of ``arguments``, which must not be changed any more."""
-        self._asked.append(self._thread.submit(step, *arguments))
+        self._asked.append(self._thread.submit(step, *arguments, **named))
 
     def known(self, point: Point[object]) -> None:
         """Queue a point that needs no evaluation, behind those requested before."""

@@ -1,9 +1,9 @@
 """Execution of one part of a run: the control loop, the journal, the evaluated points, and every way to stop."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from rig.arming.run_options import Progress
 from rig.bench import Bench
 from rig.campaigns.evaluation.force_harmonics import with_force_harmonics
 from rig.campaigns.evaluation.heavy_damping import with_heavy_damping
-from rig.campaigns.evaluation.measured_together import round_at
+from rig.campaigns.evaluation.measured_together import Passage, round_at
 from rig.campaigns.evaluation.plausibility import with_plausibility
 from rig.campaigns.evaluation.point import Attempt, Point, Quality, RowRange, point_name
 from rig.campaigns.evaluation.rows import Rows
@@ -22,7 +22,7 @@ from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.transient_disturbance import refused_for_a_transient
 from rig.campaigns.evaluation.vibrations import failed_point
 from rig.campaigns.kinds import KINDS
-from rig.campaigns.planning.plan import Plan
+from rig.campaigns.planning.plan import Plan, Target
 from rig.campaigns.running.attempts import RefusedRecords, after_attempts
 from rig.campaigns.running.device_remarks import with_device_remarks, with_disorder
 from rig.campaigns.running.evaluation_thread import EvaluationThread
@@ -37,6 +37,7 @@ from rig.daq import flag_names
 from rig.errors import RecordingError
 from rig.live.publisher import Live, Unpublished
 from rig.loop.loop import LoopStatistics, RunningLoop
+from rig.recording.stored import End, Event, Information, LoopTable, TrippedAtTable
 from rig.system.stop_signals import deferred, stopping_on_signals
 from rig.text.disorder import disorder_text
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
@@ -61,22 +62,27 @@ OVER = {
 }
 
 
+P = ParamSpec("P")
+T = TypeVar("T")
+Table = TypeVar("Table", bound=Mapping[str, object])
+
+
 class Journal(Protocol):
     """Takes what a part of a run produces; `rig.recording.journal.JournalWriter` writes it to a disk."""
 
-    def part(self, information: Mapping[str, Any]) -> None:
+    def part(self, information: Information) -> None:
         """Begin the part."""
 
     def rows(self, rows: np.ndarray) -> None:
         """Take telemetry rows."""
 
-    def event(self, event: Mapping[str, Any]) -> None:
+    def event(self, event: Event) -> None:
         """Take an event."""
 
-    def point(self, point: Mapping[str, Any]) -> None:
+    def point(self, point: Mapping[str, object]) -> None:
         """Take a point."""
 
-    def end(self, end: Mapping[str, Any]) -> None:
+    def end(self, end: End) -> None:
         """End the part."""
 
 
@@ -101,9 +107,8 @@ class Execution:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
         self.journal, self.progress, self.live = journal, progress, live or Unpublished()
-        self.measure = KINDS[plan.kind].measure
-        self.batched = KINDS[plan.kind].batched
-        self.watch = KINDS[plan.kind].watch
+        self.kind = KINDS[plan.kind]
+        self.batched = self.kind.measure_batch is not None
         self.targets = plan.targets()
         self.measured_before = before.done | before.given_up
         self.numbers = range(len(self.targets)) if before.numbers is None else before.numbers
@@ -127,13 +132,14 @@ class Execution:
         self.write_error: RecordingError | None = None
         self.failure: BaseException | None = None
 
-    def go(self, information: Mapping[str, Any]) -> None:
+    def run(self, information: Information) -> None:
         """Run to the end of the plan, or as far as possible; afterwards raise errors that occurred on the way.
 
         ``information`` is written to the journal before the first row of the part. A run that ends early raises no error.
         """
-        flags = {"points_done": self.done, "device_flags": flag_names(self.loop.counters)}
-        self._write("part", {**information, **flags})
+        flags: Information = {"points_done": self.done, "device_flags": flag_names(self.loop.counters)}
+        begin: Information = {**information, **flags}
+        self._write("part", self.journal.part, begin)
         for remark in self.loop.remarks:
             self._remark(remark)
         with one_thread(), deferred():  # signals: until the end record is in the journal
@@ -150,7 +156,7 @@ class Execution:
             self._attempt(self._mark_unlocked)
             self.evaluations.close()
             self._remark(disorder_text(self.loop.counters))
-            self._write("end", self._end())
+            self._write("end", self.journal.end, self._end())
         if self.failure is not None:
             raise self.failure
         if self.write_error is not None:
@@ -159,46 +165,49 @@ class Execution:
     def _remark(self, text: str) -> None:
         """Record and print a remark of the driver, if there is one."""
         if text:
-            self._write("event", {"sample": self.tick.sample, "what": "remark", "text": text})
+            self._event({"sample": self.tick.sample, "what": "remark", "text": text})
             self._attempt(self.progress.remark, text)
 
     def _take(self, rows: np.ndarray) -> None:
         """Record and evaluate a chunk of rows."""
         stored, events = self.stored.take(self.tick.sample - rows.size, rows)
         if stored.size:
-            self._write("rows", stored)
+            self._record(self.journal.rows, stored)
         for event in events:
-            self._write("event", event)
+            self._event(event)
         self._attempt(self._note_changes, rows)
         self._attempt(self._collect, rows)
         self._attempt(self.progress.advance, rows, self.tick)
         self.live.take(rows, self.loop, self.finished, len(self.targets))
 
-    def _attempt(self, step: Callable[..., None], *arguments: Any) -> None:
+    def _attempt(self, step: Callable[P, None], *arguments: P.args, **named: P.kwargs) -> None:
         """Run a step outside the control loop. If it fails, the rig is ramped down, and the error is raised at the end."""
         if self.failure is None:
-            self._anyway(step, *arguments)
+            self._anyway(step, *arguments, **named)
 
-    def _anyway(self, step: Callable[..., Any], *arguments: Any) -> Any:
+    def _anyway(self, step: Callable[P, T], *arguments: P.args, **named: P.kwargs) -> T | None:
         """Run a step even after an earlier failure; return the result of the step, or None if it fails."""
         try:
-            return step(*arguments)
+            return step(*arguments, **named)
         except BaseException as error:  # whatever the error, the driven rig is brought down before anything is reported
             self.failure = self.failure or error
             self.loop.request_stop()
             return None
 
-    def _write(self, what: str, told: Any) -> None:
-        """Write to the journal. If that fails, bring the rig down; the run continues unrecorded until it is at rest.
+    def _event(self, event: Event) -> None:
+        self._write("event", self.journal.event, event)
 
-        ``what`` names the method of `Journal`. All but rows can be watched as well.
-        """
-        if what != "rows":
-            self.live.line(what, told)
+    def _write(self, what: str, write: Callable[[Table], None], content: Table) -> None:
+        """Publish a part, an event, a point or an end, and ``write`` it to the journal."""
+        self.live.line(what, content)
+        self._record(write, content)
+
+    def _record(self, write: Callable[[T], None], content: T) -> None:
+        """Write to the journal. If that fails, bring the rig down; the run continues unrecorded until it is at rest."""
         if self.write_error is not None:
             return
         try:
-            getattr(self.journal, what)(told)
+            write(content)
         except RecordingError as error:
             self.write_error = error
             self.loop.request_stop(str(error))
@@ -206,7 +215,7 @@ class Execution:
     def _note_changes(self, rows: np.ndarray) -> None:
         """Record every change of the lock state and of the guard as an event with its sample number."""
         first = self.tick.sample - rows.size
-        events: list[dict[str, Any]] = []
+        events: list[Event] = []
         for name, kind in (("lock", LockState), ("guard", GuardMode)):
             values = np.ascontiguousarray(rows[name])
             begins = [0] if int(values[0]) != self.last[name] else []
@@ -216,7 +225,7 @@ class Execution:
                 events.append({"sample": first + int(index), "what": name, "state": state})
             self.last[name] = int(rows[name][-1])
         for event in sorted(events, key=lambda event: event["sample"]):
-            self._write("event", event)
+            self._event(event)
 
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the current point, and request the evaluation of points that are over."""
@@ -255,7 +264,7 @@ class Execution:
         if (due := self.start.due_rows(self.kept)) is not None:
             self.evaluations.ask(self.start.judge, *due)
         if remark := self.start.take_remark():
-            self._write("event", {"sample": self.tick.sample, "what": "remark", "text": remark})
+            self._event({"sample": self.tick.sample, "what": "remark", "text": remark})
             self.progress.remark(remark)
 
     def _note_refused(self) -> None:
@@ -264,7 +273,7 @@ class Execution:
             self.attempts[number] = (*self.attempts.get(number, ()), attempt)
             name, tried = point_name(self.numbers[number]), len(self.attempts[number])
             text = f"{name}, attempt {tried}: {attempt.reason}; measured again"
-            self._write("event", {"sample": sample, "what": "attempt", "state": "refused", "text": text})
+            self._event({"sample": sample, "what": "attempt", "state": "refused", "text": text})
             self.progress.remark(text)
 
     def _faults(self, first: int, end: int, *, settled: bool) -> int:
@@ -279,19 +288,31 @@ class Execution:
         return int(sum(outcomes[name].sum() for name in ("held", "continued", "lost")))
 
     def _measured(
-        self, first: int, rows: Rows, faults: int, steady: bool, target: Any, *told: Any
+        self, first: int, rows: Rows, faults: int, steady: bool, target: Target, settling: np.void
     ) -> list[Point[object]]:
-        """Evaluate the points in rows that begin with sample ``first``.
+        """Evaluate the point in rows that begin with sample ``first``.
 
         ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
         """
-        found = self.measure(self.bench, self.plan, target, rows, *told)
-        points = [
-            with_device_remarks(point, rows, self.loop.counters) for point in (found if self.batched else [found])
-        ]
-        if not self.batched:
-            left_alone = int(told[0]["left_alone"])
-            points = [with_force_harmonics(self.bench, self.plan, target, point, left_alone) for point in points]
+        assert self.kind.measure is not None
+        point = self.kind.measure(self.bench, self.plan, target, rows, settling)
+        point = with_device_remarks(point, rows, self.loop.counters)
+        point = with_force_harmonics(self.bench, self.plan, target, point, int(settling["left_alone"]))
+        return self._located([point], first, rows, faults, steady)
+
+    def _measured_batch(
+        self, first: int, rows: Rows, faults: int, targets: list[Target], passages: Sequence[Passage], ended: str
+    ) -> list[Point[object]]:
+        """Evaluate the points that are measured together in rows that begin with sample ``first``."""
+        assert self.kind.measure_batch is not None
+        points = self.kind.measure_batch(self.bench, self.plan, targets, rows, passages, ended)
+        points = [with_device_remarks(point, rows, self.loop.counters) for point in points]
+        return self._located(points, first, rows, faults, steady=False)
+
+    def _located(
+        self, points: list[Point[object]], first: int, rows: Rows, faults: int, steady: bool
+    ) -> list[Point[object]]:
+        """Add to evaluated points where their rows are stored, and note those that are worth another attempt."""
         points = [with_heavy_damping(point) for point in points]
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
@@ -354,7 +375,7 @@ class Execution:
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
         faults = self._faults(self.next_segment, found.end_segment, settled=False)
-        self.evaluations.ask(self._measured, first, rows, faults, False, targets, passages, ended)
+        self.evaluations.ask(self._measured_batch, first, rows, faults, targets, passages, ended)
         self.next_segment = found.end_segment
         return True
 
@@ -364,8 +385,8 @@ class Execution:
         point, refusal = self.scale.applied(point)
         if refusal:
             self.loop.request_stop(refusal)
-        if self.watch is not None:
-            point, stop = self.watch(self.plan, self.known, point)
+        if self.kind.watch is not None:
+            point, stop = self.kind.watch(self.plan, self.known, point)
             if stop:
                 self.loop.request_stop(stop)
         if point.quality is Quality.GOOD and point.warnings:
@@ -376,7 +397,7 @@ class Execution:
             self.passing.discard(number)
         point = replace(point, number=self.numbers[number])
         self.known.append(point)
-        self._write("point", stored(point))
+        self._write("point", self.journal.point, stored(point))
         self.reported[point.number] = point
         self.finished += 1
         self.accepted += 1 if point.accepted else 0
@@ -388,10 +409,9 @@ class Execution:
         completed = EndReason(int(self.tick.guard["reason"][0])) is EndReason.COMPLETED and self.loop.failure is None
         return frozenset(self.passing) if completed else frozenset()
 
-    def measured_before_repeat(self, points: Iterable[Mapping[str, Any]]) -> MeasuredBefore:
+    def measured_before_repeat(self, points: Iterable[Mapping[str, object]]) -> MeasuredBefore:
         """Return what was measured before the next attempts at `to_repeat`; ``points``: all of the recording."""
-        result: type[Any] = KINDS[self.plan.kind].result
-        known = tuple(point_from(table, result) for table in points)
+        known = tuple[Point[object], ...](point_from(table, self.kind.result) for table in points)
         return measured_before_repeat(self.numbers, known, self.to_repeat, self.attempts)
 
     def _mark_unlocked(self) -> None:
@@ -415,7 +435,7 @@ class Execution:
                 number = int(segment["point"])
                 self._report(failed_point(self.plan, self.targets[number], entry, locked=self.locked))
 
-    def _end(self) -> dict[str, Any]:
+    def _end(self) -> End:
         reason = EndReason(int(self.tick.guard["reason"][0]))
         if self.scale.refused and reason is EndReason.STOP_REQUESTED:
             reason = EndReason.START_REFUSED
@@ -428,11 +448,11 @@ class Execution:
             "tripped": reason.is_trip,
             **(self._trip(reason) if reason.is_trip else {}),
             "skipped": skipped_summary(self.reported.values(), len(self.targets) - self.done),
-            "loop": self.loop.report,
+            "loop": cast(LoopTable, self.loop.report),
             "counters": self.loop.counters,
         }
 
-    def _trip(self, reason: EndReason) -> dict[str, Any]:
+    def _trip(self, reason: EndReason) -> End:
         """Return where in the plan the run tripped, the most likely cause, and what to do."""
         at = tripped_at(self.tick, self.plan, self.targets)
         frequency_hz = self.tick.frequency_hz
@@ -441,7 +461,11 @@ class Execution:
         points = [point for point in recorded if point.quality is not Quality.IMPLAUSIBLE]
         first = not points and (self.batched or len(self.reported) <= 1)
         advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
-        return {"tripped_at": None if at is None else at._asdict(), **advice._asdict()}
+        return {
+            "tripped_at": None if at is None else cast(TrippedAtTable, at._asdict()),
+            "likely_cause": advice.likely_cause,
+            "what_to_do": advice.what_to_do,
+        }
 
     def _why(self) -> str:
         """Return in one sentence why the output was brought down."""
@@ -458,7 +482,7 @@ class Execution:
         )
 
 
-def end_without_measuring(bench: Bench) -> dict[str, Any]:
+def end_without_measuring(bench: Bench) -> End:
     """Return the end record of a part in which nothing moved, because all points of the plan had been measured before."""
     return {
         "completed": True,
@@ -466,6 +490,6 @@ def end_without_measuring(bench: Bench) -> dict[str, Any]:
         "text": "nothing was left to measure",
         "tripped": False,
         "skipped": "",
-        "loop": LoopStatistics(bench.sample_rate_hz).report(0),
+        "loop": cast(LoopTable, LoopStatistics(bench.sample_rate_hz).report(0)),
         "counters": {},
     }

@@ -1,12 +1,12 @@
 """The runner: carries out a plan on a bench and records it. However a run ends, the output is brought to 0 V."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from pydantic import TypeAdapter
 
@@ -39,7 +39,7 @@ from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.stored import BenchTable, ChannelTable, PlanTable
+from rig.recording.stored import About, BenchTable, ChannelTable, Information, PlanTable, RehearsalTable
 from rig.system.stop_signals import deferred, ended_in_order
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
@@ -88,7 +88,7 @@ def run_plan(plan: Plan, bench: Bench, output: Path, options: RunOptions | None 
             ):
                 folder = output.absolute().parent
                 execution = Execution(plan, bench, loop, journal, options.progress, None, folder, live, _checked(facts))
-                execution.go({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
+                execution.run({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
         return _with_further_attempts(_whole(output, options.progress), execution, options, facts, live)
 
 
@@ -124,10 +124,9 @@ def resume_run(
         left = remaining(recording, change, source)
         # Each part has its own noise: with the same seed, a new part would repeat the noise of the first.
         drawn = (recording.seed or 0) + len(recording.parts) if options.seed is None else options.seed
-        information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
+        information: Information = {"first_sample": recording.n_rows, "seed": drawn, **left.information()}
         finished = recording.complete and not left.changed
-        result: type[Any] = KINDS[left.plan.kind].result
-        points = tuple(point_from(table, result) for table in recording.points)
+        points = tuple(point_from(table, KINDS[left.plan.kind].result) for table in recording.points)
         before = MeasuredBefore(left.done, left.numbers, points)
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
@@ -177,7 +176,7 @@ def _further_part(
     session: Session,
     settings: TickSettings,
     begin: Callable[[RunningLoop, JournalWriter], Execution],
-    information: Mapping[str, Any],
+    information: Information,
 ) -> Execution:
     """Measure in a new part of a recording; ``begin`` makes its execution, ``information`` is what the part says of itself."""
     columns = [Column(**column) for column in ROW_COLUMNS]
@@ -187,12 +186,12 @@ def _further_part(
         _started(session, settings, output) as loop,
     ):
         execution = begin(loop, journal)
-        execution.go({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
+        execution.run({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
     return execution
 
 
 def _with_further_attempts(
-    recording: Recording, execution: Execution, options: RunOptions, facts: Mapping[str, Any], live: Live
+    recording: Recording, execution: Execution, options: RunOptions, facts: About, live: Live
 ) -> Recording:
     """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
 
@@ -224,7 +223,7 @@ def _with_further_attempts(
                 progress.remark(f"nothing is measured again: {error}")
                 return Recording(output)
             about = with_queue({**facts, "device": session.identity}, choice)
-            information = {"first_sample": first_sample, "seed": seed, "about": about}
+            information: Information = {"first_sample": first_sample, "seed": seed, "about": about}
             segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
             settings = tick_settings(plan, bench, segments, _checked(facts))
             begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
@@ -277,7 +276,7 @@ def _whole(output: Path, progress: Progress) -> Recording:
     return Recording(output)
 
 
-def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> dict[str, Any]:
+def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> About:
     """Arm the bench and collect the facts recorded for a part: who armed it, operator, specimen, device, code."""
     purpose = options.about.purpose
     rehearsed = {} if purpose else rehearsal_facts(plan, bench, options.rehearsal, options.override_rehearsal)
@@ -285,10 +284,10 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
     scale, unproven = known_scale(bench, session.identity, options.check, virtual=virtual)
     missing = [unproven, unproven_phase(bench, virtual=virtual)] if isinstance(plan, LockedPlan) else []
     arming, choice = armed_with_queue(plan, bench, session, options)
-    facts = {
-        **options.about.facts(),
+    facts: About = {
+        **cast(About, options.about.facts()),
         **({} if scale is None else {"checked": asdict(scale)}),
-        **({"rehearsal": rehearsed} if rehearsed else {}),
+        **({"rehearsal": cast(RehearsalTable, rehearsed)} if rehearsed else {}),
         "armed": arming,
         "device": session.identity,
         "remarks": [*calibration_remarks(bench, datetime.now(UTC).date()), *filter(None, missing)],
@@ -299,11 +298,11 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> d
     return with_queue(facts, choice)
 
 
-def _checked(facts: Mapping[str, Any]) -> CheckedScale | None:
+def _checked(facts: About) -> CheckedScale | None:
     """Return the scale with which a part compares its own, of what is recorded of the part; None for what is no scale."""
     try:
-        return CheckedScale(**facts["checked"]) if "checked" in facts else None
-    except (TypeError, ValueError):
+        return TypeAdapter(CheckedScale).validate_python(facts["checked"]) if "checked" in facts else None
+    except ValueError:
         return None
 
 

@@ -1,11 +1,11 @@
 """Select the rows of a run that are stored, and map samples to rows of the file."""
 
 from bisect import bisect_right
-from typing import Any
 
 import numpy as np
 
 from rig.campaigns.planning.plan import Plan
+from rig.recording.stored import Event
 
 
 class StoredRows:
@@ -27,7 +27,7 @@ class StoredRows:
         self._changes: list[tuple[int, int, int]] = [(0, 0, 1)]  # first sample, first row, stride
         self._rows = 0
 
-    def take(self, first: int, rows: np.ndarray) -> tuple[np.ndarray, list[dict[str, Any]]]:
+    def take(self, first: int, rows: np.ndarray) -> tuple[np.ndarray, list[Event]]:
         """Return the rows to store of a chunk that begins with sample ``first``, and an event for each change of stride."""
         if self._all:
             return rows, []
@@ -35,7 +35,7 @@ class StoredRows:
         samples = first + np.arange(rows.size)
         kept = samples % strides == 0
         stored_before = self._rows + np.concatenate([[0], np.cumsum(kept)])
-        events = []
+        events: list[Event] = []
         previous = self._changes[-1][2]
         for index in np.flatnonzero(np.diff(strides, prepend=previous)):
             change = (int(samples[index]), int(stored_before[index]), int(strides[index]))
