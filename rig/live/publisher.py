@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import ParamSpec, Self
 
 import numpy as np
 
@@ -28,50 +28,33 @@ from vibrolock.printable import error_text
 
 FRAMES_PER_S = 30.0
 LATENESS_S = 1.0
+Arguments = ParamSpec("Arguments")
 
 
-class Live(Protocol):
-    """Consumer of the state of a run."""
+class Live:
+    """Consumer of the state of a run. This one ignores everything: the run is not published."""
 
     def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         """Take telemetry rows, with the loop as it is after them and the number of points that are over."""
 
-    def line(self, what: str, told: Mapping[str, Any]) -> None:
+    def line(self, what: str, told: Mapping[str, object]) -> None:
         """Take a point, an event, a remark or how the part began or ended: ``what`` is to be told of it."""
 
     @property
     def stop_requested(self) -> bool:
         """Whether a stop was requested."""
+        return False
 
     def another_part(self) -> bool:
         """Say that one more part is going to be started; return whether it may be: not once a stop was requested."""
-
-    def stopping_on_request(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
-        """Let requests to stop reach ``stop`` while the rig is driven."""
-
-
-class Unpublished:
-    """Ignores everything: the run is not published."""
-
-    def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
-        """Do nothing."""
-
-    def line(self, what: str, told: Mapping[str, Any]) -> None:
-        """Do nothing."""
-
-    stop_requested = False
-    """Nobody could request one."""
-
-    def another_part(self) -> bool:
-        """Return True: nobody could request a stop."""
         return True
 
     def stopping_on_request(self, stop: Callable[[str], None]) -> AbstractContextManager[None]:
-        """Do nothing."""
+        """Let requests to stop reach ``stop`` while the rig is driven."""
         return nullcontext()
 
 
-class Publisher:
+class Publisher(Live):
     """Publishes a run in a folder of its own, which is removed at the end.
 
     An error while the run goes on is told by a ``remark``, once; nothing more is published then.
@@ -81,7 +64,7 @@ class Publisher:
     """
 
     def __init__(
-        self, facts: Mapping[str, Any], n_channels: int, remark: Callable[[str], None] = lambda text: None
+        self, facts: Mapping[str, object], n_channels: int, remark: Callable[[str], None] = lambda text: None
     ) -> None:
         self._remark = remark
         self._failed = False
@@ -120,11 +103,11 @@ class Publisher:
             self._written = now
             self._publish(rows, loop, finished, total)
 
-    def line(self, what: str, told: Mapping[str, Any]) -> None:
+    def line(self, what: str, told: Mapping[str, object]) -> None:
         """Append a line. Where the memory is full, it is left out."""
         self._carefully(self._line, what, told)
 
-    def _line(self, what: str, told: Mapping[str, Any]) -> None:
+    def _line(self, what: str, told: Mapping[str, object]) -> None:
         if what == "part":
             self._frame["part"] += 1
             self._rows.clear()
@@ -172,12 +155,14 @@ class Publisher:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _carefully(self, step: Callable[..., None], *arguments: Any) -> None:
+    def _carefully(
+        self, step: Callable[Arguments, None], *arguments: Arguments.args, **named: Arguments.kwargs
+    ) -> None:
         """Run a step of publishing; whatever goes wrong with it, the test is more important than its picture."""
         if self._failed:
             return
         try:
-            step(*arguments)
+            step(*arguments, **named)
         except Exception as error:
             self._failed = True
             text = f"the run can no longer be watched ({error_text(error)}); requests to stop are still heeded"
@@ -255,7 +240,7 @@ def _reserved(path: Path, size: int) -> mmap.mmap:
 
 
 @contextmanager
-def published(facts: Mapping[str, Any], n_channels: int, remark: Callable[[str], None]) -> Iterator[Live]:
+def published(facts: Mapping[str, object], n_channels: int, remark: Callable[[str], None]) -> Iterator[Live]:
     """Publish a run; where that cannot be done, say so in a ``remark`` and go on without.
 
     ``facts``: what does not change while it goes on.
@@ -264,7 +249,7 @@ def published(facts: Mapping[str, Any], n_channels: int, remark: Callable[[str],
         publisher = Publisher(facts, n_channels, remark)
     except Exception as error:  # the same holds here
         remark(f"the run cannot be watched or stopped from another terminal: {error}")
-        yield Unpublished()
+        yield Live()
         return
     with publisher:
         try:

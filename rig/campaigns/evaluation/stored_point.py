@@ -8,23 +8,30 @@ from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar, cast, get_args, get_origin, get_type_hints, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rig.campaigns.evaluation.point import ARRAY, PAIRS, PART, Point, Quality
 from rig.errors import RecordingError
+from rig.text.json_values import JsonValue
 from vibrolock.printable import shown
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Kind: TypeAlias = type["DataclassInstance"]
 Result = TypeVar("Result")
 
 
-def as_pairs(values: np.ndarray) -> Any:
+def as_pairs(values: np.ndarray) -> JsonValue:
     """Return complex numbers as [real, imaginary]."""
-    return np.stack([values.real, values.imag], axis=-1).tolist()
+    pairs: JsonValue = np.stack([values.real, values.imag], axis=-1).tolist()
+    return pairs
 
 
-def as_complex(pairs: Any) -> np.ndarray:
+def as_complex(pairs: ArrayLike) -> np.ndarray:
     """Return the complex array for the output of `as_pairs`."""
     array = np.asarray(pairs, float)
     return np.asarray(array[..., 0] + 1j * array[..., 1])
@@ -34,14 +41,14 @@ FORMER = {"alien_force": "nonharmonic_force"}
 """Keys of earlier versions, with their names of today."""
 
 
-def stored(point: Point[object]) -> dict[str, Any]:
+def stored(point: Point[object]) -> dict[str, JsonValue]:
     """Return the JSON form of a point."""
     return {**_table(point), "accepted": point.accepted}
 
 
-def _table(value: Any) -> dict[str, Any]:
+def _table(value: "DataclassInstance") -> dict[str, JsonValue]:
     """Return the keys and values of a dataclass, including those of its parts."""
-    out: dict[str, Any] = {}
+    out: dict[str, JsonValue] = {}
     for one in fields(value):
         content = getattr(value, one.name)
         if one.metadata == PART:
@@ -51,23 +58,23 @@ def _table(value: Any) -> dict[str, Any]:
     return out
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> JsonValue:
     if isinstance(value, np.ndarray):
-        return as_pairs(value) if np.iscomplexobj(value) else value.tolist()
+        return as_pairs(value) if np.iscomplexobj(value) else cast(JsonValue, value.tolist())
     if isinstance(value, Quality):
         return str(value)
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
-    return _table(value) if is_dataclass(value) else value
+    return _table(value) if is_dataclass(value) and not isinstance(value, type) else cast(JsonValue, value)
 
 
 @overload
-def point_from(table: Mapping[str, Any]) -> Point[object]: ...
+def point_from(table: Mapping[str, object]) -> Point[object]: ...
 @overload
-def point_from(table: Mapping[str, Any], result: type[Result]) -> Point[Result]: ...
+def point_from(table: Mapping[str, object], result: type[Result]) -> Point[Result]: ...
 
 
-def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Point[object]:
+def point_from(table: Mapping[str, object], result: type[object] | None = None) -> Point[object]:
     """Return a point from its JSON form.
 
     ``result`` is the class of the results that only its kind of campaign has; if None, the point has no such results. Raises
@@ -75,23 +82,23 @@ def point_from(table: Mapping[str, Any], result: type[Any] | None = None) -> Poi
     """
     table = {FORMER.get(key, key): value for key, value in table.items()}
     try:
-        point: Point[object] = _read(Point, {**table, "quality": _quality(table)}, result)
+        point: Point[object] = _read(Point, {**table, "quality": _quality(table)}, cast("Kind | None", result))
     except KeyError as error:
         raise RecordingError(f"a point's {error.args[0]}: is missing") from None
     return point
 
 
-def _quality(table: Mapping[str, Any]) -> Quality:
+def _quality(table: Mapping[str, object]) -> Quality:
     """Return the quality stored in a file. Files of earlier versions have only ``accepted``."""
-    accepted, told = bool(table["accepted"]), table.get("quality")
+    accepted, told = bool(table["accepted"]), str(table.get("quality"))
     if told in set(Quality) and Quality(told).accepted is accepted:
         return Quality(told)
     return Quality.REJECTED if not accepted else Quality.WARNED if table.get("warnings") else Quality.GOOD
 
 
-def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) -> Any:
+def _read(kind: Kind, table: Mapping[str, object], result: Kind | None = None) -> Any:
     """Build a dataclass from the keys of a table."""
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for one, inner, optional in _layout(kind):
         inner = result if inner is None and one.metadata == PART else inner
         if one.metadata == PART:
@@ -107,16 +114,16 @@ def _read(kind: Any, table: Mapping[str, Any], result: type[Any] | None = None) 
     return kind(**found)
 
 
-def _value(one: Field[Any], inner: type[Any] | None, stored_value: Any) -> Any:
+def _value(one: Field[object], inner: Kind | None, stored_value: object) -> object:
     """Return the value of a field from its JSON form; raise RecordingError for one of another type."""
     value = stored_value
     try:
         if one.name == "quality":
-            return Quality(value) if value in set(Quality) else Quality.REJECTED
+            return Quality(str(value)) if value in set(Quality) else Quality.REJECTED
         if value is not None and one.metadata == PAIRS:
-            return as_complex(value)
+            return as_complex(cast(ArrayLike, value))
         if value is not None and one.metadata == ARRAY:
-            return np.asarray(value, float)
+            return np.asarray(cast(ArrayLike, value), float)
         if isinstance(value, list):
             value = tuple(_read(inner, item) for item in value) if inner is not None else _tuples(value)
         elif isinstance(value, Mapping) and inner is not None:
@@ -130,17 +137,17 @@ def _value(one: Field[Any], inner: type[Any] | None, stored_value: Any) -> Any:
     return value
 
 
-def _fits(value: Any, hint: Any) -> bool:
+def _fits(value: object, hint: object) -> bool:
     """Return whether a value is of a type; of types that JSON does not have, everything is."""
     options = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     return any(_is(value, option) for option in options)
 
 
-def _is(value: Any, kind: Any) -> bool:
+def _is(value: object, kind: object) -> bool:
     if kind in (float, int):
         return isinstance(value, float | int) and not isinstance(value, bool)
     if kind in (bool, str, NoneType):
-        return isinstance(value, kind)
+        return isinstance(value, cast(type, kind))
     if get_origin(kind) is Literal:
         return value in get_args(kind)
     if get_origin(kind) is tuple:
@@ -152,18 +159,18 @@ def _is(value: Any, kind: Any) -> bool:
     return True
 
 
-def _first_key(kind: Any) -> str:
+def _first_key(kind: Kind) -> str:
     """Return the key of the first field of a part. If this key is present, so is the part."""
     one, inner, _ = _layout(kind)[0]
     return _first_key(inner) if one.metadata == PART and inner is not None else one.name
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value: object) -> object:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 @cache
-def _layout(kind: Any) -> tuple[tuple[Field[Any], type[Any] | None, bool], ...]:
+def _layout(kind: Kind) -> tuple[tuple[Field[object], Kind | None, bool], ...]:
     """Return for each field: the field, the dataclass that it holds (None: another type), and whether it may be None."""
     hints = get_type_hints(kind)
     out = []
@@ -179,12 +186,12 @@ def value_of(point: Point[object], name: str) -> Any:
     return next((getattr(part, name) for part in _parts(point) if name in _own_names(type(part))), None)
 
 
-def names_of(result: type[Any]) -> frozenset[str]:
+def names_of(result: Kind) -> frozenset[str]:
     """Return the names of all fields that points of a kind of campaign have, given the class of its results."""
     return frozenset(_names(Point)) | frozenset(_names(result))
 
 
-def _parts(value: Any) -> Iterator[Any]:
+def _parts(value: "DataclassInstance") -> "Iterator[DataclassInstance]":
     """Yield a dataclass and all parts in it."""
     yield value
     for one in fields(value):
@@ -192,11 +199,11 @@ def _parts(value: Any) -> Iterator[Any]:
             yield from _parts(part)
 
 
-def _own_names(kind: type[Any]) -> frozenset[str]:
+def _own_names(kind: Kind) -> frozenset[str]:
     return frozenset(one.name for one in fields(kind) if one.metadata != PART)
 
 
-def _names(kind: Any) -> Iterator[str]:
+def _names(kind: Kind) -> Iterator[str]:
     yield from _own_names(kind)
     for one, inner, _ in _layout(kind):
         if one.metadata == PART and inner is not None:

@@ -35,7 +35,7 @@ from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
 from rig.daq import flag_names
 from rig.errors import RecordingError
-from rig.live.publisher import Live, Unpublished
+from rig.live.publisher import Live
 from rig.loop.loop import LoopStatistics, RunningLoop
 from rig.recording.stored import End, Event, Information, LoopTable, TrippedAtTable
 from rig.system.stop_signals import deferred, stopping_on_signals
@@ -106,7 +106,7 @@ class Execution:
     ) -> None:
         before = before or MeasuredBefore()
         self.plan, self.bench, self.loop, self.tick = plan, bench, loop, loop.tick
-        self.journal, self.progress, self.live = journal, progress, live or Unpublished()
+        self.journal, self.progress, self.live = journal, progress, live or Live()
         self.kind = KINDS[plan.kind]
         self.batched = self.kind.measure_batch is not None
         self.targets = plan.targets()

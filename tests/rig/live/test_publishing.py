@@ -12,7 +12,7 @@ import pytest
 from rig.errors import RecordingError
 from rig.live.layout import BINS
 from rig.live.place import base_folder, lives, new_folder, runs
-from rig.live.publisher import Publisher, Unpublished, published
+from rig.live.publisher import Live, Publisher, published
 from rig.live.reader import LiveRun, run_into
 from rig.tick.safety.layout import GuardMode
 from tests.rig.live.writer import BENCH, FACTS, ROWS, chunk, made_loop
@@ -210,7 +210,7 @@ def test_where_the_memory_is_full_a_run_is_not_published_and_says_so(monkeypatch
     monkeypatch.setattr(os, "posix_fallocate", full)
     remarks = []
     with published(FACTS, N, remarks.append) as live:
-        assert isinstance(live, Unpublished)
+        assert type(live) is Live
     (remark,) = remarks
     assert "cannot be watched or stopped from another terminal" in remark
     assert "No space left" in remark
@@ -253,7 +253,7 @@ def test_a_folder_of_somebody_else_is_refused(monkeypatch, place):
     assert runs() == []
     remarks = []
     with published(FACTS, N, remarks.append) as live:
-        assert isinstance(live, Unpublished)
+        assert type(live) is Live
     assert "belongs to somebody else" in remarks[0]
 
 
