@@ -255,7 +255,7 @@ def identify(
     save(found, output)
     show_file(output, json)
     if kind == "pnlss" and found.fit is not None and found.fit.limited:
-        print(f"rig: the fit was {found.fit.stopped}; --resume with more --iterations goes on", file=sys.stderr)
+        print(f"rig: the fit was {found.fit.message}; --resume with more --iterations goes on", file=sys.stderr)
     if kind == "pnlss" and found.fit is not None and found.fit.interrupted:
         print(f"rig: interrupted; the best so far is in {output}, and --resume goes on", file=sys.stderr)
         raise typer.Exit(1)

@@ -14,8 +14,10 @@ FOLDER = Path(__file__).parent / "every_field"
 CONTENTS = json.loads(lzma.decompress((FOLDER / "contents.json.xz").read_bytes()))
 """By the name of the file: path and value of all fields, as the version had them that wrote the file."""
 EXCHANGED = sorted(path.name.removesuffix(".mat.xz") for path in FOLDER.glob("*.mat.xz"))
-RENAMED: dict[str, str] = {}
+RENAMED = {"stopped": "message"}
 """Fields that have another name now."""
+FLAGS = {"limited": "still-improving", "interrupted": "interrupted"}
+"""Flags of a fit that its status holds now."""
 
 
 def unpacked(name: str, folder: Path) -> Path:
@@ -27,8 +29,16 @@ def unpacked(name: str, folder: Path) -> Path:
 def differing(found, name: str) -> dict[str, tuple]:
     """Values now and then, by their paths then, where they differ; NaN is equal to NaN."""
     now = json.loads(json.dumps(dict(flattened(found))))
-    pairs = {path: (now.get(RENAMED.get(path, path), "missing"), then) for path, then in CONTENTS[name].items()}
+    pairs = {path: (value_at(path, now), then) for path, then in CONTENTS[name].items()}
     return {path: pair for path, pair in pairs.items() if json.dumps(pair[0]) != json.dumps(pair[1])}
+
+
+def value_at(path: str, now: dict):
+    """The value now, of a path then."""
+    head, _, field = path.rpartition(".")
+    if field in FLAGS:
+        return now[f"{head}.status"] == FLAGS[field]
+    return now.get(f"{head}.{RENAMED.get(field, field)}", "missing")
 
 
 @pytest.mark.parametrize("name", CONTENTS)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.experiments.experiment import Experiment
+from identification.fitting.result import Ending, FitStatus
 from identification.models.pnlss.fitting.fit import fit_pnlss
 from identification.models.pnlss.fitting.result import PnlssFit
 from identification.models.pnlss.fitting.settings import FitProgress, FitSettings
@@ -61,7 +62,7 @@ def best_of_starts(
 
 def interrupted(fit: PnlssFit) -> PnlssFit:
     """Return the fit, marked as interrupted."""
-    return replace(fit, interrupted=True, stopped="interrupted")
+    return replace(fit, **Ending.of(FitStatus.INTERRUPTED)._asdict())
 
 
 def _told(progress: Callable[[FitProgress], None], stage: str) -> Callable[[FitProgress], None]:

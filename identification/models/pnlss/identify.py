@@ -167,7 +167,7 @@ def _with_scores(found: PnlssFit, begin: PnlssModel, experiments: Sequence[Exper
     score = f"nonlinear model: training error {100 * found.training_error:.2g} %"
     if not np.isnan(found.validation_error):
         score += f", validation error {100 * found.validation_error:.2g} %"
-    score += f", iteration {found.chosen} of {found.history.iterations} ({found.stopped})"
+    score += f", iteration {found.chosen} of {found.history.iterations} ({found.message})"
     notes += [score, *_unstable(found.model)]
     return replace(found, model=replace(found.model, notes=(*found.model.notes, *notes)), linear=begin)
 

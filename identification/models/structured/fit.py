@@ -11,6 +11,7 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band, same_channels
+from identification.fitting.result import Ending, FitResult
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
 from identification.models.structured.element_trials import ElementTrial
@@ -24,7 +25,6 @@ from identification.models.structured.parameters import HIGHEST, Parameters
 from identification.models.structured.problem import Problem
 from identification.models.structured.start import linear_start, with_element
 from vibrolock.arrays import Float
-from vibrolock.results import Result
 
 _ROUGH, _FINE = 3e-2, 2e-4
 """Relative gains of a step below which the fits before the last one, and the last one, end."""
@@ -52,8 +52,8 @@ _SUPPORT = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StructuredFit(Result):
-    """A fitted model.
+class StructuredFit(FitResult):
+    """A fitted structured model; further fields are those of `identification.fitting.result.FitResult`.
 
     Parameters
     ----------
@@ -70,10 +70,6 @@ class StructuredFit(Result):
         small. What the steps of the simulation get wrong is in it, as one error that all numbers share.
     training_error
         RMS of the residual over that of the outputs, every output relative to its own RMS.
-    evaluations, seconds
-        Number of simulations with derivatives of all experiments, and time.
-    stopped
-        Why the fit ended.
     trials
         Which elements were fitted, and what they brought.
     """
@@ -84,9 +80,6 @@ class StructuredFit(Result):
     values: Float
     covariance: Float
     training_error: float
-    evaluations: int
-    seconds: float
-    stopped: str
     trials: tuple[ElementTrial, ...] = ()
 
     def __post_init__(self) -> None:
@@ -167,7 +160,7 @@ def fit_structured(
     known = 0.0 if isinstance(support, bool) else float(support)
     if not 0.0 <= known < math.inf:
         raise IdentificationError(f"support: is {known:g} N/m, allowed is 0 or above, True or False")
-    found, trials, evaluations = replace(linear, support_largest_n=largest, support_n_m=known), [], 0
+    found, trials, evaluations, iterations = replace(linear, support_largest_n=largest, support_n_m=known), [], 0, 0
     kept: _Fitted | None = None
     for plan in wanted:
         if found.elements or plan.between:
@@ -176,7 +169,7 @@ def fit_structured(
             with threads():  # its matrices are too small to share
                 start = with_element(found, experiments, led, plan.laws, reach)
         fitted = _fitted(start, linear, modes, experiments, led, support is True)
-        evaluations += fitted.evaluations
+        evaluations, iterations = evaluations + fitted.evaluations, iterations + fitted.iterations
         trial = ElementTrial.of(fitted.model, None if kept is None else kept.model, plan, validation)
         trials.append(trial)
         if not trial.kept:
@@ -191,8 +184,10 @@ def fit_structured(
         covariance=kept.problem.covariance(kept.vector),
         training_error=kept.problem.error(kept.vector),
         evaluations=evaluations,
+        iterations=iterations,
         seconds=time.perf_counter() - began,
-        stopped=kept.problem.stopped,
+        status=kept.ending.status,
+        message=kept.ending.message,
         trials=tuple(trials),
     )
 
@@ -204,7 +199,9 @@ class _Fitted(NamedTuple):
     start: StructuredModel
     problem: Problem
     vector: Float
+    ending: Ending
     evaluations: int
+    iterations: int
 
 
 def _fitted(
@@ -218,7 +215,7 @@ def _fitted(
     """Fit all numbers, in stages with less and less of the leading forces."""
     tied = (find_role(start.outputs, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
-    found, evaluations, misfit = start, 0, _MISFIT
+    found, evaluations, iterations, misfit = start, 0, 0, _MISFIT
     measured = np.arange(len(linear.omega)) < led
     seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
     poles = len(linear.frequency_hz if seen else modes.frequency_hz)
@@ -246,10 +243,11 @@ def _fitted(
         ]
         parameters = Parameters(begun, tied, free, turned, poles)
         problem = Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
-        vector, more = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
-        found, evaluations = parameters.model(vector), evaluations + more
-        misfit = min(_MISFIT, problem.error(vector))
-    return _Fitted(found, start, problem, vector, evaluations)
+        end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
+        found = parameters.model(end.vector)
+        evaluations, iterations = evaluations + end.evaluations, iterations + end.iterations
+        misfit = min(_MISFIT, problem.error(end.vector))
+    return _Fitted(found, start, problem, end.vector, end.ending, evaluations, iterations)
 
 
 def _rough_steps(model: StructuredModel) -> int:

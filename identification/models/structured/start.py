@@ -10,7 +10,7 @@ import numpy as np
 from identification.channels import find_name
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
-from identification.fitting.levenberg_marquardt import triangle_of
+from identification.fitting.bounded_steps import qr_r
 from identification.linear.modes import LinearModes
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.kernels import slide_along
@@ -228,7 +228,7 @@ def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omeg
         rows = [np.concatenate([of, part.own])[:, 1:].T for part, of in zip(parts, forces, strict=True)]
         columns = np.concatenate(rows)
         both = np.column_stack([columns, left])
-        triangle = triangle_of(np.concatenate([both.real, both.imag]))  # the same norms, in few rows
+        triangle = qr_r(np.concatenate([both.real, both.imag]))  # the same norms, in few rows
         a, y = triangle[:, :-1], triangle[:, -1]
         scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
         numbers = lsq_linear(a / scale, y, bounds=bounds, method="bvls").x / scale

@@ -110,7 +110,7 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
             "chosen": fit.chosen,
             "training_error": fit.training_error,
             "validation_error": fit.validation_error,
-            "stopped": fit.stopped,
+            "stopped": fit.message,
             "limited": fit.limited,
             "interrupted": fit.interrupted,
             "seconds": float(fit.history.seconds[-1]),

@@ -138,7 +138,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
             "numbers": len(fit.names),
             "training_error": fit.training_error,
             "evaluations": fit.evaluations,
-            "stopped": fit.stopped,
+            "stopped": fit.message,
             "seconds": fit.seconds,
             "trials": [asdict(trial) for trial in fit.trials],
         },

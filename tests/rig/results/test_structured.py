@@ -152,7 +152,7 @@ def test_a_file_gives_back_fit_and_errors_to_the_bit(recordings, tmp_path):
     assert again.fit.start.elements[0].laws[0].as_dict() == first.fit.start.elements[0].laws[0].as_dict()
     assert [run.row() for run in again.runs] == [run.row() for run in first.runs]
     assert np.array_equal(again.spectra.error, first.spectra.error)
-    assert (again.fit.stopped, again.uses, again.data) == (first.fit.stopped, first.uses, first.data)
+    assert (again.fit.message, again.uses, again.data) == (first.fit.message, first.uses, first.data)
 
 
 def test_elements_of_all_laws_come_back_from_a_model_alone(tmp_path):

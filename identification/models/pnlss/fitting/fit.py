@@ -13,7 +13,7 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment, excited_band
 from identification.models.pnlss.fitting.checks import check_data, check_memory, check_resumed
 from identification.models.pnlss.fitting.initial_states import fitted_initial_state
-from identification.models.pnlss.fitting.levenberg_marquardt import Iterates, iterate
+from identification.models.pnlss.fitting.iterates import Iterates, iterate
 from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.problem import Problem, Scales, scales_of
 from identification.models.pnlss.fitting.result import PnlssFit
@@ -73,7 +73,7 @@ def fit_pnlss(
     parameters = Parameters(scales.model(start if resume is None else resume.last), estimated)
     problem = Problem(parameters, scales, experiments, validation, settings)
     iterates = _begin(problem) if resume is None else _resumed(problem, scales, resume)
-    ending = iterate(problem, iterates, progress)
+    found = iterate(problem, iterates, progress)
 
     def physical(vector: Float) -> tuple[PnlssModel, Float]:
         begins = parameters.initial_states(vector) * scales.states
@@ -90,9 +90,11 @@ def fit_pnlss(
         last_initial_states=last_begins,
         state_scale=scales.states,
         settings=settings,
-        stopped=ending.reason,
-        limited=ending.limited,
-        interrupted=ending.interrupted,
+        status=found.ending.status,
+        message=found.ending.message,
+        evaluations=found.evaluations,
+        iterations=iterates.history.iterations,
+        seconds=float(iterates.history.seconds[-1]),
     )
 
 

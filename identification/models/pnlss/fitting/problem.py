@@ -7,6 +7,8 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
+from identification.fitting.threads import threads
+from identification.fitting.truncated_steps import TruncatedSteps
 from identification.models.pnlss.fitting.frequency_lines import with_lines
 from identification.models.pnlss.fitting.initial_states import PRIOR, fitted_initial_state
 from identification.models.pnlss.fitting.layout import System
@@ -16,6 +18,9 @@ from identification.models.pnlss.fitting.records import Record, records_of, simu
 from identification.models.pnlss.fitting.settings import FitSettings
 from identification.models.pnlss.model import PnlssModel
 from vibrolock.arrays import Float
+
+_REMEMBERED = 3
+"""Vectors of which the error is kept: that of an accepted step is asked for again, after at most two further trials."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +75,7 @@ class Problem:
         self.validation = with_lines(records_of(validation, *both, "validation"), settings, rate_hz)
         rms = settings.outputs == "rms"
         self.weights = np.ones_like(scales.outputs) if rms else scales.outputs / np.max(scales.outputs)
+        self._errors: dict[bytes, float] = {}
         self._total = self._measured(self.training)
         self._ridge = settings.ridge * parameters.nonlinear
         self._held = np.zeros(parameters.count)
@@ -90,6 +96,12 @@ class Problem:
 
     def training_error(self, vector: Float) -> float:
         """Relative RMS error over all training data; inf if a run is unbounded."""
+        key = vector.tobytes()
+        if key not in self._errors:
+            self._errors = {**dict(list(self._errors.items())[-_REMEMBERED:]), key: self._simulated_error(vector)}
+        return self._errors[key]
+
+    def _simulated_error(self, vector: Float) -> float:
         if not np.all(np.isfinite(vector)):
             return float(np.inf)
         system, begins = self.parameters.system(vector), self.parameters.initial_states(vector)
@@ -111,14 +123,25 @@ class Problem:
             total += self._squares(system, record, begin)
         return float(np.sqrt(total / self._validation_total))
 
-    def cost(self, vector: Float, error: float) -> float:
-        """Return the squared relative error plus the ridge."""
-        if not np.isfinite(error):
-            return float(np.inf)
-        return error**2 + float(self._ridge @ vector**2)
+    def cost(self, vector: Float) -> float:
+        """Return the squared relative error plus the ridge; inf if a run is unbounded."""
+        with threads():
+            error = self.training_error(vector)
+        return error**2 + float(self._ridge @ vector**2) if np.isfinite(error) else float(np.inf)
 
-    def equations(self, vector: Float, threads: int = 1) -> NormalEquations:
+    def equations(self, vector: Float, count: int = 1) -> NormalEquations:
         """Return the normal equations of half of `cost`; a small weight keeps unobservable initial states near zero."""
-        found = normal_equations(self.parameters, vector, self.training, self.weights, threads)
+        found = normal_equations(self.parameters, vector, self.training, self.weights, count)
         hessian, gradient = found.hessian / self._total, found.gradient / self._total
         return NormalEquations(hessian + np.diag(self._ridge + self._held), gradient + self._ridge * vector)
+
+    def linearised(self, vector: Float) -> TruncatedSteps | None:
+        """Return the steps from a vector; None if sensitivities are not finite.
+
+        n_states^2 directions change no output; they are among those that the steps leave out.
+        """
+        with threads() as count:
+            found = self.equations(vector, count)
+            if not (np.all(np.isfinite(found.hessian)) and np.all(np.isfinite(found.gradient))):
+                return None
+            return TruncatedSteps(found.hessian, found.gradient, vector, self.cost(vector), self.settings.truncation)

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.fitting.result import FitResult, upgrade_fit
 from identification.models.pnlss.fitting.settings import FitSettings
 from identification.models.pnlss.model import PnlssModel
 from identification.storage import stored
 from identification.validation import read_only
 from vibrolock.arrays import Float
-from vibrolock.results import Result
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,15 +72,18 @@ class FitHistory:
         return 1.0 - float(np.min(self.judged)) / before if 0.0 < before < np.inf else float(np.nan)
 
 
-def _upgrade(_arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
-    """Drop a setting of files from before Hessians were always of all samples."""
+def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
+    """Drop a setting of files from before Hessians were always of all samples, and read why the fit ended."""
+    upgrade_fit(arrays, attributes)
     attributes["settings"] = {key: value for key, value in attributes["settings"].items() if key != "every"}
 
 
 @stored(upgrade=_upgrade)
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PnlssFit(Result):
-    """A fitted model.
+class PnlssFit(FitResult):
+    """A fitted nonlinear state-space model.
+
+    Further fields are those of `identification.fitting.result.FitResult`; ``resume`` of `fit_pnlss` continues it.
 
     Parameters
     ----------
@@ -101,12 +104,6 @@ class PnlssFit(Result):
         float[n_states], RMS of the states in the start: their unit in the fit.
     settings
         Settings of the fit, as given.
-    stopped
-        Why the fit ended, in one line.
-    limited
-        Whether it ended because the settings allow no further iteration, while the last ones still lowered the error.
-    interrupted
-        Whether the fit was interrupted. The result so far is complete, and ``resume`` continues from it.
     """
 
     model: PnlssModel
@@ -118,9 +115,6 @@ class PnlssFit(Result):
     last_initial_states: Float
     state_scale: Float
     settings: FitSettings
-    stopped: str
-    limited: bool = False
-    interrupted: bool = False
 
     def __post_init__(self) -> None:
         for name in ("initial_states", "last_initial_states", "state_scale"):

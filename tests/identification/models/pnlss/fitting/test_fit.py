@@ -90,7 +90,7 @@ def test_the_iterate_with_the_smallest_validation_error_is_chosen_and_patience_e
     errors = fit.history.validation_error
     assert fit.chosen == np.argmin(errors) < fit.history.iterations
     assert fit.history.iterations == fit.chosen + 4
-    assert "validation" in fit.stopped
+    assert "validation" in fit.message
     assert pnlss_errors(fit.model, validation).overall[0] == pytest.approx(errors[fit.chosen], rel=1e-9)
     assert pnlss_errors(fit.last, validation).overall[0] == pytest.approx(errors[-1], rel=1e-9)
 
@@ -103,16 +103,16 @@ def test_a_fit_that_is_stopped_while_it_pays_says_so_and_one_that_has_arrived_do
     errors = short.history.training_error
     lowered = 100 * (1 - errors[-1] / errors[-2])
     assert short.limited
-    assert short.stopped == (
+    assert short.message == (
         f"stopped at its limit of 3 iterations while it still paid: the last one lowered the training error by {lowered:.2g} %"
     )
     assert decode(PnlssFit, *encode(short)).limited
     whole = fit_pnlss(start, experiments, resume=short)
     assert not whole.limited
-    assert "limit" not in whole.stopped
+    assert "limit" not in whole.message
     assert whole.training_error < 1.02 * 0.01 < short.training_error
     idle = fit_pnlss(whole.last, experiments, settings=FitSettings(iterations=2))
-    assert (idle.limited, idle.stopped) == (False, "stopped at its limit of 2 iterations")
+    assert (idle.limited, idle.message) == (False, "stopped at its limit of 2 iterations")
 
 
 def test_what_lowers_the_error_by_next_to_nothing_is_no_gain() -> None:
@@ -164,7 +164,7 @@ def test_an_interrupt_loses_nothing() -> None:
 
     fit = fit_pnlss(disturbed(system), [experiment(system, 400, noise=0.01)], progress=progress)
     assert fit.interrupted
-    assert fit.stopped == "interrupted"
+    assert fit.message == "interrupted"
     assert fit.history.iterations == fit.chosen == 2
     assert [state.training_error for state in seen] == fit.history.training_error[1:].tolist()
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, structured_backbone, structured_mode
+from identification.fitting.result import FitStatus
 from identification.models.structured.laws import Jenkins, PolynomialSpring
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.pnlss.steady.oscillators import shaker
@@ -36,7 +37,8 @@ def fit_of(model, std):
         training_error=0.01,
         evaluations=1,
         seconds=1.0,
-        stopped="",
+        status=FitStatus.CONVERGED,
+        message="",
     )
 
 

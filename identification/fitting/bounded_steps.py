@@ -1,0 +1,76 @@
+"""Damped steps within bounds, from the QR decomposition of derivatives and residuals.
+
+Each step solves a linear least-squares problem with damping and bounds exactly, by an active set. Numbers that belong at a
+bound (sliders that a joint does not need) thereby arrive there. Interior methods approach it by a share in each iteration.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vibrolock.arrays import Float
+
+Bounds = tuple[Float, Float]
+
+
+def qr_r(matrix: Float) -> Float:
+    """Return the triangle R of the QR decomposition: columns with the same norms and scalar products."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
+
+
+class BoundedLeastSquares:
+    """A sum of squares with least and largest numbers, for `identification.fitting.levenberg_marquardt.minimise`.
+
+    Dampings are relative to derivatives of unit norm, with the scales of More (1978): the largest norm of a column so far.
+
+    Parameters
+    ----------
+    triangle
+        float[P + 1, P + 1]: triangle of derivatives and residuals, [J r] = Q R, at a vector.
+    cost
+        Sum of squares at a vector.
+    bounds
+        float[P] each, least and largest numbers.
+    """
+
+    def __init__(self, triangle: Callable[[Float], Float], cost: Callable[[Float], float], bounds: Bounds) -> None:
+        self._triangle, self.cost, self._bounds = triangle, cost, bounds
+        self._norms = np.zeros_like(bounds[0])
+
+    def linearised(self, vector: Float) -> "BoundedSteps":
+        """Return the steps from a vector."""
+        found = self._triangle(vector)
+        self._norms = np.maximum(self._norms, np.linalg.norm(found[:, :-1], axis=0))
+        return BoundedSteps(found, np.where(self._norms > 0.0, self._norms, 1.0), vector, self._bounds)
+
+
+class BoundedSteps:
+    """Steps with any damping from one vector."""
+
+    def __init__(self, triangle: Float, scale: Float, vector: Float, bounds: Bounds) -> None:
+        self._scale, self._vector, self._bounds = scale, vector, bounds
+        self._jacobian, self._residual = triangle[:, :-1] / scale, triangle[:, -1]
+        self.cost = float(self._residual @ self._residual)
+        self._known: dict[float, tuple[Float, float]] = {}
+
+    def _solved(self, damping: float) -> tuple[Float, float]:
+        """Return the step, in scaled numbers, and the decrease of the sum of squares that it predicts."""
+        from scipy.optimize import lsq_linear  # only on use: it takes long to load
+
+        if damping not in self._known:
+            count = self._scale.size
+            matrix = np.concatenate([self._jacobian, np.sqrt(damping) * np.eye(count)])
+            right = np.concatenate([-self._residual, np.zeros(count)])
+            least, largest = ((bound - self._vector) * self._scale for bound in self._bounds)
+            step = lsq_linear(matrix, right, (least, largest), method="bvls").x
+            left = self._residual + self._jacobian @ step
+            self._known[damping] = step, self.cost - float(left @ left)
+        return self._known[damping]
+
+    def vector(self, damping: float) -> Float:
+        """Return the vector to which the step with this damping leads."""
+        return np.clip(self._vector + self._solved(damping)[0] / self._scale, *self._bounds)
+
+    def predicted(self, damping: float) -> float:
+        """Return the predicted decrease of the sum of squares."""
+        return self._solved(damping)[1]
