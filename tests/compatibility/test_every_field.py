@@ -35,10 +35,10 @@ def differing(found, name: str) -> dict[str, tuple]:
 
 def value_at(path: str, now: dict):
     """The value now, of a path then."""
-    head, _, field = path.rpartition(".")
+    head, dot, field = path.rpartition(".")
     if field in FLAGS:
         return now[f"{head}.status"] == FLAGS[field]
-    return now.get(f"{head}.{RENAMED.get(field, field)}", "missing")
+    return now.get(f"{head}{dot}{RENAMED.get(field, field)}", "missing")
 
 
 @pytest.mark.parametrize("name", CONTENTS)
