@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
-from identification import StructuredModel, bound_of
-from identification.models.structured.bound import Bound
+from identification import Bound, StructuredModel, bound_of
 from rig.results.files import load
 from rig.results.structured.kind import IdentifiedStructured
 from vibrolock.arrays import Float

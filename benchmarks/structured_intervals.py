@@ -11,8 +11,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from identification import StructuredModel, fit_structured
-from identification.models.structured.laws import Jenkins, PolynomialSpring
-from identification.models.structured.uncertainty import std_of
+from identification.models import Jenkins, PolynomialSpring, std_of
 from tests.identification.models.structured import test_elements as truth
 from vibrolock.arrays import Float
 

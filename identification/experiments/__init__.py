@@ -1,1 +1,13 @@
 """Experiments, models that simulate them, and time records from elsewhere that become experiments."""
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from identification.experiments.experiment import InitialState as InitialState
+    from identification.experiments.periodicity import period_remark as period_remark
+    from identification.experiments.simulators import SimulatedMotion as SimulatedMotion, Simulator as Simulator
+    from identification.experiments.time_experiments import suitable_rate_hz as suitable_rate_hz
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)

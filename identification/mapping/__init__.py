@@ -1,1 +1,12 @@
 """Mappings: where the values of an external measurement are in nested data, and what they mean."""
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from identification.mapping.csv_layout import CsvLayout as CsvLayout
+    from identification.mapping.time_data import SampledChannel as SampledChannel, Stretch as Stretch
+    from identification.mapping.units import UNITS as UNITS, si_of as si_of
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)

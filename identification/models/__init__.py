@@ -1,1 +1,33 @@
 """Dynamic models: modal, polynomial state-space (PNLSS) and structured ones."""
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from identification.models.modal.frequency_response import HeldForce as HeldForce
+    from identification.models.modal.sweep_prediction import as_recorded as as_recorded
+    from identification.models.modal.uncertainty import band_of_responses as band_of_responses
+    from identification.models.pnlss.error_table import SAME_LEVEL as SAME_LEVEL, ModelTest as ModelTest
+    from identification.models.pnlss.features import FUNCTIONS as FUNCTIONS
+    from identification.models.pnlss.user_functions import is_users as is_users
+    from identification.models.structured.laws import (
+        LAWS as LAWS,
+        Damper as Damper,
+        Iwan as Iwan,
+        Jenkins as Jenkins,
+        Joint as Joint,
+        Law as Law,
+        MagnetSpring as MagnetSpring,
+        Masing as Masing,
+        PolynomialDamper as PolynomialDamper,
+        PolynomialSpring as PolynomialSpring,
+        SplineSpring as SplineSpring,
+        Spring as Spring,
+        Stop as Stop,
+        UserSpring as UserSpring,
+    )
+    from identification.models.structured.start import linear_start as linear_start
+    from identification.models.structured.uncertainty import drawn as drawn, std_of as std_of
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredModel
-from identification.channels import find_role
+from identification.common import find_role
 from rig.bench import Bench, load_bench
 from rig.bench.bench import DriverChoice
 from rig.bench.channels import Channel

@@ -3,8 +3,8 @@
 import re
 from fractions import Fraction
 
-from identification.errors import IdentificationError
-from identification.mapping.units import si_of
+from identification import IdentificationError
+from identification.mapping import si_of
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _VOLTS = {"V": Fraction(1), "mV": Fraction(1, 1000), "uV": Fraction(1, 1_000_000)}  # in V

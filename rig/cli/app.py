@@ -128,7 +128,7 @@ def _complain(line: str, status: int) -> int:
 
 def _one_line(error: Exception) -> str:
     """Return the error in one line. For an error from other code, include its type."""
-    from identification.errors import IdentificationError
+    from identification import IdentificationError
     from rig.errors import DaqError, NotArmed, RigError
     from rig.text.message_pages import where_explained
 

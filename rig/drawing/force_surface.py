@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
-from identification.response_control.levels import LevelFit
+from identification.response_control import LevelFit
 from rig.drawing.page import grid
 from rig.drawing.steady_curve import UNSTABLE
 from rig.drawing.style import COLOURS, REJECTED, engineering, plain_log, shade, title

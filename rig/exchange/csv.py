@@ -21,7 +21,7 @@ from rig.system.text_files import read_text
 from rig.text.contents import Contents
 
 if TYPE_CHECKING:
-    from identification.mapping.csv_layout import CsvLayout
+    from identification.mapping import CsvLayout
 
 LARGEST_BYTES = 1_000_000_000
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
@@ -66,7 +66,7 @@ def columns_in(path: Path, layout: Mapping[str, Any] | None = None) -> dict[str,
 
     ``layout`` holds the keys of a `identification.mapping.csv_layout.CsvLayout`. Raises `ImportFailed`.
     """
-    from identification.mapping.csv_layout import CsvLayout
+    from identification.mapping import CsvLayout
 
     if layout is not None:
         return {**read_csv(path, CsvLayout(**layout)), "__file_units__": {}}

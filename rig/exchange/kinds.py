@@ -20,9 +20,8 @@ from identification import (
     pack_frequency_responses,
     unpack_frequency_responses,
 )
-from identification.channels import MOTION_UNIT
-from identification.nonlinear.nonlinear_modes import QUANTITIES
-from identification.storage import decode, encode
+from identification.common import MOTION_UNIT, decode, encode
+from identification.nonlinear import QUANTITIES
 from rig.exchange.pnlss import pnlss_from, pnlss_parts
 from rig.exchange.structured import structured_from, structured_parts
 from rig.exchange.time_data import TimeData, time_data_from, time_data_parts, transient_from, transient_parts

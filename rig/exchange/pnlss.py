@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import PnlssModel
-from identification.storage import decode, encode
+from identification.common import decode, encode
 from rig.text.contents import Contents
 
 _NAMES = {

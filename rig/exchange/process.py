@@ -6,7 +6,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
-from identification.errors import IdentificationError
+from identification import IdentificationError
 from rig.errors import RigError
 from rig.exchange.child_reading import NAMES
 from rig.exchange.child_values import most_bytes, reason, write_values

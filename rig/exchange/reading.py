@@ -46,7 +46,7 @@ def import_file(
     ImportFailed
         If the file cannot be read or does not contain what the mapping says.
     """
-    from identification.errors import IdentificationError
+    from identification import IdentificationError
 
     form = format_of(path, format_, "`format`")
     readers = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}
@@ -87,7 +87,7 @@ def import_sep005(series: Sequence[Mapping[str, Any]], mapping: str | Path) -> A
 
     Errors are those of `import_file`.
     """
-    from identification.errors import IdentificationError
+    from identification import IdentificationError
     from rig.exchange.sep005 import data_of_series
 
     try:
@@ -150,8 +150,8 @@ def _mapped(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any] | No
 
 def _check_units(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any]) -> None:
     """Refuse units in a mapping that contradict those that the file itself tells of its values."""
-    from identification.errors import IdentificationError
-    from identification.mapping.units import si_of
+    from identification import IdentificationError
+    from identification.mapping import si_of
 
     for channel in getattr(mapping, "channels", ()):
         of_file = files.get(getattr(channel, "file", ""), data)

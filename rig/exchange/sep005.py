@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.errors import IdentificationError
-from identification.mapping.units import si_of
+from identification import IdentificationError
+from identification.mapping import si_of
 from rig.exchange.child_reading import ImportFailed
 from rig.system.text_files import read_text
 from vibrolock.printable import shown

@@ -8,7 +8,7 @@ from rig.errors import ConfigurationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 
 if TYPE_CHECKING:
-    from identification.mapping.csv_layout import CsvLayout
+    from identification.mapping import CsvLayout
 
 FORMATS = {
     "mat": (".mat",),

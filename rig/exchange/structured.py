@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from identification import StructuredModel
-from identification.models.structured.laws import Damper, Joint, Spring, UserSpring
-from identification.storage import decode, encode
+from identification.common import decode, encode
+from identification.models import Damper, Joint, Spring, UserSpring
 from rig.text.contents import Contents
 
 _POINTS = 201

@@ -14,7 +14,7 @@ from identification import (
     SteadyPrediction,
     SweepPrediction,
 )
-from identification.channels import MOTION_UNIT
+from identification.common import MOTION_UNIT
 from rig.drawing.style import MAIN, REJECTED, SECOND, shade, title, unit_text
 from rig.figures.axes import branches, length_factor
 from rig.results.frequency_responses.figure import draw_responses

@@ -1,6 +1,6 @@
 """Read recordings as measurements in memory, and as experiments for nonlinear state-space models."""
 
-from identification.multisine.estimators import Estimator
+from identification.multisine import Estimator
 from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows
 from rig.measurements.measurements import (
     STEPPED,

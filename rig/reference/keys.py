@@ -45,8 +45,8 @@ def tables() -> dict[str, type[BaseModel]]:
     """Return the model of every table by the name under which the reference has it."""
     from controller import LockRule, OpenLoop, PhaseLockedLoop
     from controller.harmonics import HarmonicsSettings
-    from identification.mapping.csv_layout import CsvLayout
-    from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
+    from identification import TimeDataMapping
+    from identification.mapping import CsvLayout, SampledChannel, Stretch
     from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
     from rig.campaigns.dwell.plan import DriftLimits
     from rig.campaigns.kinds import KINDS

@@ -5,7 +5,7 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.errors import IdentificationError
+from identification import IdentificationError
 from rig.drawing.page import svg_of
 from rig.errors import RigError
 from rig.figures.files import drawing

@@ -27,8 +27,8 @@ from identification import (
     stabilisation,
     stepped_sine_mode,
 )
-from identification.linear.accelerance import Weighting
-from identification.validation import one_specimen
+from identification.common import one_specimen
+from identification.linear import Weighting
 from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import (

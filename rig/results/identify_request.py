@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
-from identification.linear.accelerance import Weighting
+from identification.linear import Weighting
 from rig.errors import ConfigurationError
 from rig.measurements import Estimator
 from rig.results.decay_backbone.options import DecayOptions

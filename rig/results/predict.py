@@ -22,9 +22,8 @@ from identification import (
     recorded_force_response,
     response_band,
 )
-from identification.models.modal.frequency_response import HeldForce
-from identification.prediction.comparison import Over
-from identification.prediction.steady_prediction import FLAGGED_BEYOND
+from identification.models import HeldForce
+from identification.prediction import FLAGGED_BEYOND, Over
 from rig.campaigns.evaluation.point import spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
 from rig.errors import ConfigurationError, RecordingError

@@ -17,8 +17,7 @@ from identification import (
     SteadyPrediction,
     StructuredModel,
 )
-from identification.models.modal.uncertainty import band_of_responses
-from identification.models.structured.uncertainty import drawn
+from identification.models import band_of_responses, drawn
 from rig.errors import ConfigurationError
 from rig.results.exciter.kind import EXCITER
 from rig.results.files import load_as

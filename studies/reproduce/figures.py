@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import ErrorTable
-from identification.models.pnlss.error_table import SAME_LEVEL
+from identification.models import SAME_LEVEL
 from rig.drawing.areas import broad
 from rig.drawing.page import grid, legend_below, page_for
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends

@@ -22,7 +22,7 @@ from identification import (
     linear_modes,
     realisation_combinations,
 )
-from identification.models.structured.laws import Law
+from identification.models import Law
 from rig.errors import RecordingError
 from rig.measurements import response_matrices
 from rig.recording.reader import Recording

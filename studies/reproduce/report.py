@@ -5,7 +5,7 @@ import io
 import json
 from typing import Any
 
-from identification.models.pnlss.error_table import SAME_LEVEL
+from identification.models import SAME_LEVEL
 from rig.errors import RecordingError
 from rig.results.predictions.kind import CUT
 from rig.system.text_files import read_text

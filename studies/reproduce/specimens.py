@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from identification.models.structured.laws import Law, MagnetSpring, Masing
+from identification.models import Law, MagnetSpring, Masing
 from rig.errors import ConfigurationError
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from identification import ErrorTable, Experiment, IdentificationError, PnlssModel, StructuredModel
-from identification.scatter.own_model import OwnModel
+from identification.scatter import OwnModel
 from rig.results.simulated.model import rows_of_scatter
 from studies.reproduce.folder import prepare
 from studies.reproduce.identified import Models, identify_all

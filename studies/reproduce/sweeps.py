@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import Exciter, Experiment
-from identification.channels import find_role
-from identification.experiments.simulators import SimulatedMotion
+from identification.common import find_role
+from identification.experiments import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.results.simulated.driven_models import DrivenModel, coupled_run

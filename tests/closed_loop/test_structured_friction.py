@@ -5,7 +5,7 @@ import pytest
 
 import identification
 import rig
-from identification.models.structured.laws import Masing
+from identification.models import Masing
 from rig.campaigns.plans import load_plan
 from simulators import VirtualRig
 

@@ -5,7 +5,7 @@ import pytest
 
 import identification
 import rig
-from identification.models.structured.laws import Masing, PolynomialSpring
+from identification.models import Masing, PolynomialSpring
 from rig.analysis.subject import subject_of
 from rig.bench import load_bench
 from rig.campaigns.plans import load_plan

@@ -12,19 +12,19 @@ import pytest
 import rig
 from identification import (
     Channel,
+    Exciter,
     LinearModes,
+    ModalProperties,
     NonlinearMode,
     Transient,
     compare,
+    compare_sweep,
+    identify_exciter,
     nonlinear_mode,
+    predict_sweep,
     recorded_force_response,
     zero_crossings,
 )
-from identification.exciter_coupling.exciter import Exciter
-from identification.exciter_coupling.exciter_fit import identify_exciter
-from identification.models.modal.properties import ModalProperties
-from identification.models.modal.sweep_prediction import compare_sweep
-from identification.models.modal.sweeps import predict_sweep
 from rig.campaigns.plans import plan_from
 from rig.measurements import point_rows
 from simulators import VirtualRig

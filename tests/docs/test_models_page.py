@@ -11,11 +11,11 @@ from identification import (
     Channel,
     IdentificationError,
     LinearModes,
+    PeriodicSpectra,
     frequency_response,
     identify_exciter,
     nonlinear_mode,
 )
-from identification.multisine.spectra import PeriodicSpectra
 from tests.docs.pages import ROOT
 from tests.recorded import SHORT, recorded_run
 

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from identification.errors import IdentificationError
+from identification import IdentificationError
 from rig.errors import ConfigurationError
 from vibrolock.errors import InvalidValueError, StatedError, at_least
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from identification import FrequencyResponse, IdentificationError
-from identification.frequency_responses import Controlled
+from identification.common import Controlled
 from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from identification.signals.chunks import unwrapped
+from identification.signals import unwrapped
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.rows import Rows

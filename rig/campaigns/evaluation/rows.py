@@ -10,7 +10,7 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from identification.signals.chunks import spans, unwrapped
+from identification.signals import spans, unwrapped
 
 _TURN = 2.0 * math.pi
 

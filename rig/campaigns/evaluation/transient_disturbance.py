@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.signals.chunks import unwrapped
+from identification.signals import unwrapped
 from rig.bench import Bench
 from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point, Quality

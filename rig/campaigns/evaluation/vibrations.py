@@ -8,7 +8,7 @@ from typing import Literal, cast
 import numpy as np
 
 from identification import Channel, PeriodicVibration, nonlinear_mode
-from identification.signals.fourier import vibration_in
+from identification.signals import vibration_in
 from rig.bench import Bench
 from rig.campaigns.evaluation.device_faults import DISTURBED, DeviceFaults, why_disturbed
 from rig.campaigns.evaluation.lost_samples import lost_rows

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.errors import IdentificationError
-from identification.mapping.units import si_of
+from identification import IdentificationError
+from identification.mapping import si_of
 
 _TOLD = ("sample_rate_hz", "__rates_hz__", "__starts_s__", "units", "__file_units__")
 """Keys by which readers tell of the data; they are no data."""

@@ -6,8 +6,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Literal
 
-from identification.mapping.csv_layout import CsvLayout
-from identification.mapping.units import UNITS
+from identification.mapping import UNITS, CsvLayout
 from rig.exchange.csv import table_lines
 
 _LOOKED_AT = 100

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from identification import IdentificationError
-from identification.mapping.units import si_of
+from identification.mapping import si_of
 from vibrolock.arrays import Float
 
 _RATES = re.compile(

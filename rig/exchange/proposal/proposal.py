@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mapping.csv_layout import CsvLayout
+from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
 from rig.exchange.proposal.csv_guess import guessed_layout

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.errors import IdentificationError
-from identification.mapping.csv_layout import CsvLayout
-from identification.mapping.units import UNITS, si_of
+from identification import IdentificationError
+from identification.mapping import UNITS, CsvLayout, si_of
 from rig.exchange.proposal.contents import FileContents, Leaf
 
 _MOST_LISTED = 60

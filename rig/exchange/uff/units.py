@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from identification.mapping.units import si_of
+from identification.mapping import si_of
 from rig.exchange.child_reading import ImportFailed
 
 _TOLERANCE = 1e-3

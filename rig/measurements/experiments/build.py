@@ -8,8 +8,8 @@ from typing import get_args
 import numpy as np
 
 from identification import Experiment, IdentificationError
-from identification.signals.decimation import LARGEST_FACTOR
-from identification.validation import positive
+from identification.common import positive
+from identification.signals import LARGEST_FACTOR
 from rig.bench.configuration import validated
 from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, Result, point_name, vibration_of

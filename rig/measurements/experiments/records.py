@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification import decimated
-from identification.experiments.experiment import Experiment, InitialState
-from identification.signals.decimation import EDGE_SAMPLES
+from identification import Experiment, decimated
+from identification.experiments import InitialState
+from identification.signals import EDGE_SAMPLES
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.measurements.experiments.signals import Signals

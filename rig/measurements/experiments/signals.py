@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from identification import Channel
-from identification.channels import chosen_rows
+from identification.common import chosen_rows
 from rig.bench import Bench
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Exciter
-from identification.exciter_coupling.exciter import PARAMETERS
+from identification.exciter_coupling import PARAMETERS
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, title
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from identification import Exciter
-from identification.exciter_coupling.exciter import PARAMETERS
-from identification.storage import decode, encode
+from identification.common import decode, encode
+from identification.exciter_coupling import PARAMETERS
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

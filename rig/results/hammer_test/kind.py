@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification import HammerTest
-from identification.storage import decode, encode
+from identification.common import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

@@ -4,7 +4,7 @@ from functools import partial
 from typing import Any
 
 from identification import NonlinearMode
-from identification.storage import decode, encode
+from identification.common import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

@@ -13,8 +13,8 @@ from identification import (
     PnlssFit,
     PnlssModel,
 )
-from identification.models.pnlss.user_functions import is_users
-from identification.storage import decode, encode
+from identification.common import decode, encode
+from identification.models import is_users
 from rig.errors import ConfigurationError
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.results.simulated.model import (

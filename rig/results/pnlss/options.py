@@ -45,8 +45,7 @@ class PnlssOptions(Options):
         self.chosen_degrees  # noqa: B018 refused here, not when it is asked for
         if self.function is None:
             return
-        from identification.models.pnlss.features import FUNCTIONS  # only on use: nothing else here needs models
-        from identification.models.pnlss.user_functions import is_users
+        from identification.models import FUNCTIONS, is_users
 
         if not self.saturating:
             raise ConfigurationError(f"`function` = {self.function}: is of features; add `saturating`, their number")

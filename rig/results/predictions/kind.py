@@ -15,7 +15,7 @@ from identification import (
     SweepPrediction,
     Transient,
 )
-from identification.storage import decode, encode
+from identification.common import decode, encode
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

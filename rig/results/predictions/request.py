@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import get_args
 
 from identification import FrequencyResponse
-from identification.models.modal.frequency_response import HeldForce
-from identification.prediction.comparison import Over
+from identification.models import HeldForce
+from identification.prediction import Over
 from rig.errors import ConfigurationError
 from rig.results.predictions.sweeps import CROSSINGS
 

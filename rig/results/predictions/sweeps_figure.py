@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Predictions, SweepPrediction, Transient
-from identification.models.modal.sweep_prediction import as_recorded
+from identification.models import as_recorded
 from rig.drawing.areas import broad
 from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from identification import Channel, Experiment, PnlssModel
-from identification.experiments.simulators import Simulator
+from identification.experiments import Simulator
 from rig.errors import ConfigurationError
 from rig.results.simulated.driven_models import DrivenModel
 from vibrolock.arrays import Float

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from identification import Experiment, IdentificationError, TimeRecords, time_experiments
-from identification.experiments.time_experiments import suitable_rate_hz
+from identification.experiments import suitable_rate_hz
 from rig.measurements import bench_of_recording
 from rig.measurements.experiments import default_rate_hz, experiments
 from rig.measurements.experiments.build import kinds_with_experiments

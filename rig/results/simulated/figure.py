@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.channels import MOTION_UNIT
+from identification.common import MOTION_UNIT
 from rig.drawing.lines import pooled
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, MARKERS, REJECTED, SECOND, THIRD, plain_log, say_why_empty, title, unit_text
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import Channel, ErrorSpectra, OutputStretch
-    from identification.experiments.simulators import Simulator
+    from identification.experiments import Simulator
     from rig.results.simulated.model import SimulatedModel
 
 _FLOOR = 0.1  # of the median residual: smaller values are not shown

@@ -10,8 +10,8 @@ from typing import TypeVar, cast
 import numpy as np
 
 from identification import Experiment, PnlssFit, RunScatter, StructuredFit, fit_with_scatter
-from identification.experiments.simulators import Simulator
-from identification.validation import one_specimen
+from identification.common import one_specimen
+from identification.experiments import Simulator
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
 from rig.results.simulated.data_files import KINDS, experiments_in, rates_hz_in, specimen_in

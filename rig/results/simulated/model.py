@@ -18,8 +18,8 @@ from identification import (
     output_stretch,
     simulated_run,
 )
-from identification.experiments.simulators import Simulator
-from identification.storage import stored
+from identification.common import stored
+from identification.experiments import Simulator
 from rig.results.kind import Arrays, Attributes
 from rig.text.console import number, print_table
 from vibrolock.results import Result

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification import Exciter, PnlssModel, SimulatedRun
-from identification.experiments.simulators import SimulatedMotion
+from identification.experiments import SimulatedMotion
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.plans import bench_of, load_plan

@@ -15,7 +15,7 @@ from identification import (
     SteadyStates,
     compare,
 )
-from identification.prediction.comparison import Over
+from identification.prediction import Over
 from rig.results.simulated.driven_models import DrivenModel, frequency_response_at, steady_state_at
 
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]

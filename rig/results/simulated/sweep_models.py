@@ -14,8 +14,8 @@ from identification import (
     Transient,
     demodulate,
 )
-from identification.channels import MOTION_ORDER, find_role
-from identification.experiments.simulators import SimulatedMotion
+from identification.common import MOTION_ORDER, find_role
+from identification.experiments import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.results.simulated.constants import all_inputs, driving
 from rig.results.simulated.driven_models import DrivenModel, coupled_run

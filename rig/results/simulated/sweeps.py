@@ -11,9 +11,9 @@ from identification import (
     PnlssModel,
     Transient,
     compare_sweep,
+    estimated_initial_state,
 )
-from identification.channels import find_role
-from identification.models.pnlss.errors import estimated_initial_state
+from identification.common import find_role
 from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import kinds_that_yield

@@ -40,7 +40,7 @@ def _laws(axis: "Axes", element: "NonlinearElement", number: int) -> None:
 
     Of joints it is the loop between the ends of that range. Functions of the user are not imported and therefore not drawn.
     """
-    from identification.models.structured.laws import Damper, Joint, Spring, UserSpring
+    from identification.models import Damper, Joint, Spring, UserSpring
 
     largest = element.largest or 1.0
     to_mm = 1e3 * element.scale_m

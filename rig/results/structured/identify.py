@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import cast
 
 from identification import LinearModes, ModalAnalysis, fit_structured
-from identification.models.structured.start import linear_start
-from identification.validation import one_specimen
+from identification.common import one_specimen
+from identification.models import linear_start
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
 from rig.results.files import load_as

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
-from identification.models.structured.laws import Joint, UserSpring
-from identification.models.structured.uncertainty import std_of
-from identification.storage import decode, encode
+from identification.common import decode, encode
+from identification.models import Joint, UserSpring, std_of
 from rig.results.kind import Arrays, Attributes, FileKind
 from rig.results.simulated.model import (
     SimulatedModel,

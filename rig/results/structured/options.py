@@ -8,8 +8,8 @@ from rig.errors import ConfigurationError
 from rig.results.simulated.options import Options
 
 if TYPE_CHECKING:
-    from identification.models.structured.further import ElementPlan
-    from identification.models.structured.laws import Law
+    from identification import ElementPlan
+    from identification.models import Law
 
 MODES_OF_A_STRUCTURE = (
     "the modes with which a structured model begins; make them from a test at a low level with "
@@ -42,8 +42,8 @@ class StructuredOptions(Options):
         """Return the elements as `identification.fit_structured` takes them."""
         if not self.laws:
             return ()
-        from identification.models.structured.further import ElementPlan
-        from identification.models.structured.laws import LAWS
+        from identification import ElementPlan
+        from identification.models import LAWS
 
         ready: dict[str, type[Law]] = {name: law for name, law in LAWS.items() if name != "user-spring"}
         found = []

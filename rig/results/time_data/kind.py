@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from identification import TimeRecords
-from identification.experiments.periodicity import period_remark
-from identification.storage import decode, encode
+from identification.common import decode, encode
+from identification.experiments import period_remark
 from rig.results.kind import FileKind
 from rig.text.console import number, print_table
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, structured_backbone
-from identification.models.structured.laws import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
+from identification.models import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
 from rig.authoring.new_files import new_file
 from rig.authoring.structured_rig import structured_bench
 from rig.bench import load_bench

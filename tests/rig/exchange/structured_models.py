@@ -1,15 +1,7 @@
 """A structured model with elements of all laws, for tests of files."""
 
 from identification import Channel, NonlinearElement, StructuredModel
-from identification.models.structured.laws import (
-    Iwan,
-    Jenkins,
-    MagnetSpring,
-    PolynomialDamper,
-    PolynomialSpring,
-    SplineSpring,
-    Stop,
-)
+from identification.models import Iwan, Jenkins, MagnetSpring, PolynomialDamper, PolynomialSpring, SplineSpring, Stop
 
 
 def structure(**changes) -> StructuredModel:

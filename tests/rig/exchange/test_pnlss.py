@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
-from identification import Channel, Features, PnlssModel
-from identification.linear.subspace import StateSpace
-from identification.storage import encode
+from identification import Channel, Features, PnlssModel, StateSpace
+from identification.common import encode
 from rig.errors import RecordingError
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rig
-from identification.exciter_coupling.exciter import PARAMETERS
+from identification.exciter_coupling import PARAMETERS
 from rig.campaigns.plans import load_plan, plan_from
 from rig.recording.reader import Recording
 from rig.results.files import load

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 import rig
 from identification import NonlinearElement
-from identification.models.structured.laws import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
+from identification.models import LAWS, Iwan, Jenkins, PolynomialSpring, UserSpring
 from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.results.files import load, save

@@ -62,7 +62,7 @@ def test_peaks_at_a_constant_force_are_those_of_the_rig(told):
 def test_bands_hold_the_peaks_of_other_models_that_the_fit_allows(told, model):
     """Against first-order errors along the numbers of the fit, of amplitude and frequency at phase resonance."""
     from identification import structured_backbone
-    from identification.models.structured.uncertainty import std_of
+    from identification.models import std_of
     from rig.results.files import load
 
     (sine,) = told("--frequency-response 0.05 --bands")["frequency_responses"]

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from identification import ErrorTable
-from identification.models.pnlss.error_table import ModelTest
+from identification.models import ModelTest
 from studies.reproduce.figures import _tests
 
 ERRORS = {"low": [0.02, 0.05, 0.08], "high": [0.4], "beyond": [0.1, 0.3, np.inf, np.inf]}

@@ -1,0 +1,18 @@
+"""What callers share with the library: roles of channels, checks of arguments, and the stored form of results."""
+
+from typing import TYPE_CHECKING
+
+from vibrolock.on_use import on_use
+
+if TYPE_CHECKING:
+    from identification.channels import (
+        MOTION_ORDER as MOTION_ORDER,
+        MOTION_UNIT as MOTION_UNIT,
+        chosen_rows as chosen_rows,
+        find_role as find_role,
+    )
+    from identification.frequency_responses import Controlled as Controlled
+    from identification.storage import decode as decode, encode as encode, stored as stored
+    from identification.validation import one_specimen as one_specimen, positive as positive
+else:
+    __getattr__, __dir__, __all__ = on_use(__name__)
