@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.reference.coupled_rig import Complex, CoupledRig, Vector
+from tests.reference.coupled_rig import CoupledRig
 from tests.reference.friction import jenkins_over_a_period
+from vibrolock.arrays import Complex, Float
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class Balance:
             voltages[h] = (rig.coil_r + s * rig.coil_l) * current + rig.motor_g * s * armature
         return voltages
 
-    def forces(self, y: Vector) -> tuple[Vector, Vector, Vector, Vector]:
+    def forces(self, y: Float) -> tuple[Float, Float, Float, Float]:
         """Coefficients of magnet and friction force and their Jacobians by the coefficients of z and delta."""
         z = self.basis @ y[: self.size]
         if np.max(np.abs(z)) >= 0.7 * self.rig.magnet_d0_m:
@@ -113,22 +114,22 @@ class Balance:
         p = self.project
         return p @ magnet, p @ friction, p @ (slope[:, None] * self.basis), p @ tangent
 
-    def to_complex(self, coefficients: Vector) -> Complex:
+    def to_complex(self, coefficients: Float) -> Complex:
         """[Y_0, Re, Im] along the first axis to complex harmonics."""
         h = self.harmonics
         packed = coefficients[: h + 1].astype(complex)
         packed[1:] += 1j * coefficients[h + 1 :]
         return packed
 
-    def to_real(self, harmonics: Complex) -> Vector:
+    def to_real(self, harmonics: Complex) -> Float:
         """Inverse of `to_complex`."""
         return np.concatenate([harmonics.real, harmonics.imag[1:]])
 
-    def unknowns(self, magnet_m: Complex, delta: Complex, omega_rad_s: float, voltage_v: float) -> Vector:
+    def unknowns(self, magnet_m: Complex, delta: Complex, omega_rad_s: float, voltage_v: float) -> Float:
         """Pack harmonics, frequency and voltage into y."""
         return np.concatenate([self.to_real(magnet_m), self.to_real(delta), [omega_rad_s, voltage_v]])
 
-    def responses(self, y: Vector) -> tuple[Complex, Complex]:
+    def responses(self, y: Float) -> tuple[Complex, Complex]:
         """[z, delta, F, x_d] that the forces of y cause, (H + 1, 4), and Jacobian (H + 1, 4, len(y))."""
         p, h = self.size, self.harmonics
         transfer, by_omega = self.transfer(y[-2])
@@ -149,7 +150,7 @@ class Balance:
         jacobian[:, :, -2] += np.einsum("hoi,hi->ho", by_omega, inputs)
         return np.einsum("hoi,hi->ho", transfer, inputs), jacobian
 
-    def residual(self, y: Vector, conditions: Conditions) -> tuple[Vector, Vector]:
+    def residual(self, y: Float, conditions: Conditions) -> tuple[Float, Float]:
         """Balance of z and delta, then the two closing equations, shape (len(y),), and the Jacobian."""
         p = self.size
         response, slopes = self.responses(y)

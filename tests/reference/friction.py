@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tests.reference.coupled_rig import Vector
+from vibrolock.arrays import Float
 
 
-def jenkins_over_a_period(delta: Vector, basis: Vector, k: Vector, slip: Vector) -> tuple[Vector, Vector]:
+def jenkins_over_a_period(delta: Float, basis: Float, k: Float, slip: Float) -> tuple[Float, Float]:
     """Site force `sum k delta - sum f_j` over the second of two periods from the virgin state, and its derivative.
 
     `delta` has shape (N,), samples of one period; `basis` (N, P) is d delta / d coefficients. Returns (N,) and (N, P).

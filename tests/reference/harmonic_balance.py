@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.reference.balance import Balance, Conditions
-from tests.reference.coupled_rig import Complex, CoupledRig, Vector
+from tests.reference.coupled_rig import CoupledRig
+from vibrolock.arrays import Complex, Float
 
 HARMONICS = 15
 SAMPLES = 256
@@ -57,7 +58,7 @@ class Periodic:
         return float(abs(self.drive_m[1])) / self.rig.linear_mode[1]
 
     @property
-    def active_power_w(self) -> Vector:
+    def active_power_w(self) -> Float:
         """Mean power through the stinger per harmonic, shape (H + 1,)."""
         order = np.arange(self.force_n.size)
         return 0.5 * np.real(self.force_n * np.conj(1j * order * self.omega_rad_s * self.drive_m))
@@ -72,13 +73,13 @@ class Periodic:
         """Active power of all harmonics over Omega^3 q^2."""
         return float(self.active_power_w.sum()) / (self.omega_rad_s**3 * self.modal_amplitude**2)
 
-    def waveform(self, harmonics: Complex, theta_rad: Vector) -> Vector:
+    def waveform(self, harmonics: Complex, theta_rad: Float) -> Float:
         """Sum a harmonic series at the given phases."""
         order = np.arange(harmonics.size)
         return np.real(np.exp(1j * np.outer(theta_rad, order)) @ harmonics)
 
 
-def solve(balance: Balance, conditions: Conditions, start: Vector, tolerance: float = 1e-10) -> tuple[Vector, Vector]:
+def solve(balance: Balance, conditions: Conditions, start: Float, tolerance: float = 1e-10) -> tuple[Float, Float]:
     """Newton from `start`; the unknowns and the Jacobian there. ArithmeticError when a dozen steps do not do."""
     y, scale = start.copy(), np.ones_like(start)
     # displacements and slips are of the order of millimetres
@@ -91,7 +92,7 @@ def solve(balance: Balance, conditions: Conditions, start: Vector, tolerance: fl
     raise ArithmeticError(f"no convergence with {conditions}")
 
 
-def linear_start(balance: Balance, conditions: Conditions) -> Vector:
+def linear_start(balance: Balance, conditions: Conditions) -> Float:
     """Solution of the rig with linearised magnets and stuck clamp, closing conditions met roughly."""
     rig = balance.rig
     k_lin = -float(rig.magnet_slope(np.zeros(1))[0])
@@ -106,7 +107,7 @@ def linear_start(balance: Balance, conditions: Conditions) -> Vector:
     return balance.unknowns(z * first, delta * first, omega, voltage)
 
 
-def periodic(balance: Balance, y: Vector) -> Periodic:
+def periodic(balance: Balance, y: Float) -> Periodic:
     """Unknowns to a named state."""
     response = balance.responses(y)[0]
     magnet, delta, force, drive = response.T
@@ -132,8 +133,8 @@ def sequence(balance: Balance, points: Sequence[Conditions]) -> list[Periodic]:
 
 
 def _continue(
-    balance: Balance, here: Conditions, goal: Conditions, y: Vector, jacobian: Vector, depth: int = 0
-) -> tuple[Vector, Vector]:
+    balance: Balance, here: Conditions, goal: Conditions, y: Float, jacobian: Float, depth: int = 0
+) -> tuple[Float, Float]:
     """One step of `sequence`, halved on failure."""
     by_level = np.zeros_like(y)
     by_level[-1] = 1.0 if goal.force_n is None else 2.0 / here.level

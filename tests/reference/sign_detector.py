@@ -6,14 +6,15 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tests.reference.balance import Balance, Conditions
-from tests.reference.coupled_rig import CoupledRig, Vector
+from tests.reference.coupled_rig import CoupledRig
 from tests.reference.harmonic_balance import RESONANCE_DEG, SAMPLES, Periodic, periodic, sequence, solve
+from vibrolock.arrays import Float
 
 # the fourth mode answers the 29th harmonic strongly enough to move the zero crossings by up to two degrees
 HARMONICS = 35
 
 
-def mean_sign_product(one: Vector, other: Vector) -> float:
+def mean_sign_product(one: Float, other: Float) -> float:
     """Mean of sign(one) sign(other) over one period, zero crossings interpolated linearly between the samples."""
     edges = [np.arange(one.size + 1.0)]
     closed = [np.append(signal, signal[0]) for signal in (one, other)]
@@ -49,7 +50,7 @@ def _rest_point(balance: Balance, resonance: Periodic, step_deg: float = 3.0) ->
     """Walk in lag from a phase-resonant state at fixed voltage until the detector changes sign, then find the zero."""
     here = balance.unknowns(resonance.magnet_m, resonance.delta, resonance.omega_rad_s, resonance.voltage_v)
 
-    def at(lag_deg: float) -> tuple[Vector, Periodic]:
+    def at(lag_deg: float) -> tuple[Float, Periodic]:
         y, _ = solve(balance, Conditions(voltage_v=resonance.voltage_v, lag_deg=lag_deg), here)
         return y, periodic(balance, y)
 

@@ -1,21 +1,21 @@
 import numpy as np
 import pytest
 
-from tests.reference.coupled_rig import Vector
 from tests.reference.friction import jenkins_over_a_period
 from tests.reference.parameters import ONE_SIDED
+from vibrolock.arrays import Float
 
 K, SLIP = ONE_SIDED.jenkins_k, ONE_SIDED.jenkins_slip
 THETA = 2 * np.pi * np.arange(1024) / 1024
 BASIS = np.column_stack([np.ones_like(THETA), np.cos(THETA), -np.sin(THETA)])
 
 
-def parallel(delta: Vector, basis: Vector = BASIS) -> Vector:
+def parallel(delta: Float, basis: Float = BASIS) -> Float:
     """Sum of the Jenkins forces themselves, without the stuck part that the site adds."""
     return np.asarray(K.sum() * delta - jenkins_over_a_period(delta, basis, K, SLIP)[0])
 
 
-def virgin(delta: Vector) -> Vector:
+def virgin(delta: Float) -> Float:
     """First loading from rest."""
     return np.asarray(np.sum(K * np.minimum(delta[:, None], SLIP), axis=1))
 

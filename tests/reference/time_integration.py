@@ -10,9 +10,10 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from tests.reference.coupled_rig import Complex, CoupledRig, Vector
+from tests.reference.coupled_rig import CoupledRig
+from vibrolock.arrays import Complex, Float
 
-Derivative = Callable[[float, Vector], Vector]
+Derivative = Callable[[float, Float], Float]
 
 
 class TimeDomain:
@@ -50,7 +51,7 @@ class TimeDomain:
         rise = 1.0 if t >= self.ramp_s else 0.5 - 0.5 * np.cos(np.pi * t / self.ramp_s)
         return float(rise * np.real(self.voltages_v @ np.exp(1j * self.omega * t * self.orders)))
 
-    def derivative(self, t: float, x: Vector, jenkins: float = 0.0) -> Vector:
+    def derivative(self, t: float, x: Float, jenkins: float = 0.0) -> Float:
         """x' under the given sum of Jenkins forces."""
         z, rig = float(self.z_row @ x), self.rig
         away = (rig.magnet_d0_m + z) if rig.symmetric else rig.magnet_d0_m
@@ -58,7 +59,7 @@ class TimeDomain:
         friction = self.stuck * float(self.delta_row @ x) - jenkins
         return np.asarray(self.linear @ x + self.into @ np.array([magnet, friction, self.voltage(t)]))
 
-    def derivative_with_rates(self, t: float, y: Vector) -> Vector:
+    def derivative_with_rates(self, t: float, y: Float) -> Float:
         """State and Jenkins forces: f_j' = k_j delta', held at the limit while the motion pushes on."""
         x, f = y[: self.size], y[self.size :]
         speed = float(self.delta_row[: self.mechanical] @ x[self.mechanical : 2 * self.mechanical])
@@ -67,14 +68,14 @@ class TimeDomain:
             [self.derivative(t, x, float(f.sum())), np.where(pushing, 0.0, self.rig.jenkins_k * speed)]
         )
 
-    def force_n(self, x: Vector) -> Vector:
+    def force_n(self, x: Float) -> Float:
         """Stinger force from states (..., size)."""
         n = self.mechanical
         stretch = x[..., n - 1] - x @ self.drive_row
         rate = x[..., 2 * n - 1] - x[..., n : 2 * n - 1] @ self.rig.phi_drive
         return np.asarray(self.rig.stinger_k * stretch + self.rig.stinger_c * rate)
 
-    def last_period(self, derivative: Derivative, extra: int, periods: int, samples: int = 128) -> Vector:
+    def last_period(self, derivative: Derivative, extra: int, periods: int, samples: int = 128) -> Float:
         """DOP853 from rest over whole periods; states of the last one, shape (samples, size)."""
         t = (periods - 1 + np.arange(samples) / samples) * self.period_s
         solution = solve_ivp(
@@ -82,25 +83,25 @@ class TimeDomain:
         )
         return np.asarray(solution.y[: self.size].T)
 
-    def without_friction(self, periods: int) -> Vector:
+    def without_friction(self, periods: int) -> Float:
         """Settled period, clamp stuck (the rig must have no Jenkins stiffness), shape (samples, size)."""
         assert self.stuck == 0.0, "the rig has friction"
         return self.last_period(self.derivative, 0, periods)
 
-    def with_friction_rates(self, periods: int) -> Vector:
+    def with_friction_rates(self, periods: int) -> Float:
         """Settled period with Jenkins forces as states, shape (samples, size)."""
         return self.last_period(self.derivative_with_rates, self.limit.size, periods)
 
-    def with_return_map(self, periods: int, steps: int = 384) -> Vector:
+    def with_return_map(self, periods: int, steps: int = 384) -> Float:
         """Settled period by classical Runge-Kutta steps and the return map, shape (steps, size)."""
         h, k = self.period_s / steps, self.rig.jenkins_k
         x, force, kept = np.zeros(self.size), np.zeros(k.size), np.zeros((steps, self.size))
 
-        def moved(to: Vector) -> Vector:
+        def moved(to: Float) -> Float:
             trial = force + k * float(self.delta_row @ (to - x))
             return np.minimum(np.maximum(trial, -self.limit), self.limit)
 
-        def slope(t: float, at: Vector) -> Vector:
+        def slope(t: float, at: Float) -> Float:
             return self.derivative(t, at, float(moved(at).sum()))
 
         for step in range(periods * steps):
@@ -115,7 +116,7 @@ class TimeDomain:
             x = after
         return kept
 
-    def harmonics(self, signal: Vector) -> Complex:
+    def harmonics(self, signal: Float) -> Complex:
         """Y_h of samples over one period, y = Re sum_h Y_h exp(i h theta), shape (samples // 2,)."""
         spectrum = np.fft.rfft(signal)[:-1] * (2.0 / signal.size)
         spectrum[0] *= 0.5
