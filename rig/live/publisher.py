@@ -17,6 +17,7 @@ from typing import ParamSpec, Self
 import numpy as np
 
 from rig.live.binning import put_bin
+from rig.live.facts import RunFacts
 from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
 from rig.live.place import FRAME_FILE, LINES, STOP, TRACES, new_folder, remove
 from rig.live.stopping import stopping_on_request
@@ -63,12 +64,10 @@ class Publisher(Live):
         OSError, RecordingError: on construction: the folder or its memory cannot be had.
     """
 
-    def __init__(
-        self, facts: Mapping[str, object], n_channels: int, remark: Callable[[str], None] = lambda text: None
-    ) -> None:
+    def __init__(self, facts: RunFacts, n_channels: int, remark: Callable[[str], None] = lambda text: None) -> None:
         self._remark = remark
         self._failed = False
-        self.folder, self._lock = new_folder(encode(facts, what="facts of the run"))
+        self.folder, self._lock = new_folder(encode(facts.to_json(), what="facts of the run"))
         try:
             rows = recorded_row(n_channels)
             self._recent: list[np.ndarray] = []  # chunks that hold the last rows, for the frame's window
@@ -240,7 +239,7 @@ def _reserved(path: Path, size: int) -> mmap.mmap:
 
 
 @contextmanager
-def published(facts: Mapping[str, object], n_channels: int, remark: Callable[[str], None]) -> Iterator[Live]:
+def published(facts: RunFacts, n_channels: int, remark: Callable[[str], None]) -> Iterator[Live]:
     """Publish a run; where that cannot be done, say so in a ``remark`` and go on without.
 
     ``facts``: what does not change while it goes on.

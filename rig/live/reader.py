@@ -5,19 +5,23 @@ import mmap
 import os
 import time
 import zlib
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
 from rig.errors import RecordingError
+from rig.live.facts import Line, RunFacts, facts_from
 from rig.live.layout import BINS, FRAME, HEAD, bin_dtype
 from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, base_folder, lives, runs
 from rig.live.stopping import request_stop
 from rig.tick.layout import recorded_row
 
 TRIES = 20
+"""Attempts to read a whole frame while the run writes; chosen: 2 ms in all, a write takes microseconds."""
 
 
 class Frame(NamedTuple):
@@ -31,11 +35,47 @@ class Frame(NamedTuple):
     """Time since it was written, s."""
 
 
+@dataclass(frozen=True)
+class ReplayState:
+    """Where a replay stands."""
+
+    time_s: float
+    duration_s: float
+    playing: bool
+    speed: float
+    """How many times as fast as the clock."""
+
+
+class Player(Protocol):
+    """Controls of a replay."""
+
+    def replay_state(self) -> ReplayState:
+        """Return where the replay stands."""
+
+    def pause(self) -> None:
+        """Stop the replay where it stands."""
+
+    def play(self) -> None:
+        """Go on with the replay; at the end, begin again."""
+
+    def seek(self, time_s: float) -> None:
+        """Jump to a time, or to the nearest that was recorded."""
+
+    def control(self, action: str, value: float) -> None:
+        """Do what is asked on a page; `ValueError` for what is not known."""
+
+
 class View(Protocol):
     """A run as it is watched: one that is under way, or a recording that is replayed."""
 
-    facts: dict[str, Any]
-    """What does not change: plan, bench, channels with units and limits, operator."""
+    facts: RunFacts
+    """What does not change."""
+    generation: int
+    """Number of jumps of a replay so far: after each, lines and bins begin anew."""
+
+    @property
+    def player(self) -> Player | None:
+        """Controls of a replay; None for a run that is under way."""
 
     def frame(self) -> Frame | None:
         """Return the present state, or None if there is none yet."""
@@ -43,7 +83,7 @@ class View(Protocol):
     def bins(self, first: int) -> tuple[int, np.ndarray]:
         """Return the bins of the traces from number ``first`` on that are left, and the number of the first of them."""
 
-    def lines(self, first: int) -> list[dict[str, Any]]:
+    def lines(self, first: int) -> Sequence[Line]:
         """Return points, events and remarks from number ``first`` on, as they were told."""
 
     @property
@@ -53,6 +93,9 @@ class View(Protocol):
     def request_stop(self, cause: str) -> None:
         """Ask for the ramp to 0 V; RecordingError if the request cannot be left."""
 
+    def close(self) -> None:
+        """Close what is open."""
+
 
 class LiveRun:
     """A run that is under way, or was when it was opened: what was published last can still be read.
@@ -61,20 +104,23 @@ class LiveRun:
         RecordingError: the run has ended before, or was started by another version.
     """
 
+    generation = 0
+    player = None
+
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         try:
-            self.facts: dict[str, Any] = json.loads((folder / FACTS).read_bytes())
-            self._rows = recorded_row(len(self.facts["channels"]))
-            self._bin = bin_dtype(len(self.facts["channels"]))
+            self.facts = facts_from((folder / FACTS).read_bytes())
+            self._rows = recorded_row(len(self.facts.channels))
+            self._bin = bin_dtype(len(self.facts.channels))
             self._frames, self._traces = _mapped(folder / FRAME_FILE), _mapped(folder / TRACES)
             self._file = (folder / LINES).open("rb")
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError) as error:
             raise RecordingError(f"{folder}: is no run under way ({error})") from error
         if len(self._traces) != HEAD + BINS * self._bin.itemsize:
             self.close()
             raise RecordingError(f"{folder}: was published by another version of this program")
-        self._lines: list[dict[str, Any]] = []
+        self._lines: list[Line] = []
         self._rest = b""
 
     @property
@@ -106,7 +152,7 @@ class LiveRun:
         first = max(first, self._n_bins() - BINS + 1, 0)  # what was overwritten while it was read is left out
         return first, ring[np.arange(first, max(count, first)) % BINS]
 
-    def lines(self, first: int) -> list[dict[str, Any]]:
+    def lines(self, first: int) -> list[Line]:
         """Return what was told so far, from number ``first`` on."""
         *whole, self._rest = (self._rest + self._file.read()).split(b"\n")
         for text in whole:
@@ -147,7 +193,7 @@ def run_into(recording: Path | None = None) -> LiveRun | None:
     for folder in runs():
         with suppress(RecordingError):
             run = LiveRun(folder)
-            if recording is None or Path(run.facts["recording"]).resolve() == recording.resolve():
+            if recording is None or Path(run.facts.recording).resolve() == recording.resolve():
                 return run
             run.close()
     return None
@@ -160,6 +206,6 @@ def left_behind(recording: Path | None = None) -> list[Path]:
         if folder.name.startswith(".") or lives(folder):
             continue
         with suppress(RecordingError), LiveRun(folder) as run:
-            if recording is None or Path(run.facts["recording"]).resolve() == recording.resolve():
+            if recording is None or Path(run.facts.recording).resolve() == recording.resolve():
                 found.append(folder)
     return found

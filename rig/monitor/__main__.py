@@ -10,7 +10,6 @@ import sys
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
 
 from rig.monitor.priority import lower_priority
 
@@ -30,13 +29,10 @@ def _main(process: int) -> None:
         os.read(0, 1)
         gone.set()
 
-    def of_that_process(facts: Mapping[str, Any]) -> bool:
-        return bool(facts["process"] == process)
-
     threading.Thread(target=wait, name="the run's process", daemon=True).start()
     try:
         stopping = Stopping(expecting=lambda: not gone.is_set())
-        look = Latest(of_that_process, on_found=stopping.begun)
+        look = Latest(lambda facts: facts.process == process, on_found=stopping.begun)
         server = PageServer(look, alone=gone.is_set, stopping=stopping)
     except (RigError, OSError) as error:
         _tell({"error": str(error)})

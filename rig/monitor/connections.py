@@ -2,12 +2,13 @@
 
 import asyncio
 from collections.abc import Callable
-from typing import Any
 
 import h11
 from starlette.datastructures import Headers
+from uvicorn import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from uvicorn.server import ServerState
 
 from rig.monitor.first_message import with_token
 from rig.monitor.security import Keys
@@ -39,8 +40,10 @@ class _Deadline:
 class WebConnection(H11Protocol):
     """A connection for HTTP. Without a key there is one answer on it."""
 
-    def __init__(self, visit: Visit, keys: Keys, **how: Any) -> None:
-        super().__init__(**how)
+    def __init__(
+        self, visit: Visit, keys: Keys, config: Config, state: ServerState, app_state: dict[str, object]
+    ) -> None:
+        super().__init__(config, state, app_state)
         self._visit, self._keys = visit, keys
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]

@@ -36,5 +36,4 @@ class DoorServer(uvicorn.Server):
         await super().shutdown(sockets)
 
     def _connection(self, visit: Visit) -> WebConnection:
-        how = {"config": self.config, "server_state": self.server_state, "app_state": self.lifespan.state}
-        return WebConnection(visit, self._keys, **how)
+        return WebConnection(visit, self._keys, self.config, self.server_state, self.lifespan.state)

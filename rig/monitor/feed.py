@@ -4,8 +4,8 @@ Nobody is waited for. A client that does not read is sent the newest state when 
 has missed; until then no message is made for it.
 
 A message is JSON. ``is``: "whole" for what begins anew (a client that has just come, another run, a replay after a jump), else
-"next". Both have ``frame`` (`rig.monitor.shown.shown_frame`, None without a run), ``lines`` and ``bins``
-(`rig.monitor.shown.shown_bins` with ``first``, the number of the first of them): all in "whole", in "next" what is new; and
+"next". Both have ``frame`` (`rig.monitor.shown.shown_json`, None without a run), ``lines`` and ``bins``
+(`rig.monitor.shown.bins_json`): all in "whole", in "next" what is new; and
 ``connected`` (whether the run's process lives), ``replay`` (None, or time_s, duration_s, playing, speed). "whole" also has
 ``facts`` (None without a run) and ``earlier`` (None, or facts and lines of a run to compare with).
 """
@@ -14,20 +14,22 @@ import asyncio
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from rig.live.facts import Line, RunFacts
 from rig.live.layout import bin_dtype
 from rig.live.reader import View
-from rig.monitor.shown import as_json, shown_bins, shown_frame, shown_line
+from rig.monitor.shown import Shown, as_json, bins_json, shown_frame, shown_json, shown_line
 from vibrolock.printable import error_text
 
 TICK_S = 1.0 / 15.0
+"""Time between two looks at a run that is watched, s; chosen: motion looks smooth from some ten pictures a second on."""
 STILL_S = 0.25
 """Longest time between two messages where nothing changes: they show that the server lives."""
 UNWATCHED_S, WAITING_S = 1.0, 0.2
@@ -53,8 +55,8 @@ class Moment:
     view: View | None
     lines: list[str]
     """JSON of all lines of the view; it may have grown since, `place` says how many there were."""
-    facts: Mapping[str, Any] | None
-    shown: Mapping[str, Any] | None
+    facts: RunFacts | None
+    shown: Shown | None
     connected: bool
     ended: bool
     """Whether the run has told how it ended, after which its output is at 0 V."""
@@ -65,22 +67,30 @@ class Moment:
     texts: "dict[Place, Future[str]]" = field(default_factory=dict)
 
 
+class Earlier(NamedTuple):
+    """Facts and points of a recording, drawn under those of the run that is shown."""
+
+    facts: RunFacts
+    lines: list[Line]
+
+
 class Feed:
     """Reads what ``look`` chooses, and makes messages of it. All reading is done in one thread, beside the event loop."""
 
-    def __init__(self, look: Look, earlier: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, look: Look, earlier: Earlier | None = None) -> None:
         self.view: View | None = None
         self.clients = 0
         self.last_seen_s = time.monotonic()
         """When a client last asked for anything, or was connected."""
-        self._look, self._earlier = look, _text(earlier)
+        self._look = look
+        self._earlier = _text(earlier and {"facts": earlier.facts.to_json(), "lines": earlier.lines})
         self._thread = ThreadPoolExecutor(1, "view")
         self._number, self._generation = 0, 0
         self._lines: list[str] = []
-        self._raw: list[dict[str, Any]] = []
+        self._raw: list[Line] = []
         self._bins = 0
-        self._key: Any = None
-        self._shown: Mapping[str, Any] = {}
+        self._key: object = None
+        self._shown = Shown("")
         self._shown_text = "null"
         self._told_s = -math.inf
         self._moment: Moment | None = None
@@ -142,16 +152,16 @@ class Feed:
         view = self.view
         try:
             view = self._look(view)
-            generation = getattr(view, "generation", 0)  # a replay that jumps begins anew
+            generation = 0 if view is None else view.generation  # a replay that jumps begins anew
             if view is not self.view or generation != self._generation:
                 self.view, self._generation = view, generation
                 self._number += 1
                 self._lines, self._raw, self._bins, self._key = [], [], 0, None
             return self._read_view(view)
         except Exception as error:  # of a damaged file, or of a run of which nothing is left
-            shown = {"state": "unreadable", "cause": error_text(error)}
+            shown = Shown("unreadable", error_text(error))
             facts = None if view is None else view.facts
-            return self._moment_of(facts, shown, _text(shown), connected=False, changed=False)
+            return self._moment_of(facts, shown, _text(shown_json(shown)), connected=False, changed=False)
 
     def _read_view(self, view: View | None) -> Moment:
         if view is None:
@@ -166,23 +176,26 @@ class Feed:
         changed = key != self._key
         if changed:
             self._key, self._shown = key, shown_frame(frame, view.facts, self._raw)
-            self._shown_text = _text({name: value for name, value in self._shown.items() if name != "age_s"})
+            content = shown_json(self._shown)
+            content.pop("age_s", None)
+            self._shown_text = _text(content)
         shown, text = self._shown, self._shown_text
-        if frame is not None:
-            shown = {**shown, "age_s": frame.age_s}
+        if frame is not None and shown.details is not None:
+            shown = replace(shown, details=replace(shown.details, age_s=frame.age_s))
             text = f'{text[:-1]},"age_s":{frame.age_s:.3f}}}'
         first, bins = view.bins(self._bins)
         self._bins = first + len(bins)
         moment = self._moment_of(view.facts, shown, text, connected=connected, changed=changed or len(bins) > 0)
         made: Future[str] = Future()
-        made.set_result(_next(moment, before, _bins_text(first, bins, view.facts)))
+        made.set_result(_next(moment, before, _text(bins_json(first, bins, view.facts))))
         moment.texts[before] = made  # nearly all clients are there
         return moment
 
     def _moment_of(
-        self, facts: Any, shown: Mapping[str, Any] | None, text: str, *, connected: bool, changed: bool
+        self, facts: RunFacts | None, shown: Shown | None, text: str, *, connected: bool, changed: bool
     ) -> Moment:
-        replay = getattr(self.view, "replay_state", lambda: None)()
+        player = None if self.view is None else self.view.player
+        replay = None if player is None else player.replay_state()
         return Moment(
             place=Place(self._number, len(self._lines), self._bins),
             view=self.view,
@@ -199,14 +212,14 @@ class Feed:
         """Return the message that brings a client from ``since`` to a moment."""
         bins = "null"
         if moment.view is not None and moment.facts is not None:
-            first, found = since.bins, np.zeros(0, bin_dtype(len(moment.facts["channels"])))
+            first, found = since.bins, np.zeros(0, bin_dtype(len(moment.facts.channels)))
             if moment.view is self.view:  # which may have been closed otherwise
                 first, found = moment.view.bins(since.bins)
-            bins = _bins_text(first, found[: max(moment.place.bins - first, 0)], moment.facts)
+            bins = _text(bins_json(first, found[: max(moment.place.bins - first, 0)], moment.facts))
         if since.view >= 0:
             return _next(moment, since, bins)
         lines = ",".join(moment.lines[: moment.place.lines])
-        whole = f'"facts":{_text(moment.facts)},"earlier":{self._earlier}'
+        whole = f'"facts":{_text(moment.facts and moment.facts.to_json())},"earlier":{self._earlier}'
         return f'{{"is":"whole",{whole},"lines":[{lines}],"bins":{bins},{moment.state}}}'
 
 
@@ -215,9 +228,5 @@ def _next(moment: Moment, since: Place, bins: str) -> str:
     return f'{{"is":"next","lines":[{lines}],"bins":{bins},{moment.state}}}'
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return json.dumps(as_json(value), separators=(",", ":"))
-
-
-def _bins_text(first: int, bins: Any, facts: Mapping[str, Any]) -> str:
-    return _text({"first": first, **shown_bins(bins, facts)})

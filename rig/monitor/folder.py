@@ -8,10 +8,11 @@ import json
 import sys
 from collections import OrderedDict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from rig.recording.journal import journal_path
 from rig.system.child import ChildFailed, child_environment
+from rig.text.json_values import JsonValue
 
 MOST_FILES = 500
 """So many files are listed, the youngest."""
@@ -39,7 +40,7 @@ class Folder:
         self._kept: OrderedDict[tuple[str, _Version], bytes] = OrderedDict()
         self._one_at_a_time = asyncio.Lock()
 
-    async def entries(self) -> list[dict[str, Any]]:
+    async def entries(self) -> list[dict[str, JsonValue]]:
         """Return the files, the youngest first: number, name, kind, when modified (s since 1970), bytes, what it is."""
         found = await asyncio.to_thread(self._found)
         async with self._one_at_a_time:

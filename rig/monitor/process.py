@@ -8,11 +8,10 @@ import socket
 import ssl
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import uvicorn
 
@@ -22,13 +21,13 @@ from rig.monitor.certificate import from_files, self_signed
 from rig.monitor.connections import FeedConnection, WebConnection
 from rig.monitor.door import BACKLOG
 from rig.monitor.door_server import DoorServer
-from rig.monitor.feed import Feed, Look
+from rig.monitor.feed import Earlier, Feed, Look
 from rig.monitor.first_message import LARGEST_HEADERS
 from rig.monitor.opening import open_in_browser
 from rig.monitor.priority import lower_priority
 from rig.monitor.security import Keys
 from rig.monitor.server import Site, application
-from rig.monitor.sources import always, of_an_earlier_run
+from rig.monitor.sources import always, earlier_run
 from rig.monitor.stopping import Stopping
 from rig.system.stop_signals import ended_in_order
 
@@ -118,7 +117,7 @@ class PageServer:
 
     look: Look
     address: Address = field(default_factory=Address)
-    earlier: Mapping[str, Any] | None = None
+    earlier: Earlier | None = None
     folder: Path | None = None
     alone: Callable[[], bool] = lambda: False
     """Whether whoever started the server has gone, so that it ends by itself: at once where there never was a run, else some
@@ -219,7 +218,7 @@ def serve(show: View | Look, serving: Serving | None = None, *, folder: Path | N
     lower_priority()
     serving = serving or Serving()
     look = show if callable(show) else always(show)
-    earlier = None if serving.over is None else of_an_earlier_run(serving.over)
+    earlier = None if serving.over is None else earlier_run(serving.over)
     server = PageServer(look, serving.address, earlier, folder)
     with suppress(KeyboardInterrupt), ended_in_order(), _way_in(server, serving.open_browser):
         server.run()

@@ -2,9 +2,8 @@
 
 import math
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -156,14 +155,10 @@ class RecordedPart:
     def _fits(self, table: np.ndarray) -> bool:
         """Return whether the rows of the first points lie in segments of these points, or of those measured with them."""
         known = [point for point in self.part.points if "end_sample" in point][:5]
-        return all(self._lies_in(table, point) for point in known)
+        return all(self._lies_in(table, int(point["end_sample"]), int(point["number"])) for point in known)
 
-    def _lies_in(self, table: np.ndarray, point: Mapping[str, Any]) -> bool:
-        last = int(point["end_sample"]) - 1
-        at = int(self.part.rows("segment", last, last + 1)[0])
-        if not 0 <= at < table.size:
-            return False
-        number = int(point["number"])
-        if number not in self._of.numbers:
+    def _lies_in(self, table: np.ndarray, end_sample: int, number: int) -> bool:
+        at = int(self.part.rows("segment", end_sample - 1, end_sample)[0])
+        if not 0 <= at < table.size or number not in self._of.numbers:
             return False
         return int(table[at]["point"]) in self._of.plan.together(self._of.numbers.index(number))

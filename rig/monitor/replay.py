@@ -4,8 +4,10 @@ import math
 import threading
 import time
 from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -14,17 +16,20 @@ from rig.bench.configuration import validated
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.watched import watched_facts
 from rig.errors import RecordingError
+from rig.live.facts import Line
 from rig.live.layout import BINS, FRAME, bin_dtype, window_rows
-from rig.live.reader import Frame
+from rig.live.reader import Frame, ReplayState
 from rig.monitor.recorded_part import PlanOfPart, RecordedPart
 from rig.monitor.shown import fundamentals_of
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode
 
 FASTEST = 1000.0
+"""Largest speed of a replay, times the clock; chosen."""
 STRETCH = 100
 """Bins that are made at once and kept: ten seconds."""
 MEAN_S = 0.1
+"""Time over which the phase error is averaged, s; chosen: about as long as the rows between two frames of a run."""
 
 
 class Replay:
@@ -61,9 +66,10 @@ class Replay:
         bench = validated(Bench, recording.configuration["bench"], f"{path.name}: bench")
         plan = plan_from(recording.configuration["plan"], f"{path.name}: plan")
         about = recording.parts[0].information.get("about") or {} if recording.parts else {}
-        self.facts: dict[str, Any] = watched_facts(plan, bench, path, about, started=recording.started)
-        self.facts |= {"version": recording.software_version, "process": 0}
+        facts = watched_facts(plan, bench, path, about, recording.started)
+        self.facts = replace(facts, version=recording.software_version, process=0)
         self._rate = bench.sample_rate_hz
+        self._bin_dtype = bin_dtype(len(bench.channels))
         self._parts = [
             RecordedPart(part, number + 1, bench, _plan_of(recording, number))
             for number, part in enumerate(recording.parts)
@@ -95,14 +101,14 @@ class Replay:
         """Whether the recording is open."""
         return self._connected
 
-    def replay_state(self) -> dict[str, Any]:
-        """Return where the replay stands: ``time_s``, ``duration_s``, ``playing``, ``speed``."""
-        return {
-            "time_s": self.time_s,
-            "duration_s": self.duration_s,
-            "playing": self.playing,
-            "speed": self.speed,
-        }
+    @property
+    def player(self) -> Self:
+        """The replay is its own controls."""
+        return self
+
+    def replay_state(self) -> ReplayState:
+        """Return where the replay stands."""
+        return ReplayState(self.time_s, self.duration_s, self.playing, self.speed)
 
     def pause(self) -> None:
         """Let time stand."""
@@ -169,10 +175,10 @@ class Replay:
         """Return the bins up to the present time from number ``first`` on, of which the last `BINS` are kept."""
         part, samples = self._place()
         if part is None:
-            return 0, np.zeros(0, _bins_of(self.facts))
+            return 0, np.zeros(0, self._bin_dtype)
         count = int(self._first_bins[part.number - 1]) + min(part.n_bins, samples // part.bin_samples)
         first = max(first, count - BINS, 0)
-        out = [np.zeros(0, _bins_of(self.facts))]
+        out = [np.zeros(0, self._bin_dtype)]
         for one in self._parts:
             begin = int(self._first_bins[one.number - 1])
             lowest, end = max(first - begin, 0), min(count - begin, one.n_bins)
@@ -182,7 +188,7 @@ class Replay:
                 out.append(found[max(lowest - offset, 0) : end - offset])
         return first, np.concatenate(out)
 
-    def lines(self, first: int) -> list[dict[str, Any]]:
+    def lines(self, first: int) -> Sequence[Line]:
         """Return what was told up to the present time, from number ``first`` on."""
         return self._told[first : bisect_right(self._times, self._samples_over())]
 
@@ -220,10 +226,10 @@ class Replay:
             self._stretches[key] = part.bins(first, min(first + STRETCH, part.n_bins))
         return self._stretches[key]
 
-    def _lines_of(self, part: RecordedPart) -> list[tuple[int, dict[str, Any]]]:
+    def _lines_of(self, part: RecordedPart) -> list[tuple[int, Line]]:
         """Return what was told of a part, each with the number of samples of the recording after which it is told."""
         begin, told = int(self._begins[part.number - 1]), part.part
-        lines: list[tuple[int, dict[str, Any]]] = [(begin + 1, {**told.information, "is": "part"})]
+        lines: list[tuple[int, Line]] = [(begin + 1, {**told.information, "is": "part"})]
         events = [(begin + int(event.get("sample", 0)), {**event, "is": "event"}) for event in told.events]
         points = [
             (begin + sample, {**point, "is": "point"})
@@ -262,8 +268,8 @@ class Replay:
             state["force_n"] = abs(bands[self._force, 1])
             state["drive_m_s2"] = abs(bands[self._drive, 1])
             state["displacement_m"] = state["drive_m_s2"] / (2.0 * np.pi * last["frequency_hz"]) ** 2
-        told = {int(line["number"]) for line in self.lines(0) if line["is"] == "point"}
-        state["finished"], state["total"] = len(told), self.facts["points"]
+        told = {line["number"] for line in self.lines(0) if line["is"] == "point"}
+        state["finished"], state["total"] = len(told), self.facts.points
         state["left_s"] = self.duration_s - self.time_s
         if end is not None and samples >= part.n_samples:
             state["overruns"] = (end.get("loop") or {}).get("overruns", 0)
@@ -284,7 +290,3 @@ def _plan_of(recording: Recording, number: int) -> PlanOfPart:
     resumed = frozenset(place for place, one in enumerate(numbers) if one in accepted)
     again = frozenset(place for place, one in enumerate(numbers) if one not in here)
     return PlanOfPart(plan, numbers, tuple(dict.fromkeys((resumed, again))))
-
-
-def _bins_of(facts: dict[str, Any]) -> np.dtype[Any]:
-    return bin_dtype(len(facts["channels"]))

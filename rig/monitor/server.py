@@ -5,12 +5,12 @@ Paths of requests are looked up in tables; none is ever a path in the file syste
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
@@ -89,10 +89,10 @@ def application(site: Site) -> ASGIApp:
         Route("/folder/{n:int}/figure.png", pages.figure),
         Route("/folder/{n:int}/table.txt", pages.table),
     ]
-    handlers: Mapping[Any, Any] = {HTTPException: pages.refused, Exception: pages.refused}
-    return Guard(
-        Starlette(routes=routes, lifespan=reading, exception_handlers=handlers), site.scheme, site.hosts, _refusal
-    )
+    app = Starlette(routes=routes, lifespan=reading)
+    app.add_exception_handler(HTTPException, pages.refused)
+    app.add_exception_handler(Exception, pages.refused)
+    return Guard(app, site.scheme, site.hosts, _refusal)
 
 
 class _Pages:
@@ -116,12 +116,11 @@ class _Pages:
         if token is not None:  # of a browser that is in already
             return plain_page("Opening the page", onward="/", after_s=0)
         moment = await self._feed.fresh()
-        facts = moment.facts or {}
-        title = " · ".join(part for part in (facts.get("bench"), facts.get("kind")) if part) or "vibrolock"
+        title = f"{moment.facts.bench} · {moment.facts.kind}" if moment.facts else "vibrolock"
         text = self._index.safe_substitute(
             action_token=self._keys.action,
             title=escape(title),
-            replay="yes" if hasattr(moment.view, "replay_state") else "no",
+            replay="yes" if moment.view is not None and moment.view.player is not None else "no",
             folder="no" if self._site.folder is None else "yes",
         )
         return Response(text, media_type="text/html; charset=utf-8")
@@ -203,12 +202,12 @@ class _Pages:
 
     async def replay(self, request: Request) -> Response:
         """Pause, play, seek, or set the speed of a replay."""
-        control = getattr(self._feed.view, "control", None)
+        player = None if self._feed.view is None else self._feed.view.player
         form = await self._form(request)
-        if control is None:
+        if player is None:
             raise HTTPException(404)
         try:
-            control(form.get("action", ""), float(form.get("value", "0")))
+            player.control(form.get("action", ""), float(form.get("value", "0")))
         except ValueError as error:
             raise HTTPException(400) from error
         return JSONResponse({"replay": "ok"})

@@ -1,21 +1,29 @@
-"""What is to be seen of a run, in words, numbers and curves: plain data, from which page and terminal view are drawn."""
+"""View model of a run for page and terminal: its state, numbers, limits and curves, and their form as JSON."""
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, is_dataclass
 
 import numpy as np
 
 from controller import LockState
+from rig.live.facts import ChannelFacts, Line, RunFacts, number_in, text_in
 from rig.live.reader import Frame
+from rig.text.json_values import JsonValue
 from rig.tick.safety.layout import TEXT, EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind
+from vibrolock.arrays import Complex, Float
 
 SCOPE_PERIODS = 3
+"""Periods of the waveform that are shown and analysed; chosen: few enough to see the waveform's shape."""
 SCOPE_POINTS = 400
+"""Most points of a shown waveform; chosen: about the width of its plot in pixels."""
 HARMONICS = 10
-BULKY = {"harmonics", "harmonics_std", "rounding_std"}  # numbers for every channel and harmonic
+"""Harmonics whose amplitudes are shown; chosen."""
+BULKY = {"harmonics", "harmonics_std", "rounding_std"}
+"""Keys of a point with a number for every channel and harmonic, which are not shown."""
 RECORDS = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
+"""Kinds of segments that are evaluated."""
 GUARDS = {
     GuardMode.DISARMED: "not armed",
     GuardMode.ARMED: "armed",
@@ -23,6 +31,111 @@ GUARDS = {
     GuardMode.OFF: "output at 0 V",
 }
 UNKNOWN = "output unknown"
+
+
+@dataclass(frozen=True)
+class Share:
+    """How much of a limit or range the last rows used."""
+
+    name: str
+    """Name of the channel, or ``output``."""
+    unit: str
+    what: str
+    """What is compared: ``limit``, ``range`` or ``displacement``."""
+    value: float
+    of: float
+    """Limit or range, in the same unit."""
+
+    @property
+    def share(self) -> float:
+        """Value over limit or range."""
+        return self.value / self.of
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Waveform of the output or of a channel."""
+
+    name: str
+    unit: str
+    values: Float
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Waveforms of the last periods over one time axis."""
+
+    t_ms: Float
+    curves: list[Curve]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Amplitudes of a channel from the first harmonic on."""
+
+    name: str
+    unit: str
+    amplitudes: Float
+    purity: float
+    """Amplitude of the fundamental over the root sum of squares of all; NaN where nothing vibrates."""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Numbers of a run at its last frame; angles in deg, displacements in mm, times as their names say."""
+
+    guard: str
+    """State of the output, in words (`GUARDS`, or `UNKNOWN`)."""
+    output_off: bool
+    """Whether the output is known to be at 0 V."""
+    lock: str
+    part: int
+    time_s: float
+    """Time of the part."""
+    point: int
+    """Number of the present point, from 1; 0 if there is none."""
+    finished: int
+    points: int
+    """Number of points of the plan, of which ``finished`` are over."""
+    level: float
+    target: float
+    """Present level and final one of the segment, in the plan's unit."""
+    frequency_hz: float
+    phase_error_deg: float
+    voltage_v: float
+    force_n: float
+    acceleration_m_s2: float
+    displacement_mm: float
+    settled: tuple[int, int] | None
+    """Periods within the tolerance, and periods wanted; None if that was not recorded."""
+    left_s: float
+    """Estimate of the time left."""
+    late_us: tuple[float, ...]
+    """Response time of the loop: p50, p99, p99.9 and largest; NaN without a clock."""
+    overruns: int
+    lost: int
+    shares: list[Share]
+    scope: Scope
+    harmonics: list[Spectrum]
+    age_s: float
+    """Time since the frame was written."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """State of a run and, once something is driven, its numbers."""
+
+    state: str
+    """State in a word or two (`state_of`)."""
+    cause: str = ""
+    """Why the output comes or came down; empty while it is driven."""
+    details: Details | None = None
+    """Numbers of the last frame; None before the first."""
+
+    @property
+    def output_off(self) -> bool:
+        """Whether the output is known to be at 0 V."""
+        return self.details is not None and self.details.output_off
 
 
 def state_of(frame: Frame | None) -> str:
@@ -53,129 +166,140 @@ def state_of(frame: Frame | None) -> str:
     return {LockState.LOCKED: "locked", LockState.LOST: "lock lost"}.get(lock, "searching")
 
 
-def cause_of(frame: Frame, facts: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> str:
+def cause_of(frame: Frame, facts: RunFacts, lines: Sequence[Line]) -> str:
     """Return why the output comes or came down; empty while it is driven. The run's own words once it has said them."""
     end = _end_of(lines)
     if end is not None:
-        return str(end.get("text", ""))
+        return text_in(end, "text")
     reason, channel = EndReason(int(frame.state["reason"])), int(frame.state["channel"])
     if reason is EndReason.NONE:
         return ""
     where = ""
-    if 0 <= channel < len(facts["channels"]):
-        unit = facts["channels"][channel]["unit"]
+    if 0 <= channel < len(facts.channels):
+        unit = facts.channels[channel].unit
         if reason in (EndReason.DISPLACEMENT_LIMIT, EndReason.OVERTRAVEL):
             unit = "m"
-        where = f" on channel {facts['channels'][channel]['name']}: {float(frame.state['value']):.4g} {unit}"
+        where = f" on channel {facts.channels[channel].name}: {float(frame.state['value']):.4g} {unit}"
     return TEXT[reason] + where
 
 
-def _end_of(lines: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return what was told of the end of the present part, if it has ended."""
+def _end_of(lines: Sequence[Line]) -> Line | None:
+    """Return the line on the end of the present part, if it has ended."""
     for line in reversed(lines):
         if line["is"] in ("part", "end"):
             return line if line["is"] == "end" else None
     return None
 
 
-def _state_at_the_end(end: Mapping[str, Any]) -> str:
-    return "tripped" if end.get("tripped") else "stopped"
+def shown_frame(frame: Frame | None, facts: RunFacts, lines: Sequence[Line]) -> Shown:
+    """Return the present state.
 
-
-def shown_frame(frame: Frame | None, facts: Mapping[str, Any], lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the present state as plain data; angles in deg, displacements in mm, times as their names say.
-
-    ``shares``: for every channel how much of its range and of its limit the last rows used, and the same of output voltage and
-    displacement, each 0 to 1 or above. ``scope``: the last periods of output, force and drive. ``harmonics``: their amplitudes
-    from the first on, and the part of the fundamental. A part that has ended without a last frame, because its driver failed,
-    has tripped or stopped, and its output is unknown. Without a frame there is the state alone, with the cause of a run that
-    ended before anything was driven.
+    A part that has ended without a last frame, because its driver failed, has tripped or stopped, and its output is unknown.
+    Without a frame there is the state alone, with the cause of a run that ended before anything was driven.
     """
+    end = _end_of(lines)
+    state_at_end = "tripped" if end is not None and end.get("tripped") else "stopped"
     if frame is None:
-        end = _end_of(lines)
-        refused = end is not None and all(line["is"] != "part" for line in lines)  # it ended before it began
-        return {"state": _state_at_the_end(end), "cause": end["text"]} if end and refused else {"state": state_of(None)}
+        if end is None or any(line["is"] == "part" for line in lines):
+            return Shown(state_of(None))
+        return Shown(state_at_end, text_in(end, "text"))
+    guard = GuardMode(int(frame.state["guard"]))
+    output_off = guard in (GuardMode.OFF, GuardMode.DISARMED)
+    if end is not None and not output_off:
+        return Shown(state_at_end, cause_of(frame, facts, lines), _details(frame, facts, UNKNOWN, output_off))
+    return Shown(state_of(frame), cause_of(frame, facts, lines), _details(frame, facts, GUARDS[guard], output_off))
+
+
+def _details(frame: Frame, facts: RunFacts, guard: str, output_off: bool) -> Details:
     state, window = frame.state, frame.window
-    guard, end = GuardMode(int(state["guard"])), _end_of(lines)
-    off = guard in (GuardMode.OFF, GuardMode.DISARMED)
-    omega = 2.0 * math.pi * float(state["frequency_hz"])
-    bands = fundamentals_of(window, facts)
-    return {
-        "state": _state_at_the_end(end) if end is not None and not off else state_of(frame),
-        "cause": cause_of(frame, facts, lines),
-        "guard": UNKNOWN if end is not None and not off else GUARDS[guard],
-        "output_off": off,
-        "lock": LockState(int(state["lock"])).name.lower(),
-        "age_s": frame.age_s,
-        "part": int(state["part"]),
-        "time_s": int(state["sample"]) / facts["sample_rate_hz"],
-        "point": int(state["point"]) + 1,
-        "finished": int(state["finished"]),
-        "points": int(state["total"]),
-        "level": float(state["level"]),
-        "target": float(state["target"]),
-        "frequency_hz": float(state["frequency_hz"]),
-        "phase_error_deg": math.degrees(float(state["phase_error_rad"])),
-        "voltage_v": float(state["voltage_v"]),
-        "force_n": float(state["force_n"]),
-        "acceleration_m_s2": float(state["drive_m_s2"]),
-        "displacement_mm": 1e3 * float(state["displacement_m"]),
-        "settled": _settled(state),
-        "left_s": float(state["left_s"]),
-        "late_us": [float(value) for value in state["late_us"]],
-        "overruns": int(state["overruns"]),
-        "lost": int(state["lost"]),
-        "shares": _shares(state, window, facts, bands[:, 1] if bands.size else None, omega),
-        "scope": _scope(window, facts),
-        "harmonics": _harmonics(bands, facts),
-    }
-
-
-def _settled(state: np.void) -> list[int] | None:
-    """Return how many periods of how many were within the tolerance; None where that was not recorded."""
+    fundamentals = fundamentals_of(window, facts)
     good = int(state["good_periods"])
-    return None if good < 0 else [good, int(state["settled_periods"])]
+    return Details(
+        guard=guard,
+        output_off=output_off,
+        lock=LockState(int(state["lock"])).name.lower(),
+        part=int(state["part"]),
+        time_s=int(state["sample"]) / facts.sample_rate_hz,
+        point=int(state["point"]) + 1,
+        finished=int(state["finished"]),
+        points=int(state["total"]),
+        level=float(state["level"]),
+        target=float(state["target"]),
+        frequency_hz=float(state["frequency_hz"]),
+        phase_error_deg=math.degrees(float(state["phase_error_rad"])),
+        voltage_v=float(state["voltage_v"]),
+        force_n=float(state["force_n"]),
+        acceleration_m_s2=float(state["drive_m_s2"]),
+        displacement_mm=1e3 * float(state["displacement_m"]),
+        settled=None if good < 0 else (good, int(state["settled_periods"])),
+        left_s=float(state["left_s"]),
+        late_us=tuple(float(value) for value in state["late_us"]),
+        overruns=int(state["overruns"]),
+        lost=int(state["lost"]),
+        shares=_shares(state, window, facts, fundamentals),
+        scope=_scope(window, facts),
+        harmonics=_spectra(fundamentals, facts),
+        age_s=frame.age_s,
+    )
 
 
-def shown_bins(bins: np.ndarray, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Return bins of the traces as plain data: their ends in s, part, lock, and [least, greatest] lists of each quantity."""
-    out: dict[str, Any] = {name: bins[name] for name in ("end_s", "part", "lock", "guard")}
-    for name, factor in (("frequency_hz", 1.0), ("voltage_v", 1.0), ("level", 1.0)):
-        out[name] = [factor * bins[name][:, 0], factor * bins[name][:, 1]]
+def shown_json(shown: Shown) -> dict[str, JsonValue]:
+    """Return a state as the page takes it: one object without nesting; numbers are left out before the first frame."""
+    cause = {"cause": shown.cause} if shown.cause or shown.details else {}
+    numbers = {} if shown.details is None else vars(shown.details)
+    return {"state": shown.state, **cause, **{name: as_json(value) for name, value in numbers.items()}}
+
+
+def bins_json(first: int, bins: np.ndarray, facts: RunFacts) -> JsonValue:
+    """Return bins of the traces as the page takes them.
+
+    ``first`` is the number of the first of them. Each has its end in s, part, lock, and [least, greatest] of each quantity.
+    """
+    out: dict[str, object] = {"first": first} | {name: bins[name] for name in ("end_s", "part", "lock", "guard")}
+    for name in ("frequency_hz", "voltage_v", "level"):
+        out[name] = [bins[name][:, 0], bins[name][:, 1]]
     out["phase_error_deg"] = [np.degrees(bins["phase_error_rad"][:, end]) for end in (0, 1)]
     for role in ("force", "drive"):
-        at = _index(facts, role)
-        out[role] = [bins["inputs"][:, at, 0], bins["inputs"][:, at, 1]]
-    return out
+        inputs = bins["inputs"][:, facts.index(role)]
+        out[role] = [inputs[:, 0], inputs[:, 1]]
+    return as_json(out)
 
 
-def shown_line(line: Mapping[str, Any], facts: Mapping[str, Any]) -> dict[str, Any]:
+def shown_line(line: Line, facts: RunFacts) -> dict[str, object]:
     """Return a line without what is too much to be shown; a point instead with standard errors of its fundamentals.
 
     ``force_std_n`` and ``amplitude_std_m`` are those of the force's and of the drive point's displacement amplitude.
     """
     shown = {key: value for key, value in line.items() if key not in BULKY}
-    errors, frequency = line.get("harmonics_std"), line.get("frequency_hz")
-    if errors and frequency:
-        shown["force_std_n"] = errors[_index(facts, "force")][1]
-        shown["amplitude_std_m"] = errors[_index(facts, "drive")][1] / (2.0 * math.pi * frequency) ** 2
+    errors, frequency_hz = line.get("harmonics_std"), number_in(line, "frequency_hz", 0.0)
+    if errors and frequency_hz:
+        fundamental = np.asarray(errors, float)[:, 1]
+        shown["force_std_n"] = float(fundamental[facts.index("force")])
+        omega = 2.0 * math.pi * frequency_hz
+        shown["amplitude_std_m"] = float(fundamental[facts.index("drive")]) / omega**2
     return shown
 
 
-def as_json(value: Any, digits: int = 6) -> Any:
+def as_json(value: object, digits: int = 6) -> JsonValue:
     """Return a value as JSON can hold it: lists for arrays, None for what is not finite, numbers of so many digits."""
     if isinstance(value, np.ndarray):
         return _list(value, digits)
+    if isinstance(value, Share):
+        return as_json({**vars(value), "share": value.share}, digits)
+    if is_dataclass(value):
+        value = vars(value)
     if isinstance(value, Mapping):
-        return {key: as_json(one, digits) for key, one in value.items()}
+        return {str(key): as_json(one, digits) for key, one in value.items()}
     if isinstance(value, list | tuple):
         return [as_json(one, digits) for one in value]
     if isinstance(value, float):
         return float(f"{value:.{digits}g}") if math.isfinite(value) else None
-    return value
+    if value is None or isinstance(value, str | int):
+        return value
+    raise TypeError(f"{type(value).__name__} is not a JSON value")
 
 
-def _list(values: np.ndarray, digits: int) -> list[Any]:
+def _list(values: np.ndarray, digits: int) -> list[JsonValue]:
     """Return an array as a list, rounded to so many digits of its largest value; None for what is not finite."""
     if values.dtype.kind != "f":
         return list(values.tolist())
@@ -184,10 +308,6 @@ def _list(values: np.ndarray, digits: int) -> list[Any]:
     decimals = digits - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
     rounded = np.round(values.astype(float), decimals).tolist()
     return list(rounded if known.all() else [one if math.isfinite(one) else None for one in rounded])
-
-
-def _index(facts: Mapping[str, Any], role: str) -> int:
-    return [channel["role"] for channel in facts["channels"]].index(role)
 
 
 def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
@@ -199,7 +319,7 @@ def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
     return window[begins[max(begins.size - 1 - periods, 0)] : begins[-1]]
 
 
-def fundamentals_of(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
+def fundamentals_of(window: np.ndarray, facts: RunFacts) -> Complex:
     """Return mean and harmonics of every channel over the last periods: complex[n_channels, H + 1], or [0, H + 1] for none.
 
     By least squares on the recorded phase of the oscillator.
@@ -216,51 +336,43 @@ def fundamentals_of(window: np.ndarray, facts: Mapping[str, Any]) -> np.ndarray:
     return np.asarray(np.hstack([found[:, :1].astype(complex), cos - 1j * sin]))
 
 
-def _shares(
-    state: np.void, window: np.ndarray, facts: Mapping[str, Any], fundamentals: np.ndarray | None, omega: float
-) -> list[dict[str, Any]]:
-    """Return what the last rows used of every limit and range: name, unit, value, what it may be, and their ratio."""
+def _shares(state: np.void, window: np.ndarray, facts: RunFacts, fundamentals: Complex) -> list[Share]:
+    """Return how much of every limit and range the last rows used."""
     rows = _last_periods(window, SCOPE_PERIODS)
     inputs = np.abs((rows if rows.size else window)["inputs"]).astype(float)
-    largest = np.fmax.reduce(inputs, axis=0) if inputs.size else np.full(len(facts["channels"]), math.nan)
-    limits = facts["limits"]
-    out = [_share("output", "V", "limit", float(state["voltage_v"]), limits["voltage_v"])]
-    for index, channel in enumerate(facts["channels"]):
+    largest = np.fmax.reduce(inputs, axis=0) if inputs.size else np.full(len(facts.channels), math.nan)
+    omega = 2.0 * math.pi * float(state["frequency_hz"])
+    out = [Share("output", "V", "limit", float(state["voltage_v"]), facts.limits.voltage_v)]
+    for index, channel in enumerate(facts.channels):
         value = float(largest[index])
-        out.append(_share(channel["name"], channel["unit"], "range", value, channel["range"]))
-        if channel["limit"] is not None:
-            out.append(_share(channel["name"], channel["unit"], "limit", value, channel["limit"]))
-        if channel["role"] in ("drive", "response") and fundamentals is not None and omega > 0.0:
-            travel_mm = 1e3 * abs(fundamentals[index]) / omega**2
-            out.append(_share(channel["name"], "mm", "displacement", travel_mm, 1e3 * limits["displacement_m"]))
+        out.append(Share(channel.name, channel.unit, "range", value, channel.range))
+        if channel.limit is not None:
+            out.append(Share(channel.name, channel.unit, "limit", value, channel.limit))
+        if channel.role in ("drive", "response") and fundamentals.size and omega > 0.0:
+            travel_mm = 1e3 * float(abs(fundamentals[index, 1])) / omega**2
+            out.append(Share(channel.name, "mm", "displacement", travel_mm, 1e3 * facts.limits.displacement_m))
     return out
 
 
-def _share(name: str, unit: str, what: str, value: float, of: float) -> dict[str, Any]:
-    return {"name": name, "unit": unit, "what": what, "value": value, "of": of, "share": value / of}
+def _force_and_drive(facts: RunFacts) -> list[tuple[int, ChannelFacts]]:
+    return [(at, facts.channels[at]) for at in (facts.index("force"), facts.index("drive"))]
 
 
-def _scope(window: np.ndarray, facts: Mapping[str, Any]) -> dict[str, Any]:
+def _scope(window: np.ndarray, facts: RunFacts) -> Scope:
     rows = _last_periods(window, SCOPE_PERIODS)
     stride = max(1, -(-rows.size // SCOPE_POINTS))
     rows = rows[::stride]
-    step_ms = 1e3 * stride / facts["sample_rate_hz"]
-    curves = [{"name": "output", "unit": "V", "values": rows["output_v"]}]
-    for role in ("force", "drive"):
-        at = _index(facts, role)
-        channel = facts["channels"][at]
-        curves.append({"name": channel["name"], "unit": channel["unit"], "values": rows["inputs"][:, at]})
-    return {"t_ms": np.arange(rows.size) * step_ms, "curves": curves}
+    curves = [Curve("output", "V", rows["output_v"])]
+    curves += [Curve(channel.name, channel.unit, rows["inputs"][:, at]) for at, channel in _force_and_drive(facts)]
+    t_ms = np.arange(rows.size, dtype=float) * (1e3 * stride / facts.sample_rate_hz)
+    return Scope(t_ms, curves)
 
 
-def _harmonics(bands: np.ndarray, facts: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return amplitudes from the first harmonic on, and the fundamental's part of their root sum of squares."""
+def _spectra(fundamentals: Complex, facts: RunFacts) -> list[Spectrum]:
     out = []
-    for role in ("force", "drive"):
-        at = _index(facts, role)
-        channel = facts["channels"][at]
-        sizes = np.abs(bands[at, 1:]) if bands.size else np.zeros(0)
-        whole = float(np.linalg.norm(sizes)) if sizes.size else 0.0
-        purity = float(sizes[0]) / whole if whole > 0.0 else math.nan
-        out.append({"name": channel["name"], "unit": channel["unit"], "amplitudes": sizes, "purity": purity})
+    for at, channel in _force_and_drive(facts):
+        amplitudes = np.abs(fundamentals[at, 1:]) if fundamentals.size else np.zeros(0)
+        whole = float(np.linalg.norm(amplitudes))
+        purity = float(amplitudes[0]) / whole if whole > 0.0 else math.nan
+        out.append(Spectrum(channel.name, channel.unit, amplitudes, purity))
     return out

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rig.errors import RecordingError
+from rig.live.facts import text_in
 from rig.live.place import lives
 from rig.live.reader import LiveRun
 from rig.live.stopping import request_stop
@@ -47,7 +48,7 @@ class ShutdownMonitor:
         """The recording of the run and its process."""
         if self._run is None:
             return f"process {self._folder.name.partition('-')[0]}"
-        return f"{self._run.facts['recording']} (process {self._run.facts['process']})"
+        return f"{self._run.facts.recording} (process {self._run.facts.process})"
 
     def outcome(self) -> Outcome | None:
         """Return what has become of the run; None while that is not known."""
@@ -86,10 +87,10 @@ class ShutdownMonitor:
     def _end(self) -> str | None:
         """Return how the last part ended, if that was told."""
         lines = [] if self._run is None else self._run.lines(0)
-        return str(lines[-1].get("text", "")) if lines and lines[-1]["is"] == "end" else None
+        return text_in(lines[-1], "text") if lines and lines[-1]["is"] == "end" else None
 
     def _longest_s(self) -> float:
         if self._timeout_s is not None:
             return self._timeout_s
-        ramp_s = math.nan if self._run is None else float(self._run.facts["limits"]["ramp_down_s"])
+        ramp_s = math.nan if self._run is None else self._run.facts.limits.ramp_down_s
         return REST_S + (ramp_s if math.isfinite(ramp_s) else 0.0)

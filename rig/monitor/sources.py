@@ -1,21 +1,24 @@
 """Which run the page shows: the one that is given, the youngest under way, the one into a file, those into a folder."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig.errors import RecordingError
+from rig.live.facts import RunFacts
 from rig.live.place import runs
 from rig.live.reader import LiveRun, View, run_into
+from rig.monitor.feed import Earlier
 from rig.monitor.shown import shown_line
 
 if TYPE_CHECKING:
     from rig.monitor.replay import Replay
 
-LOOK_S = 0.2
-Wanted = Callable[[Mapping[str, Any]], bool]
+POLL_S = 0.2
+"""Shortest time between two looks for a run, s; chosen."""
+Wanted = Callable[[RunFacts], bool]
 
 
 def always(view: View) -> Callable[[View | None], View]:
@@ -38,13 +41,13 @@ class Latest:
     ) -> None:
         self._wanted, self._instead, self._on_found = wanted, instead, on_found
         self._looked_s = float("-inf")
-        self._shown: Any = instead
+        self._shown = instead
 
     def __call__(self, shown: View | None) -> View | None:
         """Return the view to show, given the one that is shown."""
         shown = shown or self._instead
         under_way = isinstance(shown, LiveRun) and shown.connected
-        if under_way or time.monotonic() - self._looked_s < LOOK_S:
+        if under_way or time.monotonic() - self._looked_s < POLL_S:
             return shown
         self._looked_s = time.monotonic()
         found = self._found(shown)
@@ -82,12 +85,12 @@ def chosen(what: Path | None) -> Latest:
         return Latest()
     path = what.resolve()
     if path.is_dir():
-        return Latest(lambda facts: Path(facts["recording"]).resolve().parent == path)
+        return Latest(lambda facts: Path(facts.recording).resolve().parent == path)
     if not path.parent.is_dir():
         raise RecordingError(f"{what}: there is no folder {what.parent}")
 
-    def into(facts: Mapping[str, Any]) -> bool:
-        return Path(facts["recording"]).resolve() == path
+    def into(facts: RunFacts) -> bool:
+        return Path(facts.recording).resolve() == path
 
     under_way = run_into(path)
     if under_way is not None:
@@ -106,8 +109,7 @@ def recorded(path: Path) -> "Replay":
     return Replay(path, at_end=True)
 
 
-def of_an_earlier_run(path: Path) -> dict[str, Any]:
+def earlier_run(path: Path) -> Earlier:
     """Return facts and points of a recording, to be drawn under those of the run that is shown."""
     with recorded(path) as view:
-        points = [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"]
-        return {"facts": view.facts, "lines": points}
+        return Earlier(view.facts, [shown_line(line, view.facts) for line in view.lines(0) if line["is"] == "point"])

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from rig.live.reader import View
 from rig.monitor.feed import Moment
 from rig.monitor.plain_pages import HARDWARE
+from rig.monitor.shown import Shown
 from vibrolock.printable import error_text
 
 SILENT_S = 2.0
@@ -53,32 +54,33 @@ class Stopping:
         """
         if moment is None:
             return "failed", HARDWARE, "A stop may be asked for, but what the run does cannot be read."
-        shown = moment.shown or {}
-        cause = f" {shown['cause']}." if shown.get("cause") else ""
+        shown = moment.shown or Shown("starting")
+        now = shown.details
+        cause = f" {shown.cause}." if shown.cause else ""
         if moment.view is None and self._kept and self._expecting():
             return "asked", "STOP IS ASKED FOR", f"The run has not been heard of yet. If anything moves: {HARDWARE}."
         if moment.view is None and self._expecting():
             return "driven", "NOTHING IS KNOWN OF THE RUN", f"It is about to begin, or cannot be watched: {HARDWARE}."
         if moment.view is None or moment.facts is None:
             return "none", "NO RUN IS UNDER WAY", "There is nothing to stop here."
-        if hasattr(moment.view, "replay_state"):
+        if moment.view.player is not None:
             return "none", "THIS IS A RECORDING", "Nothing is driven from here: there is nothing to stop."
         if not moment.connected:
-            if shown.get("output_off") or (moment.ended and "guard" not in shown):  # the last: nothing was driven
+            if shown.output_off or (moment.ended and now is None):  # the last: nothing was driven
                 return "off", "OUTPUT AT 0 V", f"The run is over.{cause}"
             how = cause or " Its process has ended without a word."
             return "failed", HARDWARE, f"The run is over, and what the output does is not known here.{how}"
-        if shown.get("output_off") and cause:
+        if shown.output_off and cause:
             return "off", "OUTPUT AT 0 V", cause.strip()
         if self._asked is not moment.view:
-            return "driven", "NO STOP WAS ASKED FOR", f"The run is under way: {shown.get('state', 'starting')}."
+            return "driven", "NO STOP WAS ASKED FOR", f"The run is under way: {shown.state}."
         if self._refused:
             return "failed", HARDWARE, f"The request could not be left: {self._refused}."
-        if shown.get("age_s", 0.0) > SILENT_S:
-            return "failed", HARDWARE, f"A stop is asked for, but the run has said nothing for {shown['age_s']:.0f} s."
+        if now is not None and now.age_s > SILENT_S:
+            return "failed", HARDWARE, f"A stop is asked for, but the run has said nothing for {now.age_s:.0f} s."
         waited_s = time.monotonic() - self._asked_s
-        if waited_s > moment.facts["limits"]["ramp_down_s"] + REST_S:
+        if waited_s > moment.facts.limits.ramp_down_s + REST_S:
             return "failed", HARDWARE, f"The output is not at 0 V after {waited_s:.0f} s.{cause}"
-        if shown.get("guard") == "ramping down":
-            return "ramping", "RAMPING DOWN", f"Output {shown['voltage_v']:.3f} V.{cause}"
+        if now is not None and now.guard == "ramping down":
+            return "ramping", "RAMPING DOWN", f"Output {now.voltage_v:.3f} V.{cause}"
         return "asked", "STOP IS ASKED FOR", "The ramp begins as soon as the run looks, twenty times a second."

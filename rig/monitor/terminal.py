@@ -1,8 +1,7 @@
 """The terminal view: what is shown of a run, drawn for a terminal of any size. Every colour comes with a word."""
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from rich.align import Align
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -12,11 +11,18 @@ from rich.style import Style
 from rich.table import Table
 from rich.text import Text
 
+from rig.live.facts import Line, RunFacts
+from rig.live.reader import ReplayState
+from rig.monitor.shown import Details, Shown
 from rig.monitor.words import duration, event_text, figure, point_cells, point_headings, share_word
 from vibrolock.printable import printable
 
-STALE_S = 0.7  # with the time between two drawings, stale data is grey within one second
+STALE_S = 0.7
+"""Age from which on data counts as stale, s; chosen: with the time between two drawings, it is grey within one second."""
 WIDE, LEFT = 120, 62
+"""Columns from which on the view has two halves, and columns of the left one; chosen to fit its longest line."""
+LAST_LINES = 200
+"""Lines that are looked through for events; chosen: more than any terminal has rows."""
 STYLES = {
     "not armed": "white on grey30",
     "starting": "white on grey30",
@@ -36,30 +42,31 @@ DEAD = "NOT CONNECTED: USE THE HARDWARE STOP"
 
 
 def draw(
-    shown: Mapping[str, Any],
-    facts: Mapping[str, Any],
-    lines: Sequence[Mapping[str, Any]],
+    shown: Shown,
+    facts: RunFacts,
+    lines: Sequence[Line],
     *,
     size: tuple[int, int],
     connected: bool = True,
-    replay: Mapping[str, Any] | None = None,
+    replay: ReplayState | None = None,
 ) -> RenderableType:
     """Return the view of `rig.monitor.shown.shown_frame` for a terminal of ``size`` (columns, rows)."""
     width, height = size
     over = any(line["is"] == "end" for line in lines[-1:])
     lost = not connected and not over
-    stale = lost or (connected and shown.get("age_s", 0.0) > STALE_S)
+    now = shown.details
+    stale = lost or (connected and now is not None and now.age_s > STALE_S)
     head: list[RenderableType] = [_title(facts, width), _banner(shown, stale=stale, lost=lost, tall=height >= 36)]
     if replay is not None:
         head.append(_replayed(replay, width))
-    if "guard" not in shown:
+    if now is None:
         return Group(*head, Text("nothing has been published yet", style="grey50"))
     wide = width >= WIDE
-    numbers = _numbers(shown, facts, across=1 if wide else 2)
+    numbers = _numbers(shown.state, now, facts, across=1 if wide else 2)
     rest = height - _rows(head, width)
     if wide:
         right = width - LEFT - 2
-        shares = _shares(shown, rest - _rows(numbers, LEFT) - 1, bar=8)
+        shares = _shares(now, rest - _rows(numbers, LEFT) - 1, bar=8)
         events = _events(lines, facts, max(1, rest // 4), right)
         points = _points(lines, facts, rest - len(events) - 2, right)
         table = Table.grid(padding=(0, 2, 0, 0))
@@ -73,7 +80,7 @@ def draw(
     else:
         rest -= _rows(numbers, width)
         events = _events(lines, facts, max(1, rest // 8), width)
-        shares = _shares(shown, max(3, (rest - len(events)) // 2), bar=min(20, max(4, width - 60)))
+        shares = _shares(now, max(3, (rest - len(events)) // 2), bar=min(20, max(4, width - 60)))
         points = _points(lines, facts, rest - len(events) - _rows(shares, width), width)
         body = [*numbers, *shares, *points, *events]
     return Group(*head, Greyed(Group(*body)) if stale else Group(*body))
@@ -96,58 +103,56 @@ class Greyed:
             yield segment if segment.control else Segment(segment.text, Style(color="grey50"))
 
 
-def _title(facts: Mapping[str, Any], width: int) -> Text:
-    told = [facts["purpose"] or facts["kind"], f"bench {facts['bench']}", facts["specimen"]]
-    told += [f"operator {facts['operator']}"] if facts["operator"] else []
-    told += [facts["recording"]]
-    text = Text(printable("  ".join(str(one) for one in told if one)), style="grey62", no_wrap=True)
+def _title(facts: RunFacts, width: int) -> Text:
+    operator = f"operator {facts.operator}" if facts.operator else ""
+    told = [facts.purpose or facts.kind, f"bench {facts.bench}", facts.specimen, operator, facts.recording]
+    text = Text(printable("  ".join(filter(None, told))), style="grey62", no_wrap=True)
     text.truncate(width, overflow="ellipsis")
     return text
 
 
-def _banner(shown: Mapping[str, Any], *, stale: bool, lost: bool, tall: bool) -> RenderableType:
+def _banner(shown: Shown, *, stale: bool, lost: bool, tall: bool) -> RenderableType:
     """Return the state as a bar across the terminal, with level and time left."""
-    state = str(shown["state"])
+    state, now = shown.state, shown.details
     style = STYLES.get(state, "white on grey30")
     words = Text(" ".join(state.upper()), style=f"bold {style}")
-    if shown.get("output_off") and state != "not armed":
+    if shown.output_off and state != "not armed":
         words.append("   OUTPUT AT 0 V", style=f"bold {style}")
-    elif shown.get("points") and state not in ("ramping down", "tripped"):
-        words.append(f"   point {min(shown['point'] or shown['finished'] + 1, shown['points'])} of {shown['points']}")
-        words.append(f"   {duration(shown['left_s'])} left")
+    elif now is not None and now.points and state not in ("ramping down", "tripped"):
+        words.append(f"   point {min(now.point or now.finished + 1, now.points)} of {now.points}")
+        words.append(f"   {duration(now.left_s)} left")
     if stale:
         style = "bold black on grey62"
-        old = "" if not math.isfinite(shown.get("age_s", math.nan)) else f", data of {duration(shown['age_s'])} ago"
+        old = "" if now is None else f", data of {duration(now.age_s)} ago"
         words = Text(f"{DEAD if lost else 'STALE DATA'}{old}   (last: {state})", style=style)
     rows = [Align.center(words, style=style)]
-    if cause := str(shown.get("cause", "")):
-        rows.append(Align.center(Text(printable(cause), style=f"bold {style}"), style=style))
-    return Padding(Group(*rows), (1, 0) if tall or not cause else (0, 0), style=style)
+    if shown.cause:
+        rows.append(Align.center(Text(printable(shown.cause), style=f"bold {style}"), style=style))
+    return Padding(Group(*rows), (1, 0) if tall or not shown.cause else (0, 0), style=style)
 
 
-def _replayed(replay: Mapping[str, Any], width: int) -> Text:
-    at, whole = float(replay["time_s"]), float(replay["duration_s"])
+def _replayed(replay: ReplayState, width: int) -> Text:
+    at, whole = replay.time_s, replay.duration_s
     bar = max(10, width - 62)
     filled = round(bar * (at / whole if whole > 0.0 else 1.0))
-    how = f"at {replay['speed']:g} times the clock" if replay["playing"] else "PAUSED"
+    how = f"at {replay.speed:g} times the clock" if replay.playing else "PAUSED"
     text = f"REPLAY {at:8.1f} of {whole:.1f} s {'━' * filled}{'─' * (bar - filled)} {how}  space ← → q"
     return Text(text, style="bold", no_wrap=True, overflow="ellipsis")
 
 
-def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any], *, across: int) -> list[RenderableType]:
+def _numbers(state: str, now: Details, facts: RunFacts, *, across: int) -> list[RenderableType]:
     """Return numbers with their units, so many in a line, and a line on the loop where that is known."""
-    unit = facts["level_unit"]
-    target = float(shown["target"])
-    to = f", to {target:.4g} {unit}" if math.isfinite(target) and shown["guard"] == "armed" else ""
-    settled = shown["settled"] if shown["state"] == "settling" else None
+    unit = facts.level_unit
+    to = f", to {now.target:.4g} {unit}" if math.isfinite(now.target) and now.guard == "armed" else ""
+    settled = now.settled if state == "settling" else None
     cells = [
-        ("frequency", figure(shown["frequency_hz"], ".4f"), "Hz"),
-        ("phase error", figure(shown["phase_error_deg"], ".2f"), "deg"),
-        ("force", figure(shown["force_n"], ".4f"), "N"),
-        ("displacement", figure(shown["displacement_mm"], ".4f"), "mm"),
-        ("voltage", figure(shown["voltage_v"], ".4f"), "V"),
-        ("level", figure(shown["level"], ".4g"), unit + to),
-        ("time", figure(shown["time_s"], ".1f"), f"s of part {shown['part']}"),
+        ("frequency", figure(now.frequency_hz, ".4f"), "Hz"),
+        ("phase error", figure(now.phase_error_deg, ".2f"), "deg"),
+        ("force", figure(now.force_n, ".4f"), "N"),
+        ("displacement", figure(now.displacement_mm, ".4f"), "mm"),
+        ("voltage", figure(now.voltage_v, ".4f"), "V"),
+        ("level", figure(now.level, ".4g"), unit + to),
+        ("time", figure(now.time_s, ".1f"), f"s of part {now.part}"),
         ("settled", "-" if settled is None else str(settled[0]), "" if settled is None else _progress(settled)),
     ]
     table = Table.grid(expand=True)
@@ -160,16 +165,15 @@ def _numbers(shown: Mapping[str, Any], facts: Mapping[str, Any], *, across: int)
     for first in range(0, len(texts), across):
         table.add_row(*texts[first : first + across])
     told: list[RenderableType] = [table]
-    late = shown["late_us"]
-    if any(math.isfinite(value) for value in late) or shown["overruns"] or shown["lost"]:
-        p50, p99, p999, most = (figure(value, ".0f") for value in late)
-        text = f"late {p50} / {p99} / {p999} us (50, 99, 99.9 %), {most} us at most; {shown['overruns']} overruns"
-        text += f", {shown['lost']} samples lost" if shown["lost"] else ""
+    if any(math.isfinite(value) for value in now.late_us) or now.overruns or now.lost:
+        p50, p99, p999, most = (figure(value, ".0f") for value in now.late_us)
+        text = f"late {p50} / {p99} / {p999} us (50, 99, 99.9 %), {most} us at most; {now.overruns} overruns"
+        text += f", {now.lost} samples lost" if now.lost else ""
         told.append(Text(text, style="grey62", no_wrap=True, overflow="ellipsis"))
     return told
 
 
-def _progress(settled: Sequence[int]) -> str:
+def _progress(settled: tuple[int, int]) -> str:
     good, needed = settled
     return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 4)}"
 
@@ -179,29 +183,26 @@ def _bar(part: float, length: int) -> str:
     return "█" * filled + "░" * (length - filled)
 
 
-def _shares(shown: Mapping[str, Any], most: int, *, bar: int) -> list[RenderableType]:
+def _shares(now: Details, most: int, *, bar: int) -> list[RenderableType]:
     """Return a line for each limit and range, those that are used most first, as many as fit."""
-    shares = sorted(shown["shares"], key=lambda one: -one["share"] if math.isfinite(one["share"]) else 1.0)
+    shares = sorted(now.shares, key=lambda one: -one.share if math.isfinite(one.share) else 1.0)
     if most < 1:
         return []
     table = Table.grid(padding=(0, 1))
     for justify in ("left", "left", "right", "left", "right"):
         table.add_column(justify=justify, no_wrap=True)
     for one in shares[:most]:
-        part = float(one["share"])
+        part = one.share
         word = share_word(part)
         style = WORDS.get(word, "")
-        value = f"{figure(one['value'], '.3g')} of {one['of']:.3g} {one['unit']}"
-        name = f"{one['name']} {one['what']}"
-        table.add_row(
-            name, Text(_bar(part, bar), style=style), f"{figure(100.0 * part, '.0f')} %", Text(word, style), value
-        )
+        percent = f"{figure(100.0 * part, '.0f')} %"
+        value = f"{figure(one.value, '.3g')} of {one.of:.3g} {one.unit}"
+        bar_text = Text(_bar(part, bar), style=style)
+        table.add_row(f"{one.name} {one.what}", bar_text, percent, Text(word, style), value)
     return [table]
 
 
-def _points(
-    lines: Sequence[Mapping[str, Any]], facts: Mapping[str, Any], most: int, width: int
-) -> list[RenderableType]:
+def _points(lines: Sequence[Line], facts: RunFacts, most: int, width: int) -> list[RenderableType]:
     """Return the table of the last points that fit, with the columns that fit."""
     points = [line for line in lines if line["is"] == "point"]
     if not points or most < 2:
@@ -224,10 +225,8 @@ def _points(
     return [table]
 
 
-def _events(
-    lines: Sequence[Mapping[str, Any]], facts: Mapping[str, Any], most: int, width: int
-) -> list[RenderableType]:
-    told = [text for line in lines[-200:] if (text := event_text(line, facts))]
+def _events(lines: Sequence[Line], facts: RunFacts, most: int, width: int) -> list[RenderableType]:
+    told = [text for line in lines[-LAST_LINES:] if (text := event_text(line, facts))]
     out: list[RenderableType] = []
     for text in told[-most:]:
         line = Text(text, style="grey70", no_wrap=True)

@@ -2,17 +2,21 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
-from rig.live.reader import View
+from rig.live.facts import Line, text_in
+from rig.live.reader import ReplayState, View
 from rig.monitor.shown import shown_frame
 from rig.monitor.words import event_text, point_text, state_text
 from vibrolock.printable import printable
 
-LOOK_S = 0.1
+POLL_S = 0.1
+"""Time between two looks at a run that is printed as lines, s; chosen."""
 DRAWINGS_PER_S = 5.0
+"""Rate at which the terminal is drawn, 1/s; chosen: as quick as numbers can be read."""
+JUMPS = 20
+"""Jumps of an arrow key that a whole recording takes; chosen."""
 DEAD = "its process has ended without a word: what the output does is not known, USE THE HARDWARE STOP"
 Keys = Callable[[], str]
 
@@ -27,9 +31,9 @@ def watch(view: View, keys: Keys = lambda: "") -> bool:
     return _printed(view)
 
 
-def how_it_ended(lines: "list[dict[str, Any]]") -> str | None:
+def how_it_ended(lines: Sequence[Line]) -> str | None:
     """Return how the run ended, if that was told and no part was begun since."""
-    return printable(str(lines[-1].get("text", ""))) if lines and lines[-1]["is"] == "end" else None
+    return printable(text_in(lines[-1], "text")) if lines and lines[-1]["is"] == "end" else None
 
 
 class PlainLines:
@@ -37,7 +41,7 @@ class PlainLines:
 
     def __init__(self, view: View, say: Callable[[str], None]) -> None:
         self._view, self._say = view, say
-        self._lines: list[dict[str, Any]] = []
+        self._lines: list[Line] = []
         self._state = ""
 
     @property
@@ -54,8 +58,8 @@ class PlainLines:
             if text := point_text(line, facts) if line["is"] == "point" else event_text(line, facts):
                 self._say(text)
         shown = shown_frame(self._view.frame(), facts, self._lines)
-        if shown["state"] != self._state:
-            self._state = str(shown["state"])
+        if shown.state != self._state:
+            self._state = shown.state
             self._say(state_text(shown, facts))
 
 
@@ -66,7 +70,7 @@ def _printed(view: View) -> bool:
         lines.look()
         if not connected:
             break
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
     if lines.ended is None:
         _print(DEAD)
     return lines.ended is not None
@@ -79,12 +83,12 @@ def _drawn(view: View, keys: Keys) -> bool:
     from rig.monitor.terminal import draw
 
     console = Console()
-    lines: list[dict[str, Any]] = []
+    lines: list[Line] = []
     generation = 0
     with Live(console=console, screen=True, auto_refresh=False) as screen:
         while True:
             connected = view.connected
-            if (now := getattr(view, "generation", 0)) != generation:  # a replay has jumped: its lines begin anew
+            if (now := view.generation) != generation:  # a replay has jumped: its lines begin anew
                 generation, lines = now, []
             lines += view.lines(len(lines))
             shown = shown_frame(view.frame(), view.facts, lines)
@@ -98,31 +102,31 @@ def _drawn(view: View, keys: Keys) -> bool:
             time.sleep(1.0 / DRAWINGS_PER_S)
     ended = how_it_ended(lines)
     if _replay(view) is None:
-        _print(f"{view.facts['recording']}: {DEAD if ended is None else ended}")
+        _print(f"{view.facts.recording}: {DEAD if ended is None else ended}")
     return ended is not None or _replay(view) is not None
 
 
-def _replay(view: View) -> Mapping[str, Any] | None:
-    state: Mapping[str, Any] | None = getattr(view, "replay_state", lambda: None)()
-    return state
+def _replay(view: View) -> ReplayState | None:
+    return None if view.player is None else view.player.replay_state()
 
 
 def _goes_on(view: View) -> bool:
     """Return whether there is more to come: a replay is over at the end of its recording."""
     replay = _replay(view)
-    return view.connected if replay is None else replay["time_s"] < replay["duration_s"]
+    return view.connected if replay is None else replay.time_s < replay.duration_s
 
 
-def _steer(view: Any, key: str) -> None:
+def _steer(view: View, key: str) -> None:
     """Pause or go on with the space bar; jump by a twentieth of a recording with the arrows."""
-    replay = _replay(view)
-    if replay is None or not key:
+    player = view.player
+    if player is None or not key:
         return
-    jump_s = replay["duration_s"] / 20.0
+    replay = player.replay_state()
+    jump_s = replay.duration_s / JUMPS
     if key == " ":
-        (view.pause if replay["playing"] else view.play)()
+        (player.pause if replay.playing else player.play)()
     elif key in ("left", "right"):
-        view.seek(replay["time_s"] + (jump_s if key == "right" else -jump_s))
+        player.seek(replay.time_s + (jump_s if key == "right" else -jump_s))
 
 
 @contextmanager

@@ -1,13 +1,15 @@
 """Words for what is shown: times, numbers, points, events and shares, as terminal and plain lines print them."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
+from rig.live.facts import Line, RunFacts, number_in, text_in
+from rig.monitor.shown import Shown
+from rig.text.column import Column
 from rig.text.console import number
 from vibrolock.printable import one_line, printable
 
 CLOSE = 0.8
+"""Share of a limit from which on it counts as close; chosen."""
 
 
 def figure(value: float, pattern: str) -> str:
@@ -33,81 +35,75 @@ def share_word(share: float) -> str:
     return "OVER" if share >= 1.0 else "close" if share >= CLOSE else "ok"
 
 
-def state_text(shown: Mapping[str, Any], facts: Mapping[str, Any]) -> str:
+def state_text(shown: Shown, facts: RunFacts) -> str:
     """Return the present state in one line."""
-    if "guard" not in shown:
-        return str(shown["state"])
-    unit = facts["level_unit"]
-    parts = [f"{shown['time_s']:.1f} s", str(shown["state"])]
-    if shown["cause"]:
-        parts.append(printable(str(shown["cause"])))
-    if shown["output_off"]:
+    now = shown.details
+    if now is None:
+        return shown.state
+    parts = [f"{now.time_s:.1f} s", shown.state]
+    if shown.cause:
+        parts.append(printable(shown.cause))
+    if now.output_off:
         parts.append("output at 0 V")
-    elif shown["point"] > 0:
-        parts.append(f"point {shown['point']} of {shown['points']}")
+    elif now.point > 0:
+        parts.append(f"point {now.point} of {now.points}")
     parts += [
-        f"level {figure(shown['level'], '.4g')} {unit}",
-        f"{figure(shown['frequency_hz'], '.4f')} Hz",
-        f"phase error {figure(shown['phase_error_deg'], '.2f')} deg",
-        f"{figure(shown['force_n'], '.4f')} N",
-        f"{figure(shown['displacement_mm'], '.4f')} mm",
-        f"{figure(shown['voltage_v'], '.4f')} V",
+        f"level {figure(now.level, '.4g')} {facts.level_unit}",
+        f"{figure(now.frequency_hz, '.4f')} Hz",
+        f"phase error {figure(now.phase_error_deg, '.2f')} deg",
+        f"{figure(now.force_n, '.4f')} N",
+        f"{figure(now.displacement_mm, '.4f')} mm",
+        f"{figure(now.voltage_v, '.4f')} V",
     ]
-    shares = [one for one in shown["shares"] if math.isfinite(one["share"])]
+    shares = [one for one in now.shares if math.isfinite(one.share)]
     if shares:
-        nearest = max(shares, key=lambda one: float(one["share"]))
-        parts.append(f"{100.0 * nearest['share']:.0f} % of {nearest['name']} {nearest['what']}")
-    return "  ".join([*parts, f"{duration(shown['left_s'])} left"])
+        nearest = max(shares, key=lambda one: one.share)
+        parts.append(f"{100.0 * nearest.share:.0f} % of {nearest.name} {nearest.what}")
+    return "  ".join([*parts, f"{duration(now.left_s)} left"])
 
 
-def _columns(facts: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    return [column for column in facts["columns"] if column["in_line"] and not column["optional"]]
+def _columns(facts: RunFacts) -> list[Column]:
+    return [column for column in facts.columns if column.in_line and not column.optional]
 
 
-def point_headings(facts: Mapping[str, Any]) -> list[str]:
+def point_headings(facts: RunFacts) -> list[str]:
     """Return the headings of `point_cells`, with units."""
-    columns = _columns(facts)
-    return [
-        "point",
-        f"level {facts['level_unit']}",
-        *(f"{c['heading']} {c['unit']}".strip() for c in columns),
-        "quality",
-    ]
+    quantities = [f"{column.heading} {column.unit}".strip() for column in _columns(facts)]
+    return ["point", f"level {facts.level_unit}", *quantities, "quality"]
 
 
-def point_cells(point: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
+def point_cells(point: Line, facts: RunFacts) -> list[str]:
     """Return number, level, the quantities of its kind of campaign, and the quality of a point."""
-    cells = [str(int(point["number"]) + 1), figure(float(point["level"]), ".4g")]
+    cells = [f"{number_in(point, 'number') + 1:.0f}", figure(number_in(point, "level"), ".4g")]
     for column in _columns(facts):
-        value = point.get(column["key"])
-        plain = isinstance(value, int | float)
-        cells.append(number(value + column["counts_from"], column["pattern"], column["scale"]) if plain else "-")
-    return [*cells, printable(str(point.get("quality") or ("good" if point.get("accepted") else "rejected")))]
+        value = point.get(column.key)
+        if isinstance(value, int | float):
+            cells.append(number(value + column.counts_from, column.pattern, column.scale))
+        else:
+            cells.append("-")
+    return [*cells, printable(text_in(point, "quality") or ("good" if point.get("accepted") else "rejected"))]
 
 
-def point_text(point: Mapping[str, Any], facts: Mapping[str, Any]) -> str:
+def point_text(point: Line, facts: RunFacts) -> str:
     """Return a point in one line."""
     number_, level, *values, quality = point_cells(point, facts)
     shown = [
-        f"{value} {column['unit']}".strip()
-        if column["plain"]
-        else f"{column['heading']} {value} {column['unit']}".strip()
+        f"{'' if column.plain else column.heading} {value} {column.unit}".strip()
         for column, value in zip(_columns(facts), values, strict=True)
         if value != "-"
     ]
-    reason = str(point.get("reason") or "")
+    reason = text_in(point, "reason")
     ended = f"{quality}: {one_line(reason)}" if reason not in ("", quality) else quality
-    return "  ".join([f"point {number_}  {level} {facts['level_unit']}", *shown, ended])
+    return "  ".join([f"point {number_}  {level} {facts.level_unit}", *shown, ended])
 
 
-def event_text(line: Mapping[str, Any], facts: Mapping[str, Any]) -> str:
+def event_text(line: Line, facts: RunFacts) -> str:
     """Return an event, a remark, or how a part began or ended, in one line; empty for what is told elsewhere."""
-    rate = facts["sample_rate_hz"]
     if line["is"] == "end":
-        return one_line(f"end: {line.get('text', '')}")
+        return one_line(f"end: {text_in(line, 'text')}")
     if line["is"] != "event" or line.get("what") == "telemetry":
         return ""
-    at = f"{int(line.get('sample', 0)) / rate:.1f} s  "
+    at = f"{number_in(line, 'sample', 0.0) / facts.sample_rate_hz:.1f} s  "
     if "text" in line:
         return one_line(f"{at}{line['text']}")
     return one_line(f"{at}{line.get('what')}: {line.get('state')}")

@@ -248,7 +248,7 @@ def _execution(
 def _published(plan: Plan, bench: Bench, output: Path, options: RunOptions) -> AbstractContextManager[Live]:
     """Let the run be watched and stopped by other processes of the user, from before its device is opened."""
     started = datetime.now(UTC).isoformat(timespec="seconds")
-    told = watched_facts(plan, bench, output, options.about.facts(), started=started)
+    told = watched_facts(plan, bench, output, options.about.facts(), started)
     return published(told, len(bench.channels), options.progress.remark)
 
 

@@ -74,7 +74,7 @@ def driven(name):
     for folder in runs():
         with suppress(Exception), LiveRun(folder) as run:
             frame = run.frame()
-            if run.facts["recording"].endswith(name) and frame is not None:
+            if run.facts.recording.endswith(name) and frame is not None:
                 return frame.state["guard"] == GuardMode.ARMED and frame.state["voltage_v"] > 0.1
     return False
 

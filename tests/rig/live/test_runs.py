@@ -1,6 +1,7 @@
 """Whole runs: what watching costs them (nothing), how they heed a request to stop, and how long they say that they take."""
 
 import errno
+import json
 import os
 import signal
 import sys
@@ -21,7 +22,7 @@ from rig.live.reader import LiveRun
 from rig.live.stopping import request_stop
 from rig.live.time_left import time_left_s
 from rig.loop.loop import Loop
-from rig.monitor.shown import as_json, shown_bins, shown_frame, state_of
+from rig.monitor.shown import bins_json, shown_frame, shown_json, state_of
 from rig.monitor.shutdown_monitor import ShutdownMonitor
 from rig.tick.safety.layout import EndReason, GuardMode
 from tests.rig.campaigns.running.test_runs import plan_with
@@ -90,8 +91,8 @@ def test_a_request_ramps_a_run_down_by_its_own_ramp(how, tmp_path):
         assert told.lines(0)[-1]["text"] == "stopped by the test"
         assert told.frame().state["guard"] == GuardMode.OFF
         shown = shown_frame(told.frame(), told.facts, told.lines(0))
-    assert (shown["state"], shown["output_off"]) == ("stopped", True)
-    assert shown["cause"] == "stopped by the test"
+    assert (shown.state, shown.details.output_off) == ("stopped", True)
+    assert shown.cause == "stopped by the test"
     states = {state_of(frame) for frame in asking.frames}
     assert "ramping down" in states or how == "virtual"  # hundreds of times faster than a frame
     assert runs() == []
@@ -206,34 +207,34 @@ def test_the_states_of_a_run_come_one_after_the_other(tmp_path):
     bench = bench_with({"block": 20})
     with rig.run(short_plan(), bench=bench, output=tmp_path / "run.h5", progress=watching, realtime=True) as done:
         points = done.recording.points
-    order = list(dict.fromkeys(one["state"] for one in watching.shown))
+    order = list(dict.fromkeys(one.state for one in watching.shown))
     assert order[0] == "starting"
     known = [state for state in order if state in ("searching", "settling", "recording", "ramping down")]
     assert known == ["searching", "settling", "recording", "ramping down"]
     with watching.run as run:
         last = shown_frame(run.frame(), run.facts, run.lines(0))
-        assert (last["state"], last["guard"]) == ("finished", "output at 0 V")
-        assert last["cause"] == "the plan was carried out"
+        assert (last.state, last.details.guard) == ("finished", "output at 0 V")
+        assert last.cause == "the plan was carried out"
         _, bins = run.bins(0)
-        assert set(shown_bins(bins, run.facts)) >= {"end_s", "frequency_hz", "force", "drive"}
-    recording = [one for one in watching.shown if one["state"] == "recording" and one["point"] == 2]
+        assert set(bins_json(0, bins, run.facts)) >= {"end_s", "frequency_hz", "force", "drive"}
+    recording = [one for one in watching.shown if one.state == "recording" and one.details.point == 2]
     for one in recording:
         point = points[1]
-        assert one["level"] == one["target"] == pytest.approx(0.8)
-        assert one["voltage_v"] == pytest.approx(0.8, rel=1e-3)
-        assert one["frequency_hz"] == pytest.approx(point["frequency_hz"], rel=1e-3)
-        assert one["force_n"] == pytest.approx(point["force_n"], rel=0.05)
-        assert one["displacement_mm"] == pytest.approx(1e3 * point["amplitude_m"], rel=0.05)
-        shares = {(share["name"], share["what"]): share for share in one["shares"]}
-        assert shares["output", "limit"]["share"] == pytest.approx(0.8 / bench.limits.voltage_v, rel=1e-3)
+        assert one.details.level == one.details.target == pytest.approx(0.8)
+        assert one.details.voltage_v == pytest.approx(0.8, rel=1e-3)
+        assert one.details.frequency_hz == pytest.approx(point["frequency_hz"], rel=1e-3)
+        assert one.details.force_n == pytest.approx(point["force_n"], rel=0.05)
+        assert one.details.displacement_mm == pytest.approx(1e3 * point["amplitude_m"], rel=0.05)
+        shares = {(share.name, share.what): share for share in one.details.shares}
+        assert shares["output", "limit"].share == pytest.approx(0.8 / bench.limits.voltage_v, rel=1e-3)
         travel = shares["drive", "displacement"]
-        assert travel["value"] == pytest.approx(1e3 * point["amplitude_m"], rel=0.05)
-        assert travel["of"] == pytest.approx(1e3 * bench.limits.displacement_m)
+        assert travel.value == pytest.approx(1e3 * point["amplitude_m"], rel=0.05)
+        assert travel.of == pytest.approx(1e3 * bench.limits.displacement_m)
     assert recording
-    settling = [one["settled"] for one in watching.shown if one["state"] == "settling"]
+    settling = [one.details.settled for one in watching.shown if one.state == "settling"]
     assert max(good for good, _ in settling) > 0
     assert all(good <= needed for good, needed in settling)
-    as_json(watching.shown)
+    json.dumps([shown_json(one) for one in watching.shown])
 
 
 def test_a_trip_is_told_with_channel_value_and_cause(tmp_path):
@@ -241,16 +242,16 @@ def test_a_trip_is_told_with_channel_value_and_cause(tmp_path):
     bench = bench_with({"block": 20, "limits": {"force_n": 0.08}})
     with rig.run(short_plan(), bench=bench, output=tmp_path / "run.h5", progress=watching, realtime=True) as done:
         text = done.recording.parts[0].end["text"]
-    tripped = [one for one in watching.shown if one["state"] == "tripped"]
+    tripped = [one for one in watching.shown if one.state == "tripped"]
     assert tripped
-    assert tripped[0]["guard"] == "ramping down"
-    assert not tripped[0]["output_off"]
-    assert tripped[0]["cause"].startswith("force above its limit on channel force: ")
-    assert tripped[0]["cause"].endswith(" N")
-    assert 0.08 < abs(float(tripped[0]["cause"].split()[-2])) < 0.12
+    assert tripped[0].details.guard == "ramping down"
+    assert not tripped[0].details.output_off
+    assert tripped[0].cause.startswith("force above its limit on channel force: ")
+    assert tripped[0].cause.endswith(" N")
+    assert 0.08 < abs(float(tripped[0].cause.split()[-2])) < 0.12
     with watching.run as run:
         last = shown_frame(run.frame(), run.facts, run.lines(0))
-    assert (last["state"], last["output_off"], last["cause"]) == ("tripped", True, text)
+    assert (last.state, last.details.output_off, last.cause) == ("tripped", True, text)
 
 
 @pytest.mark.parametrize("realtime", [False, True])
@@ -275,7 +276,7 @@ def test_a_request_while_the_device_is_opened_keeps_the_rig_still_and_is_no_deat
     assert outcome.at_0_v
     assert "before anything was driven" in outcome.text
     shown = shown_frame(watching[0].frame(), watching[0].facts, watching[0].lines(0))
-    assert shown["state"] == "stopped"
+    assert shown.state == "stopped"
     for one in (*told, *watching):
         one.close()
 

@@ -4,20 +4,20 @@ All numbers of a frame are the number of its last sample, so that a reader sees 
 """
 
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
+from rig.campaigns.plans import load_plan
+from rig.campaigns.running.watched import watched_facts
 from rig.live.publisher import Publisher
 from rig.tick.layout import recorded_row
 from tests.rig.rigs import bench_with, tick_for
 
 ROWS = 500
 BENCH = bench_with()
-FACTS = {
-    "recording": "/nowhere/made.h5",
-    "channels": [channel.model_dump(mode="json") for channel in BENCH.channels],
-}
+FACTS = watched_facts(load_plan("magnet-beam/backbone"), BENCH, Path("/nowhere/made.h5"), {})
 
 
 def made_loop():

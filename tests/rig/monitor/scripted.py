@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.watched import watched_facts
 from rig.errors import RecordingError
+from rig.live.facts import RunFacts
 from rig.live.layout import FRAME, bin_dtype
 from rig.live.reader import Frame
 from rig.tick.layout import recorded_row
@@ -19,9 +21,10 @@ from rig.tick.safety.layout import EndReason, GuardMode
 BENCH = "magnet-beam"
 
 
-def facts(**changes: Any) -> dict[str, Any]:
+def facts(**changes: Any) -> RunFacts:
     """Facts of a backbone test of the magnet beam."""
-    return watched_facts(load_plan(f"{BENCH}/backbone"), load_bench(BENCH), Path("scripted.h5"), {}) | changes
+    told = watched_facts(load_plan(f"{BENCH}/backbone"), load_bench(BENCH), Path("scripted.h5"), {})
+    return replace(told, **changes)
 
 
 def point(number: int) -> dict[str, Any]:
@@ -32,6 +35,9 @@ def point(number: int) -> dict[str, Any]:
 class Scripted:
     """A `rig.live.reader.View` of which a test says what it shows."""
 
+    generation = 0
+    player = None
+
     def __init__(self, **changes: Any) -> None:
         self.facts = facts(**changes)
         self.told: list[dict[str, Any]] = []
@@ -40,7 +46,7 @@ class Scripted:
         self.refuses = False
         self.readings = 0
         self._state = np.zeros((), FRAME)
-        self._bins = np.zeros(0, bin_dtype(len(self.facts["channels"])))
+        self._bins = np.zeros(0, bin_dtype(len(self.facts.channels)))
         self._lock = threading.Lock()
         self.step()
 
@@ -66,7 +72,7 @@ class Scripted:
         self.readings += 1
         with self._lock:
             age_s = 1e-9 * (time.monotonic_ns() - int(self._state["written_ns"]))
-            window = np.zeros(0, recorded_row(len(self.facts["channels"])))
+            window = np.zeros(0, recorded_row(len(self.facts.channels)))
             return Frame(self._state[()], window, age_s)
 
     def bins(self, first: int) -> tuple[int, np.ndarray]:
@@ -77,6 +83,9 @@ class Scripted:
     def lines(self, first: int) -> list[dict[str, Any]]:
         """The lines from a number on."""
         return self.told[first:]
+
+    def close(self) -> None:
+        """Do nothing."""
 
     def request_stop(self, cause: str) -> None:
         """Keep the request."""

@@ -5,12 +5,14 @@ import json
 import socket
 import threading
 from contextlib import ExitStack
+from types import SimpleNamespace
 
 import pytest
 
 from rig.live.place import runs
 from rig.live.publisher import Publisher
-from rig.monitor.feed import Place
+from rig.live.reader import ReplayState
+from rig.monitor.feed import Earlier, Place
 from rig.monitor.sources import Latest
 from rig.tick.safety.layout import GuardMode
 from tests.rig.monitor.scripted import Scripted, facts, point
@@ -210,7 +212,7 @@ def test_a_run_that_is_over_stays_until_the_next_begins():
 
 
 def test_an_earlier_run_is_sent_along_once(run):
-    earlier = {"facts": facts(bench="earlier"), "lines": [point(0)]}
+    earlier = Earlier(facts(bench="earlier"), [point(0)])
     with served(run, earlier=earlier) as server, Visitor(server.url).enter().feed() as socket:
         first = heard(socket)
         assert first["earlier"]["facts"]["bench"] == "earlier"
@@ -219,7 +221,7 @@ def test_an_earlier_run_is_sent_along_once(run):
 
 def test_a_replay_that_jumps_begins_anew(run, server, inside):
     run.generation = 0
-    run.replay_state = lambda: {"time_s": 1.0, "duration_s": 2.0, "playing": True, "speed": 5.0}
+    run.player = SimpleNamespace(replay_state=lambda: ReplayState(1.0, 2.0, playing=True, speed=5.0))
     run.tell(point(0), point(1))
     with inside.feed() as socket:
         assert numbers([heard(socket)]) == [0, 1]

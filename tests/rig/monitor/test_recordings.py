@@ -4,7 +4,7 @@ import pytest
 
 from rig.errors import RecordingError
 from rig.live.publisher import Publisher
-from rig.monitor.sources import chosen, of_an_earlier_run
+from rig.monitor.sources import chosen, earlier_run
 from tests.recorded import recorded_at
 from tests.rig.monitor.scripted import facts, point
 from tests.rig.monitor.test_process import PLAN
@@ -41,15 +41,15 @@ def test_a_run_into_the_file_takes_the_place_of_what_was_recorded(recording):
 
 
 def test_points_of_an_earlier_recording_are_sent_along(recording):
-    found = of_an_earlier_run(recording)
-    assert [line["number"] for line in found["lines"]] == [0, 1]
-    assert found["facts"]["recording"] == str(recording)
-    assert "harmonics" not in found["lines"][0]
+    found = earlier_run(recording)
+    assert [line["number"] for line in found.lines] == [0, 1]
+    assert found.facts.recording == str(recording)
+    assert "harmonics" not in found.lines[0]
 
 
 def test_what_is_no_recording_is_refused(tmp_path):
     (tmp_path / "text.h5").write_text("hello")
-    for read in (chosen, of_an_earlier_run):
+    for read in (chosen, earlier_run):
         with pytest.raises(RecordingError, match=r"text\.h5: not a file of vibrolock, but a text file"):
             read(tmp_path / "text.h5")
 

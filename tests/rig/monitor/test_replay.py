@@ -3,6 +3,7 @@
 import math
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from rig.campaigns.plans import load_plan
 from rig.errors import RecordingError
 from rig.live.layout import BIN_S, BINS
 from rig.live.place import runs
-from rig.live.reader import LiveRun
+from rig.live.reader import LiveRun, ReplayState
 from rig.monitor.replay import Replay
-from rig.monitor.shown import as_json, shown_bins, shown_frame
+from rig.monitor.shown import bins_json, shown_frame
 from rig.monitor.words import point_cells, state_text
 from rig.recording.conversion import finalise
 from rig.recording.header import Header
@@ -52,7 +53,7 @@ def watched(tmp_path_factory):
     plan, bench = plan_with(levels_v=(0.4, 0.8)), bench_with({"block": 20})
     rig.run(plan, bench=bench, output=path, realtime=True, progress=watching, operator="A. Person").close()
     with watching.run as run:
-        yield path, watching.seen, run.lines(0), dict(run.facts)
+        yield path, watching.seen, run.lines(0), run.facts
 
 
 def at(path, time_s):
@@ -66,8 +67,8 @@ def test_the_facts_are_those_of_the_run(watched):
     path, _, _, facts = watched
     later = {"process": 0, "armed": "", "started": ""}
     with at(path, 0.0) as replay:
-        assert replay.facts | later == facts | later
-        assert replay.facts["armed"] == "virtual"
+        assert replace(replay.facts, **later) == replace(facts, **later)
+        assert replay.facts.armed == "virtual"
 
 
 def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
@@ -78,27 +79,26 @@ def test_what_is_shown_at_a_time_is_what_was_shown_then(watched):
         for frame, before, _ in seen:
             replay.seek(int(frame.state["sample"]) / RATE)
             now = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-            if before["guard"] != "armed" or before["state"] != now["state"]:
+            if before.details.guard != "armed" or before.state != now.state:
                 continue  # a sample beside a change
             compared += 1
-            for key in ("state", "lock", "guard", "part", "points", "output_off"):
-                assert now[key] == before[key], key
-            assert now["point"] == before["point"]
-            assert now["time_s"] == before["time_s"]
-            assert now["frequency_hz"] == pytest.approx(before["frequency_hz"], rel=5e-3)
-            assert now["target"] == pytest.approx(before["target"])
-            assert now["voltage_v"] == pytest.approx(
-                before["voltage_v"], abs=0.01
-            )  # a row has what is on the converter
-            assert now["level"] == pytest.approx(before["level"], abs=0.01)
-            if before["state"] == "recording":
-                assert now["force_n"] == pytest.approx(before["force_n"], rel=0.1)
-                assert now["displacement_mm"] == pytest.approx(before["displacement_mm"], rel=0.05)
-            for one, other in zip(now["shares"], before["shares"], strict=True):
-                assert (one["name"], one["what"]) == (other["name"], other["what"])
-                if math.isfinite(other["share"]) and math.isfinite(one["share"]):
-                    assert one["share"] == pytest.approx(other["share"], rel=0.05, abs=0.001)
-    assert compared > 0.9 * sum(before["guard"] == "armed" for _, before, _ in seen)
+            for key in ("lock", "guard", "part", "points", "output_off"):
+                assert getattr(now.details, key) == getattr(before.details, key), key
+            assert now.details.point == before.details.point
+            assert now.details.time_s == before.details.time_s
+            assert now.details.frequency_hz == pytest.approx(before.details.frequency_hz, rel=5e-3)
+            assert now.details.target == pytest.approx(before.details.target)
+            voltage_v = before.details.voltage_v  # a row has what is on the converter
+            assert now.details.voltage_v == pytest.approx(voltage_v, abs=0.01)
+            assert now.details.level == pytest.approx(before.details.level, abs=0.01)
+            if before.state == "recording":
+                assert now.details.force_n == pytest.approx(before.details.force_n, rel=0.1)
+                assert now.details.displacement_mm == pytest.approx(before.details.displacement_mm, rel=0.05)
+            for one, other in zip(now.details.shares, before.details.shares, strict=True):
+                assert (one.name, one.what) == (other.name, other.what)
+                if math.isfinite(other.share) and math.isfinite(one.share):
+                    assert one.share == pytest.approx(other.share, rel=0.05, abs=0.001)
+    assert compared > 0.9 * sum(before.details.guard == "armed" for _, before, _ in seen)
 
 
 def test_lines_come_in_the_order_and_at_the_time_of_their_samples(watched):
@@ -136,7 +136,7 @@ def test_bins_hold_the_least_and_greatest_of_the_rows_within_them(watched):
         assert replay.bins(0)[1].size == 30
         np.testing.assert_array_equal(replay.bins(12)[1], bins[12:30])
         assert replay.bins(12)[0] == 12
-        as_json(shown_bins(bins, replay.facts))
+        bins_json(0, bins, replay.facts)
 
 
 def test_the_frame_of_a_record_says_what_its_point_does(watched):
@@ -146,13 +146,13 @@ def test_the_frame_of_a_record_says_what_its_point_does(watched):
             replay.seek(point["end_sample"] / RATE - 0.05)
             frame = replay.frame()
             shown = shown_frame(frame, replay.facts, replay.lines(0))
-            assert (shown["state"], shown["point"]) == ("recording", point["number"] + 1)
-            assert shown["force_n"] == pytest.approx(point["force_n"], rel=0.01)
-            assert shown["frequency_hz"] == pytest.approx(point["frequency_hz"], rel=2e-3)
+            assert (shown.state, shown.details.point) == ("recording", point["number"] + 1)
+            assert shown.details.force_n == pytest.approx(point["force_n"], rel=0.01)
+            assert shown.details.frequency_hz == pytest.approx(point["frequency_hz"], rel=2e-3)
             np.testing.assert_array_equal(frame.window[-50:], point_rows(recording, point["number"])[-300:-250])
-            assert shown["settled"] is None
-            assert all(math.isnan(value) for value in shown["late_us"])
-            assert shown["left_s"] == pytest.approx(replay.duration_s - replay.time_s)
+            assert shown.details.settled is None
+            assert all(math.isnan(value) for value in shown.details.late_us)
+            assert shown.details.left_s == pytest.approx(replay.duration_s - replay.time_s)
             state_text(shown, replay.facts)
 
 
@@ -174,14 +174,9 @@ def test_it_plays_by_the_clock_pauses_seeks_and_ends(watched):
         replay.set_speed(1000.0)
         replay.play()
         time.sleep(0.1)
-        assert replay.replay_state() == {
-            "time_s": replay.duration_s,
-            "duration_s": replay.duration_s,
-            "playing": False,
-            "speed": 1000.0,
-        }
+        assert replay.replay_state() == ReplayState(replay.duration_s, replay.duration_s, playing=False, speed=1000.0)
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert (shown["state"], shown["cause"]) == ("finished", "the plan was carried out")
+        assert (shown.state, shown.cause) == ("finished", "the plan was carried out")
         replay.set_speed(1.0)
         replay.play()
         assert replay.time_s < 1.0  # from the beginning again
@@ -232,10 +227,10 @@ def test_every_kind_is_replayed_with_its_segments_and_points(name, tmp_path):
         for time_s in np.linspace(0.0, replay.duration_s, 80):
             replay.seek(time_s)
             shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-            states.add(shown["state"])
-            if shown["state"] == "recording" and "end_sample" in points[0]:
+            states.add(shown.state)
+            if shown.state == "recording" and "end_sample" in points[0]:
                 inside = [p for p in points if p["first_sample"] <= time_s * RATE < p["end_sample"]]
-                assert not inside or shown["point"] in [p["number"] + 1 for p in inside]
+                assert not inside or shown.details.point in [p["number"] + 1 for p in inside]
         assert "recording" in states
         assert ("driven" in states) is (name in ("multisine-1", "sweep-1", "stepped-sine-up"))
 
@@ -254,12 +249,12 @@ def test_a_resumed_recording_with_another_plan_goes_on_in_its_parts(tmp_path):
         assert replay.duration_s == pytest.approx(sum(lengths))
         replay.seek(lengths[0] + 0.01)
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert (shown["part"], shown["time_s"]) == (2, pytest.approx(0.01, abs=1e-3))
+        assert (shown.details.part, shown.details.time_s) == (2, pytest.approx(0.01, abs=1e-3))
         assert [line["is"] for line in replay.lines(0)].count("part") == 2
         last = recording.parts[1].points[-1]
         replay.seek(lengths[0] + last["end_sample"] / RATE - 0.05)
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert (shown["state"], shown["level"]) == ("recording", pytest.approx(last["level"], rel=1e-3))
+        assert (shown.state, shown.details.level) == ("recording", pytest.approx(last["level"], rel=1e-3))
         bins = replay.bins(0)[1]
         assert set(bins["part"]) == {1, 2}
         assert bins["end_s"][bins["part"] == 2][0] == pytest.approx(BIN_S)
@@ -277,14 +272,14 @@ def test_where_one_row_of_several_was_stored_the_time_is_still_that_of_the_sampl
         lock = next(event for event in part.events if event.get("state") == "locked")
         replay.seek(lock["sample"] / RATE + 0.15)  # between the records
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert shown["lock"] == "locked"
-        assert math.isnan(shown["force_n"])
-        assert shown["voltage_v"] == pytest.approx(0.4, rel=0.5)
+        assert shown.details.lock == "locked"
+        assert math.isnan(shown.details.force_n)
+        assert shown.details.voltage_v == pytest.approx(0.4, rel=0.5)
         told = next(n for n, line in enumerate(replay._told) if line.get("number") == point["number"])
         replay.seek((replay._times[told] - 100) / RATE)
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert (shown["state"], shown["point"]) == ("recording", 2)
-        assert shown["force_n"] == pytest.approx(point["force_n"], rel=0.02)
+        assert (shown.state, shown.details.point) == ("recording", 2)
+        assert shown.details.force_n == pytest.approx(point["force_n"], rel=0.02)
         bins = replay.bins(0)[1]
         np.testing.assert_allclose(np.diff(bins["end_s"]), BIN_S)
 
@@ -325,13 +320,13 @@ def test_rows_of_an_earlier_version_and_a_journal_that_was_cut_short_are_replaye
     rewritten(tmp_path / "old.h5", watched[0], fields, end=end)
     with Replay(tmp_path / "old.h5", at_end=True) as replay:
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert shown["output_off"]
-        assert shown["cause"] == ("the plan was carried out" if end else "")
+        assert shown.details.output_off
+        assert shown.cause == ("the plan was carried out" if end else "")
         replay.seek(replay.duration_s / 2)
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert math.isnan(shown["phase_error_deg"])
-        assert math.isnan(shown["target"])
-        assert 24.0 < shown["frequency_hz"] < 25.0
+        assert math.isnan(shown.details.phase_error_deg)
+        assert math.isnan(shown.details.target)
+        assert 24.0 < shown.details.frequency_hz < 25.0
         assert replay.bins(0)[1].size > 10
 
 
@@ -340,12 +335,12 @@ def test_a_recording_of_a_trip_ends_with_its_cause(tmp_path):
     rig.run(plan_with(levels_v=(0.4, 0.8)), bench=bench, output=tmp_path / "run.h5").close()
     with Replay(tmp_path / "run.h5", at_end=True) as replay:
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert shown["state"] == "tripped"
-        assert "force above its limit" in shown["cause"]
+        assert shown.state == "tripped"
+        assert "force above its limit" in shown.cause
         guard = next(line for line in replay.lines(0) if line.get("state") == "ramping")
         replay.seek(guard["sample"] / RATE + 0.1)
         shown = shown_frame(replay.frame(), replay.facts, replay.lines(0))
-        assert (shown["state"], shown["guard"]) == ("tripped", "ramping down")
+        assert (shown.state, shown.details.guard) == ("tripped", "ramping down")
         assert replay.frame().state["guard"] == GuardMode.RAMPING
 
 

@@ -76,7 +76,7 @@ def test_the_cookie_is_for_this_server_alone_and_no_script_reads_it(server):
 def test_without_the_cookie_nothing_is_shown(server, run, path):
     answer = Visitor(server.url).get(path, X_Token=server.keys.action)
     assert answer.status == 403
-    assert run.facts["bench"] not in answer.text
+    assert run.facts.bench not in answer.text
 
 
 def test_without_the_cookie_nothing_is_stopped(server, run):

@@ -1,5 +1,6 @@
 """How long a run that was asked to stop is waited for, by a clock of the test."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -25,7 +26,8 @@ def followed(monkeypatch, tmp_path):
 
     def follow(ramp_s, timeout_s=None, begun=True):
         clock = SimpleNamespace(monotonic=lambda: clock.now_s, now_s=1000.0)
-        run = Held(limits={"ramp_down_s": ramp_s})
+        run = Held()
+        run.facts = replace(run.facts, limits=replace(run.facts.limits, ramp_down_s=ramp_s))
         run.step(GuardMode.RAMPING, voltage_v=0.25)
         monkeypatch.setattr(shutdown_monitor, "time", clock)
         monkeypatch.setattr(shutdown_monitor, "lives", lambda folder: True)

@@ -5,18 +5,22 @@ import re
 import subprocess
 import sys
 import threading
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
+from rig.live.facts import LimitFacts
+from rig.live.reader import ReplayState
 from rig.monitor import server, stopping
 from rig.monitor.sources import Latest, chosen
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode
-from tests.rig.monitor.scripted import Scripted
+from tests.rig.monitor.scripted import Scripted, facts
 from tests.rig.monitor.visitor import Visitor, served
 from tests.waiting import wait_until
 
-LIMITS = {"limits": {"voltage_v": 9.5, "displacement_m": 0.006, "frequency_hz": [8, 600], "ramp_down_s": 0.5}}
+LIMITS = {"limits": LimitFacts(voltage_v=9.5, displacement_m=0.006, frequency_hz=(8.0, 600.0), ramp_down_s=0.5)}
 
 
 @pytest.fixture
@@ -175,7 +179,7 @@ def test_without_a_run_there_is_nothing_to_stop():
 
 def test_a_recording_cannot_be_stopped_and_frightens_nobody(run, inside):
     run.refuses = True
-    run.replay_state = lambda: {"time_s": 0.0, "duration_s": 1.0, "playing": True, "speed": 1.0}
+    run.player = SimpleNamespace(replay_state=lambda: ReplayState(0.0, 1.0, playing=True, speed=1.0))
     assert heading(inside.stop()) == "THIS IS A RECORDING"
 
 
@@ -191,7 +195,7 @@ def test_what_a_run_says_of_itself_is_text_on_the_page(run, inside):
     run.step(GuardMode.OFF, EndReason.STOP_REQUESTED)
     run.tell({"is": "end", "text": '<script>alert("x")</script>'})
     assert "<script" not in inside.get("/stopping").text
-    run.facts["bench"] = "</title><script>x</script>"
+    run.facts = replace(run.facts, bench="</title><script>x</script>")
     assert "</title><script>" not in inside.get("/").text
 
 
@@ -223,6 +227,6 @@ def test_a_file_is_the_same_by_another_spelling(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "real")
     for given in ("link/run.h5", "real/../link/run.h5", "link", "real/../real"):
         wanted = chosen(tmp_path / given)._wanted
-        assert wanted({"recording": str(tmp_path / "real" / "run.h5")})
-        assert wanted({"recording": str(tmp_path / "link" / "run.h5")})
-        assert not wanted({"recording": str(tmp_path / "run.h5")})
+        assert wanted(facts(recording=str(tmp_path / "real" / "run.h5")))
+        assert wanted(facts(recording=str(tmp_path / "link" / "run.h5")))
+        assert not wanted(facts(recording=str(tmp_path / "run.h5")))

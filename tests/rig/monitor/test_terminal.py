@@ -14,7 +14,7 @@ from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.watched import watched_facts
 from rig.live.layout import FRAME
-from rig.live.reader import Frame
+from rig.live.reader import Frame, ReplayState
 from rig.monitor.shown import as_json, shown_frame
 from rig.monitor.terminal import STALE_S, draw
 from rig.monitor.words import duration, event_text, figure, point_text, share_word, state_text
@@ -164,7 +164,7 @@ def test_before_the_first_frame_it_says_that_nothing_is_known():
 
 
 def test_a_replay_says_where_it_stands():
-    replay = {"time_s": 12.0, "duration_s": 60.0, "playing": False, "speed": 5.0}
+    replay = ReplayState(12.0, 60.0, playing=False, speed=5.0)
     text, _ = page(a_frame(age_s=0.0), [], (80, 24), replay=replay)
     assert re.search(r"REPLAY +12\.0 of 60\.0 s ━+─+ PAUSED", text)
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from rig.live.reader import ReplayState
 from tests.rig.monitor.browser.told import Told
 
 ESCAPE = "\ue00c"
@@ -12,11 +13,12 @@ class Replayed(Told):
 
     def __init__(self):
         super().__init__()
+        self.player = self
         self.state = {"time_s": 20.0, "duration_s": 62.0, "playing": True, "speed": 5.0}
         self.asked = []
 
     def replay_state(self):
-        return dict(self.state)
+        return ReplayState(**self.state)
 
     def control(self, action, value):
         self.asked.append((action, value))

@@ -1,6 +1,7 @@
 """A run that does what a test says, as it is watched: no loop, no files."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,13 +24,14 @@ FORCE = 0
 class Told:
     """A view of a run that settles at its third level, until a test says something else."""
 
+    generation = 0
+    player = None
+
     def __init__(self, process=1):
         plan = load_plan(PLAN)
         about = {"operator": "Ada", "specimen_serial": "no. 7", "armed": {"how": "virtual"}}
-        self.facts = watched_facts(
-            plan, bench_of(plan, PLAN), Path("/nowhere/told.h5"), about, started="2026-01-01T00:00:00+00:00"
-        )
-        self.facts["process"] = process
+        facts = watched_facts(plan, bench_of(plan, PLAN), Path("/nowhere/told.h5"), about, "2026-01-01T00:00:00+00:00")
+        self.facts = replace(facts, process=process)
         self.connected = True
         self.causes = []
         self.age_s = 0.0
@@ -94,6 +96,9 @@ class Told:
 
     def lines(self, first):
         return self._lines[first:]
+
+    def close(self):
+        """Do nothing."""
 
     def request_stop(self, cause):
         """Ramp down; a test says when the output is at 0 V."""
