@@ -3,8 +3,6 @@
 A list replaces the base's whole, so that what stands in lists keeps its required keys.
 """
 
-from typing import Any
-
 from rig.authoring.draft7 import Schema
 
 
@@ -83,7 +81,7 @@ def reachable(schema: Schema) -> Schema:
     return {**schema, "definitions": {name: definitions[name] for name in sorted(wanted)}}
 
 
-def _references(node: Any) -> set[str]:
+def _references(node: object) -> set[str]:
     if isinstance(node, list):
         return set().union(*map(_references, node)) if node else set()
     if not isinstance(node, dict):

@@ -8,14 +8,15 @@ import json
 import re
 import textwrap
 from collections.abc import Iterator
-from typing import Any
 
 from rig.authoring.draft7 import Schema
+from rig.bench.configuration import Table
 
 WIDTH = 110
+"""Longest line of a comment, characters; chosen to fit beside a page."""
 
 
-def commented(table: dict[str, Any], schema: Schema) -> str:
+def commented(table: Table, schema: Schema) -> str:
     """Return a TOML file that holds ``table``, with a comment for every key that the schema knows."""
     about = _about(str(schema["description"]), schema["title"])
     note = "A line such as `#key = value` is optional and shows the default: take the # away to change it."
@@ -32,7 +33,7 @@ def _text(words: str) -> list[str]:
 
 
 def _table(
-    given: dict[str, Any], node: Schema, definitions: Schema, path: tuple[str, ...], *, told: bool = True
+    given: Table, node: Schema, definitions: Schema, path: tuple[str, ...], *, told: bool = True
 ) -> Iterator[str]:
     """Yield the lines of a table: its plain keys, then the tables in it. Only given keys without comments unless ``told``."""
     keys = {name: _resolved(part, definitions, given.get(name)) for name, part in node["properties"].items()}
@@ -50,7 +51,7 @@ def _table(
             yield from _inner(name, given, keys[name], definitions, (*path, name))
 
 
-def _inner(name: str, given: dict[str, Any], node: Schema, definitions: Schema, path: tuple[str, ...]) -> Iterator[str]:
+def _inner(name: str, given: Table, node: Schema, definitions: Schema, path: tuple[str, ...]) -> Iterator[str]:
     """Yield the lines of a table inside another, or of a list of tables."""
     dotted = ".".join(path)
     if name not in given:
@@ -58,7 +59,9 @@ def _inner(name: str, given: dict[str, Any], node: Schema, definitions: Schema, 
         yield from _text(_meaning(node))
         yield f"#[[{dotted}]]" if "items" in node else f"#[{dotted}]"
         return
-    for number, item in enumerate(given[name] if "items" in node else [given[name]]):
+    tables = given[name] if "items" in node else [given[name]]
+    assert isinstance(tables, list | tuple)
+    for number, item in enumerate(tables):
         inside = _resolved(node["items"], definitions, item) if "items" in node else node
         yield ""
         yield from _text(_meaning(node)) if number == 0 else ()
@@ -69,7 +72,7 @@ def _inner(name: str, given: dict[str, Any], node: Schema, definitions: Schema, 
             yield from (f"{key} = {_value(value)}" for key, value in item.items())
 
 
-def _resolved(node: Schema, definitions: Schema, value: Any = None) -> Schema:
+def _resolved(node: Schema, definitions: Schema, value: object = None) -> Schema:
     """Return a schema with what it refers to; of a union, the variant that ``value`` belongs to."""
     out = dict(node)
     references = [part for part in [node, *node.get("allOf", ())] if "$ref" in part]
@@ -83,7 +86,7 @@ def _resolved(node: Schema, definitions: Schema, value: Any = None) -> Schema:
     return out
 
 
-def _fits(value: dict[str, Any], node: Schema) -> bool:
+def _fits(value: Table, node: Schema) -> bool:
     """Return whether a table may be of this variant: its keys are known, and its words are those of the variant."""
     keys = node.get("properties", {})
     return all(name in keys and value[name] == keys[name].get("const", value[name]) for name in value)
@@ -117,7 +120,7 @@ def _allowed(node: Schema) -> str:
     return f"{low} {high}".strip()
 
 
-def _value(value: Any) -> str:
+def _value(value: object) -> str:
     """Return a value as TOML writes it, in one line."""
     if isinstance(value, dict):
         inside = ", ".join(f"{key} = {_value(item)}" for key, item in value.items())

@@ -4,13 +4,14 @@ What TOML cannot hold (null) is left out. What a reader of draft 7 would ignore 
 words, ``prefixItems``, the ``discriminator`` of a union.
 """
 
-from typing import Any
+from pydantic.json_schema import JsonSchemaValue
 
 from rig.text.units import titled
 
-DRAFT = "http://json-schema.org/draft-07/schema#"
+Schema = JsonSchemaValue
+"""A JSON Schema, or a part of one."""
 
-Schema = dict[str, Any]
+DRAFT = "http://json-schema.org/draft-07/schema#"
 
 _NAMED = {"properties": "properties", "$defs": "definitions", "definitions": "definitions"}
 _LISTED = ("allOf", "anyOf", "oneOf")
@@ -20,7 +21,7 @@ _LEFT_OUT = ("title", "discriminator", "prefixItems")
 
 def draft7(schema: Schema) -> Schema:
     """Return a schema of pydantic in draft 7: definitions under ``definitions``, titles with units, unions with their tag."""
-    out: Schema = _converted(schema)
+    out = _converted(schema)
     for name, key in _tags(schema):
         variant = out["definitions"][name]
         variant["required"] = list(dict.fromkeys([key, *variant.get("required", ())]))
@@ -33,7 +34,7 @@ def plain(text: str) -> str:
     return "\n\n".join(part for part in paragraphs if part)
 
 
-def _tags(node: Any) -> set[tuple[str, str]]:
+def _tags(node: object) -> set[tuple[str, str]]:
     """Return name and tag of every definition that is a variant of a tagged union: a file must give the tag."""
     if isinstance(node, list):
         return set().union(*map(_tags, node)) if node else set()
@@ -49,10 +50,8 @@ def _name(reference: str) -> str:
     return reference.rpartition("/")[2]
 
 
-def _converted(node: Any, key: str = "") -> Any:
+def _converted(node: Schema, key: str = "") -> Schema:
     """Return a schema converted; ``key`` is the name of the property that it describes."""
-    if not isinstance(node, dict):
-        return node
     out: Schema = {"title": titled(key)} if key else {}
     for word, value in node.items():
         if word in _NAMED:
@@ -61,7 +60,7 @@ def _converted(node: Any, key: str = "") -> Any:
         elif word in _LISTED:
             out[word] = [_converted(part) for part in value if part != {"type": "null"}]
         elif word in _SINGLE:
-            out[word] = _converted(value)
+            out[word] = _converted(value) if isinstance(value, dict) else value
         elif word == "$ref":
             out[word] = f"#/definitions/{_name(value)}"
         elif word == "description":

@@ -5,12 +5,11 @@ import os
 import shutil
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 from rig.authoring.commented import commented
 from rig.authoring.draft7 import Schema
 from rig.authoring.schemas import schema_of
-from rig.bench.configuration import read_toml
+from rig.bench.configuration import Table, read_toml
 from rig.errors import ConfigurationError
 from rig.system.whole_file import whole_file
 from vibrolock.printable import shown
@@ -30,7 +29,7 @@ def new_file(
     kind: str = "backbone",
     bench: str | None = None,
     schema_file: Path | None = None,
-    table: dict[str, Any] | None = None,
+    table: Table | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Write a new ``"bench"``, ``"plan"``, ``"rig"`` or ``"sensors"`` and its schema; return the path of the schema's file.
@@ -91,11 +90,11 @@ def _reference(schema: Path, file: Path) -> str:
     return relative if relative.startswith(".") else f"./{relative}"
 
 
-def _start(name: str) -> dict[str, Any]:
+def _start(name: str) -> Table:
     return read_toml(Path(str(resources.files("rig.authoring"))) / "starts" / f"{name}.toml")
 
 
-def _plan(kind: str, bench: str | None) -> dict[str, Any]:
+def _plan(kind: str, bench: str | None) -> Table:
     """Return the table of the shipped plan of a kind, if possible for the bench, else with the bench replaced."""
     from rig.bench.configuration import shipped_names
     from rig.campaigns.kinds import KINDS

@@ -5,8 +5,6 @@ for a reason that a schema can express: an unknown key, a wrong type, a value ou
 Rules between numbers, such as a limit beyond a channel's range, stay with the program.
 """
 
-from typing import Any
-
 from pydantic import AliasChoices, BaseModel
 
 from rig.authoring.changes import Loosened, reachable, requirements
@@ -148,5 +146,5 @@ def _of_plan(model: type[BaseModel]) -> Schema:
 
 def _whole(schema: Schema, title: str) -> Schema:
     """Return a schema with its heading, and without what nothing refers to."""
-    described: dict[str, Any] = {"description": plain(schema.pop("description", ""))}
+    described = {"description": plain(schema.pop("description", ""))}
     return reachable({"$schema": DRAFT, "title": f"vibrolock {title}", **described, **schema})

@@ -2,18 +2,19 @@
 
 from importlib import resources
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from rig.bench.channels import Channel
-from rig.bench.configuration import Configured, find_toml, merged, read_toml, shipped_names, validated
+from rig.bench.configuration import Configured, Table, find_toml, merged, read_toml, shipped_names, validated
 from rig.bench.cross_checks import refuse
 from rig.bench.sensors import with_sensors
 from rig.errors import ConfigurationError
 from vibrolock.printable import shown
 
-HIGHEST_PART = 0.45  # of the sample rate; a phase-locked loop keeps to a quarter of its own accord
+HIGHEST_PART = 0.45
+"""Highest frequency of the output, over the sample rate; chosen: a tenth below Nyquist."""
 
 
 class DriverChoice(Configured):
@@ -21,8 +22,13 @@ class DriverChoice(Configured):
 
     name: str = Field(min_length=1)
     """Name of the driver, for instance ``virtual``; ``rig list`` shows those that are installed."""
-    options: dict[str, Any] = Field(default_factory=dict)
+    options: Table = Field(default_factory=dict)
     """What this driver needs to know; the driver checks it."""
+
+    def table(self, key: str) -> Table:
+        """Return a table among the options; empty if there is none."""
+        value = self.options.get(key)
+        return value if isinstance(value, dict) else {}
 
 
 class Limits(Configured):
@@ -238,7 +244,7 @@ def load_bench(name_or_path: str | Path) -> Bench:
     table = _with_base(name_or_path, ())
     sensors = table.pop("sensors", None)
     try:
-        table = table if sensors is None else with_sensors(table, sensors)
+        table = table if sensors is None else with_sensors(table, Path(str(sensors)))
     except ConfigurationError as error:
         raise ConfigurationError(f"{name_or_path}: {error}") from None
     bench = validated(Bench, table, str(name_or_path))
@@ -249,14 +255,14 @@ def load_bench(name_or_path: str | Path) -> Bench:
     return bench
 
 
-def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, Any]:
+def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> Table:
     """Return the table of a bench merged with its bases; ``over`` are the files for which this one is a base."""
     path = find_toml(name_or_path, _folder(), "bench")
     table = read_toml(path)
     if (sensors := table.get("sensors")) is not None:
         if not isinstance(sensors, str) or not sensors.endswith(".toml"):
             raise ConfigurationError(f"{name_or_path}: sensors = {shown(sensors)}: allowed is the path of a .toml file")
-        table["sensors"] = path.parent / sensors
+        table["sensors"] = str(path.parent / sensors)
     base = table.pop("base", None)
     if base is None:
         return table
@@ -272,7 +278,7 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> dict[str, An
     return _changed(_with_base(base, over), table)
 
 
-def _changed(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+def _changed(base: Table, table: Table) -> Table:
     """Return the base with the changes of ``table``; the base's driver options are dropped if the driver changes."""
     driver, other = base.get("driver"), table.get("driver")
     if (

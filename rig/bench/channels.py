@@ -3,7 +3,7 @@
 import math
 from datetime import date
 from enum import IntEnum
-from typing import Any, Self
+from typing import TYPE_CHECKING, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -11,11 +11,15 @@ from rig.bench.configuration import Configured
 from rig.bench.data_sheet import volts_per_unit
 from vibrolock.printable import shown
 
+if TYPE_CHECKING:
+    from pydantic.json_schema import JsonSchemaValue
+
 UNITS = {"force": "N", "drive": "m/s^2", "response": "m/s^2"}
 """Unit of a channel by its role; a monitor has any."""
 DATE = r"^(\d{4}-\d{2}-\d{2})?$"
 """Pattern of a day, or of no day."""
-SAME = 1e-9  # relative difference up to which two sensitivities are one
+SAME = 1e-9
+"""Relative difference up to which two sensitivities are one; chosen: far above rounding, far below any calibration."""
 
 
 def check_day(name: str, text: str) -> None:
@@ -39,7 +43,7 @@ class Role(IntEnum):
     """Anything else that is worth a column."""
 
 
-def _rules(schema: dict[str, Any]) -> None:
+def _rules(schema: "JsonSchemaValue") -> None:
     """Add to a schema what depends on the role, and the three ways in which a sensitivity is given."""
     schema["required"] = [key for key in schema["required"] if key != "sensitivity_v_per_unit"]
     ways = [{"required": [key]} for key in ("sensitivity_v_per_unit", "sensitivity", "serial_number")]
@@ -106,7 +110,7 @@ class Channel(Configured):
 
     @model_validator(mode="before")
     @classmethod
-    def _from_data_sheet(cls, table: Any) -> Any:
+    def _from_data_sheet(cls, table: object) -> object:
         """Fill in ``unit`` and ``sensitivity_v_per_unit`` where role and data sheet say them."""
         if not isinstance(table, dict):
             return table

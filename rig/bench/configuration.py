@@ -5,7 +5,7 @@ import tomllib
 from collections.abc import Mapping
 from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import TYPE_CHECKING, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -15,11 +15,23 @@ from rig.system.text_files import read_text
 from vibrolock.described import Described
 from vibrolock.printable import shown
 
+Table = dict[str, object]
+"""A table of a TOML file, before a model has validated it."""
+
 LARGEST_TOML_BYTES = 1_000_000
-MOST_DOTS = 100  # between two commas of a line: the parser's time grows with the square of the number of a key's parts
-MOST_FAULTS = 5  # in one message
-AS_CLOSE = 0.05  # of the likeness of two words
-FEW_NAMES = 10  # listed in one message
+"""Largest TOML file that is read, bytes; chosen: a thousand times that of the shipped ones."""
+MOST_DOTS = 100
+"""Most dots between two commas of a line; chosen: the parser's time grows with the square of the number of a key's parts."""
+MOST_FAULTS = 5
+"""Most faults in one message; chosen."""
+AS_CLOSE = 0.05
+"""Difference of two likenesses (0 to 1) up to which two words count as equally close; chosen."""
+FEW_NAMES = 10
+"""Most names that a message lists; chosen."""
+
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 
 class Configured(Described):
@@ -31,7 +43,7 @@ class Configured(Described):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
-def merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def merged(base: Table, changes: Table) -> Table:
     """Return ``base`` with ``changes``: tables are merged key by key, any other value is replaced."""
     out = dict(base)
     for key, value in changes.items():
@@ -71,7 +83,7 @@ def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> Table:
     """Return the table in a TOML file of up to 1 MB.
 
     Raises `ConfigurationError`, naming the file and the line or key, if the file cannot be read or holds a value that is never
@@ -91,7 +103,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     return table
 
 
-def _refuse_absurd(table: Any, source: str) -> None:
+def _refuse_absurd(table: object, source: str) -> None:
     if (fault := objection_to(table)) is not None:
         raise ConfigurationError(f"{source}: {fault}")
 
@@ -116,14 +128,14 @@ def validated(model: type[Model], table: Mapping[str, object], source: str) -> M
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
     """Return the faults of a validation error in one line; if there are many, only the first few."""
     count = error.error_count()
-    details = [dict(detail) for detail in error.errors(include_url=False)[: 4 * MOST_FAULTS]]
+    details = error.errors(include_url=False)[: 4 * MOST_FAULTS]
     keys = _keys(model)
     faults = [_fault(detail, keys) for detail in details if not _follows(detail, details)][:MOST_FAULTS]
     more = [f"and {count - len(faults)} more"] if count > len(details) or len(faults) == MOST_FAULTS < count else []
     return "; ".join(faults + more)
 
 
-def _follows(detail: dict[str, Any], details: list[dict[str, Any]]) -> bool:
+def _follows(detail: "ErrorDetails", details: "list[ErrorDetails]") -> bool:
     """Return whether the fault only says that a list is too short because its items are faulty."""
     inside = (other for other in details if other["loc"][: len(detail["loc"])] == detail["loc"] and other is not detail)
     return detail["type"] == "too_short" and any(inside)
@@ -136,7 +148,7 @@ def _closest(key: str, keys: set[str]) -> list[str]:
     return sorted(one for one, like in zip(found, likeness, strict=True) if like >= max(likeness) - AS_CLOSE)
 
 
-def _fault(detail: dict[str, Any], keys: set[str]) -> str:
+def _fault(detail: "ErrorDetails", keys: set[str]) -> str:
     path = ""
     for part in detail["loc"]:
         if isinstance(part, int):
@@ -165,7 +177,7 @@ def _fault(detail: dict[str, Any], keys: set[str]) -> str:
     return f"{path} = {shown(detail['input'])}: allowed is {message}".replace("a valid tuple", "a list")
 
 
-def _keys(model: Any) -> set[str]:
+def _keys(model: object) -> set[str]:
     """Return all keys of a model and of the models inside it."""
     if isinstance(model, type) and issubclass(model, BaseModel):
         fields = model.model_fields

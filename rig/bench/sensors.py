@@ -4,12 +4,12 @@ from calendar import monthrange
 from datetime import date
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from rig.bench.channels import DATE, check_day
-from rig.bench.configuration import Configured, read_toml, validated
+from rig.bench.configuration import Configured, Table, read_toml, validated
 from rig.bench.data_sheet import volts_per_unit
 from rig.errors import ConfigurationError
 from vibrolock.printable import shown
@@ -93,7 +93,7 @@ def load_sensors(path: Path) -> dict[str, Sensor]:
     return {sensor.serial_number: sensor for sensor in validated(SensorFile, read_toml(path), str(path)).sensors}
 
 
-def with_sensors(table: dict[str, Any], path: Path) -> dict[str, Any]:
+def with_sensors(table: Table, path: Path) -> Table:
     """Return the table of a bench, its channels completed by the sensors in a file.
 
     Raises `ConfigurationError` for a channel that says itself what the file says of its sensor, and for one that has no
@@ -106,7 +106,7 @@ def with_sensors(table: dict[str, Any], path: Path) -> dict[str, Any]:
     return {**table, "channels": [_completed(one, index, sensors, path) for index, one in enumerate(channels)]}
 
 
-def _completed(channel: Any, index: int, sensors: dict[str, Sensor], path: Path) -> Any:
+def _completed(channel: object, index: int, sensors: dict[str, Sensor], path: Path) -> object:
     if not isinstance(channel, dict) or not isinstance(number := channel.get("serial_number", ""), str) or not number:
         return channel
     field = f"channels[{index}].serial_number = {shown(number)}"

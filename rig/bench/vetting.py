@@ -4,7 +4,6 @@ Models can then rely on numbers whose squares do not overflow, on texts without 
 """
 
 from collections.abc import Iterator
-from typing import Any
 from unicodedata import category
 
 from vibrolock.printable import shown
@@ -14,11 +13,14 @@ DEEPEST = 16
 SMALLEST, LARGEST = 1e-30, 1e30
 """Allowed magnitudes of a number other than 0, in any SI unit: every quantity of a vibration test lies inside."""
 LARGEST_INTEGER = 2**63 - 1
+"""Largest magnitude of a whole number: that of TOML and HDF5, 64 bits."""
 LONGEST_KEY = 200
+"""Longest key, characters; chosen: no name of ours is a quarter as long."""
 LONGEST_TEXT = 10_000
+"""Longest text, characters; chosen: some pages of remarks."""
 
 
-def objection_to(table: Any) -> str | None:
+def objection_to(table: object) -> str | None:
     """Return path and fault of the first value that is not allowed; None if all values are allowed."""
     for path, depth, value in _values(table):
         fault = _fault(value) if depth <= DEEPEST else f"is nested too deeply: allowed are up to {DEEPEST} levels"
@@ -27,9 +29,9 @@ def objection_to(table: Any) -> str | None:
     return None
 
 
-def _values(table: Any) -> Iterator[tuple[str, int, Any]]:
+def _values(table: object) -> Iterator[tuple[str, int, object]]:
     """Yield path, depth and value of all entries of a table, without recursion; do not descend below `DEEPEST` levels."""
-    left: list[tuple[str, int, Any]] = [("", 0, table)]
+    left: list[tuple[str, int, object]] = [("", 0, table)]
     while left:
         path, depth, value = left.pop()
         yield path, depth, value
@@ -44,7 +46,7 @@ def _values(table: Any) -> Iterator[tuple[str, int, Any]]:
         left += reversed(items)
 
 
-def _fault(value: Any) -> str | None:
+def _fault(value: object) -> str | None:
     """Return the fault of one value, or None."""
     if isinstance(value, dict):
         wrong = next((key for key in value if not isinstance(key, str) or not _is_a_key(key)), None)

@@ -6,18 +6,21 @@ of a command has the name of the field that it fills, with the prefix ``no_`` if
 """
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING
 
 import typer
 from typer.main import get_command
 
 from rig.cli.studies import installed_command
 
+if TYPE_CHECKING:
+    from typer._click.core import Command
+
 
 def flags(app: typer.Typer) -> dict[str, str]:
     """Return the option for each field name, over all commands."""
     found: dict[str, str] = {}
-    waiting: list[Any] = [get_command(app)]
+    waiting: list[Command] = [get_command(app)]
     while waiting:
         command = installed_command(waiting.pop())
         waiting += getattr(command, "commands", {}).values()

@@ -3,14 +3,18 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.options import Json, Overwrite, keep_existing
 
 if TYPE_CHECKING:
+    from rig.bench import Bench
+    from rig.campaigns.planning.plan import Plan
     from rig.rehearsal.comparison import Comparison
+    from rig.rehearsal.rehearsal import Draw
+    from rig.rehearsal.remedies import Effect
     from rig.results.rehearsal.rehearse import Listener, Subject
 
 
@@ -68,10 +72,10 @@ def rehearse_(
         _write_twin(subject, twin, output, overwrite)
         return
     _check_outputs(subject, output, improve, figure, overwrite)
-    _rehearse(subject, output, improve, figure, {"overwrite": overwrite, "jobs": jobs, "json": json})
+    _rehearse(subject, output, improve, figure, overwrite=overwrite, jobs=jobs, json=json)
 
 
-def _plan_and_bench(plan: str, bench: str | None) -> tuple[Any, Any]:
+def _plan_and_bench(plan: str, bench: str | None) -> "tuple[Plan, Bench]":
     from rig.bench import load_bench
     from rig.campaigns.plans import bench_of, load_plan
 
@@ -114,7 +118,16 @@ def _check_outputs(
         check_figure(figure, overwrite)
 
 
-def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Path | None, how: dict[str, Any]) -> None:
+def _rehearse(
+    subject: "Subject",
+    output: Path,
+    improve: Path | None,
+    figure: Path | None,
+    *,
+    overwrite: bool,
+    jobs: int,
+    json: bool,
+) -> None:
     from rig.figures.files import plot
     from rig.rehearsal.report import lines, summary
     from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
@@ -123,17 +136,17 @@ def _rehearse(subject: "Subject", output: Path, improve: Path | None, figure: Pa
 
     request = request_for(subject)
     with Rehearsing(subject.draws) as listener:
-        found = rehearse_into(request, output, overwrite=how["overwrite"], listener=listener, jobs=how["jobs"])
+        found = rehearse_into(request, output, overwrite=overwrite, listener=listener, jobs=jobs)
     second = None
     if improve is not None:
         with Rehearsing(subject.draws) as listener:
-            found, second = improve_into(request, found, output, improve, listener=listener, jobs=how["jobs"])
+            found, second = improve_into(request, found, output, improve, listener=listener, jobs=jobs)
     if figure is not None:
         plot(output, figure)
     facts = {**summary(found), "file": str(output)}
     if improve is not None:
         facts["improved"] = None if second is None else {**summary(second), "plan": str(improve)}
-    if how["json"]:
+    if json:
         print_json(facts)
         return
     for line in lines(printable_strings(facts)):
@@ -171,7 +184,7 @@ class Rehearsing:
     def __exit__(self, *_: object) -> None:
         self.bar.stop()
 
-    def draw(self, draw: Any, done: int) -> None:
+    def draw(self, draw: "Draw", done: int) -> None:
         """Show a draw."""
         self.bad += 0 if draw.trial.completed else 1
         text = f"rehearsing, {done - self.bad} well" if done >= self.bad else "rehearsing"
@@ -179,7 +192,7 @@ class Rehearsing:
         if not self.terminal and (done % max(1, self.total // 10) == 0 or done == self.total):
             print(f"{done} of {self.total} draws, {self.bad} did not end well", file=sys.stderr, flush=True)
 
-    def effect(self, effect: Any) -> None:
+    def effect(self, effect: "Effect") -> None:
         """Show a remedy that was tried."""
         (well, then), (trips, later) = effect.ends_well, effect.trips
         text = f"tried {effect.name}: ends well {well:.3f} -> {then:.3f}, trips {trips:.3f} -> {later:.3f}"

@@ -1,11 +1,9 @@
 """``rig replay``: a recording as it was, on the page or in a terminal."""
 
-import inspect
 import sys
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,15 +14,7 @@ if TYPE_CHECKING:
     from rig.monitor.process import Serving
 
 
-def _of_a_page_later(**given: Any) -> "Callable[[], Serving]":
-    """Return what makes the options of a page: a terminal view does without the page's libraries."""
-    return partial(of_a_page, **given)
-
-
-_of_a_page_later.__signature__ = inspect.signature(of_a_page)  # type: ignore[attr-defined]
-
-
-@with_options(_of_a_page_later)
+@with_options(of_a_page, later=True)  # a terminal view does without the page's libraries
 def replay_(
     *,
     file: Annotated[Path, typer.Argument(help="Recording to replay.")],

@@ -2,19 +2,21 @@
 
 import inspect
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rig.cli.monitor_process import monitor_process
 from rig.cli.options import Overwrite
-from rig.cli.page_beside import page_beside
 
 if TYPE_CHECKING:
     from rig.arming.arming import Arm, ArmingRequest
     from rig.arming.run_options import RunOptions
+    from rig.text.column import Column
 
 Seed = Annotated[int, typer.Option(help="Seed of a virtual rig's noise.", min=0)]
 SeedOfTheRest = Annotated[int | None, typer.Option(help="Seed of a virtual rig's noise in the rest.", min=0)]
@@ -56,8 +58,13 @@ def of_a_further_part(
     return RunOptions(seed=seed, realtime=realtime, arm=_arm_from(arm), about=about)
 
 
-def with_options(build: Callable[..., Any]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Replace the parameter ``options`` of a command by those of ``build``; the command receives the result of ``build``."""
+def with_options(
+    build: Callable[..., object], *, later: bool = False
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Replace the parameter ``options`` of a command by those of ``build``; the command receives the result of ``build``.
+
+    With ``later`` it receives a function that returns that result.
+    """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         shared = inspect.signature(build).parameters
@@ -65,9 +72,9 @@ def with_options(build: Callable[..., Any]) -> Callable[[Callable[..., None]], C
         for parameter in inspect.signature(command).parameters.values():
             parameters += shared.values() if parameter.name == "options" else [parameter]
 
-        def call(**given: Any) -> None:
-            options = build(**{name: given.pop(name) for name in shared})
-            command(**given, options=options)
+        def call(**given: object) -> None:
+            built = partial(build, **{name: given.pop(name) for name in shared})
+            command(**given, options=built if later else built())
 
         return _with_parameters(call, command, parameters)
 
@@ -78,8 +85,8 @@ def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[.
     """As `with_options`, with ``--monitor`` for a page beside the run."""
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        def call(monitor: Monitor = False, **given: Any) -> None:
-            with page_beside(monitor):
+        def call(monitor: Monitor = False, **given: object) -> None:
+            with monitor_process(monitor):
                 command(**given)
 
         added = inspect.signature(call).parameters["monitor"]
@@ -103,7 +110,7 @@ def _with_parameters(
 
 
 @contextmanager
-def shown(options: "RunOptions", columns: Any) -> "Iterator[RunOptions]":
+def shown(options: "RunOptions", columns: "Sequence[Column]") -> "Iterator[RunOptions]":
     """Add a display of the run's points to the options; ``columns`` are those of its kind of campaign.
 
     On a terminal, say first how to watch and stop the run from another.

@@ -1,11 +1,14 @@
 """``rig schema`` and ``rig new``: what an editor checks files by, and files to begin with."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rig.cli.options import Overwrite
+
+if TYPE_CHECKING:
+    from rig.bench.configuration import Table
 
 
 def schema(
@@ -108,10 +111,10 @@ def _mapping(files: list[Path], output: Path, format_: str, overwrite: bool) -> 
     )
 
 
-def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_code: bool) -> dict[str, Any]:
+def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_code: bool) -> "Table":
     """Return the table of a bench whose specimen is a structured model."""
-    from rig.authoring.structured_rig import bench_like, structured_bench, structured_model
     from rig.errors import ConfigurationError
+    from rig.results.structured.virtual_bench import bench_like, structured_bench, structured_model
 
     if what != "rig":
         raise ConfigurationError(f"`source` = {source}: a model becomes a rig, allowed is `rig new rig`")

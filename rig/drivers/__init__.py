@@ -5,9 +5,9 @@ The names of this distribution's own drivers always mean these. Looking through 
 a virtual rig, so it is done for other names only.
 """
 
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
-from typing import Any
 
 from rig.bench import Bench
 from rig.daq import DAQ
@@ -49,7 +49,7 @@ def make_daq(bench: Bench, seed: int = 0) -> DAQ:
             f"driver.name = {name!r}: there is no such driver; installed are {', '.join(sorted(found)) or 'none'}"
         )
     try:
-        driver: Any = found[name].load()
+        driver: Callable[[Bench, int], object] = found[name].load()
     except (ImportError, AttributeError) as error:
         raise ConfigurationError(f"driver.name = {name!r}: its code cannot be imported: {error}") from error
     try:

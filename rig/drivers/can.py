@@ -1,11 +1,9 @@
 """`CanDAQ`: a device on a CAN bus."""
 
-from typing import Any
-
 from pydantic import Field
 
 from rig.bench import Bench
-from rig.bench.configuration import validated
+from rig.bench.configuration import Table, validated
 from rig.drivers.wire import WireDAQ, WireOptions
 from rig.wire.can.bus import FrameBus, PythonCanBus
 from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
@@ -33,7 +31,7 @@ class CanOptions(WireOptions):
     """A definition with other identifiers; by default the shipped one for the bench's number of channels."""
     baud: int = Field(3_000_000, ge=9600)
     """``slcan``: baud rate of the serial line."""
-    backend: dict[str, Any] = Field(default_factory=dict)
+    backend: Table = Field(default_factory=dict)
     """Further keyword arguments of python-can's backend, such as its bit timing; they override the keys above."""
 
     @property

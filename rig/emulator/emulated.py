@@ -8,14 +8,15 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
-from typing import Any, Self
+from typing import Self, TypedDict
 
 from rig import errors
 from rig.bench import Bench, DriverChoice
-from rig.bench.configuration import validated
+from rig.bench.configuration import Table, validated
 from rig.emulator.settings import EmulatorSettings
 
 ENDING_S = 10.0
+"""Longest time for the process to end, s; chosen."""
 LOCKSTEP_S = 60.0
 """Watchdog and time-out of a bench whose device waits for the host, s."""
 
@@ -23,11 +24,26 @@ HARDWARE_S = 1.0
 """The same watchdog where the device does not report itself as simulated, s: drivers allow no longer one."""
 
 
-def driver_options(options: dict[str, Any], *, lockstep: bool, as_hardware: bool = False) -> dict[str, Any]:
+def driver_options(options: Table, *, lockstep: bool, as_hardware: bool = False) -> Table:
     """Options of a driver that reaches an emulator; with long time-outs where the device waits for the host."""
     watchdog_s = HARDWARE_S if as_hardware else LOCKSTEP_S
     patience = {"watchdog_s": watchdog_s, "timeout_s": LOCKSTEP_S} if lockstep else {}
     return {**patience, **options}
+
+
+class Reached(TypedDict):
+    """Facts on an emulator that can be reached, of `rig.emulator.process.Ready`."""
+
+    options: Table
+
+
+class Said(TypedDict, total=False):
+    """A line of the emulator's process."""
+
+    ready: Reached
+    error: str
+    message: str
+    counted: dict[str, int]
 
 
 class Emulator:
@@ -37,9 +53,7 @@ class Emulator:
     Errors: `ConfigurationError` or a `DaqError` for what the emulator refuses.
     """
 
-    def __init__(
-        self, bench: Bench, wire: str = "serial", *, options: dict[str, Any] | None = None, **settings: Any
-    ) -> None:
+    def __init__(self, bench: Bench, wire: str = "serial", *, options: Table | None = None, **settings: object) -> None:
         table = {"wire": wire, "bench": bench.model_dump(), **settings}
         self._settings = validated(EmulatorSettings, table, "emulator")
         self._options = options or {}
@@ -67,14 +81,14 @@ class Emulator:
         self.bench = self._settings.bench.model_copy(update={"driver": driver})
         return self
 
-    def _heard(self) -> dict[str, Any]:
+    def _heard(self) -> Said:
         assert self.process is not None
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
         if not line:
             self.stop()
             raise errors.DaqRefused("the emulator ended before it could be reached")
-        said: dict[str, Any] = json.loads(line)
+        said: Said = json.loads(line)
         if "error" in said:
             self.process.wait(ENDING_S)
             self.stop()
@@ -120,8 +134,8 @@ def emulated(
     *,
     lockstep: bool = True,
     seed: int = 0,
-    options: dict[str, Any] | None = None,
-    **settings: Any,
+    options: Table | None = None,
+    **settings: object,
 ) -> Iterator[Bench]:
     """Emulate a virtual bench over ``serial`` or ``can`` while the context lasts; gives a bench that reaches the emulator.
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rig.bench.configuration import Table
 from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqRefused
 from rig.wire.link import Link
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def device_end(settings: EmulatorSettings) -> Iterator[tuple[Link, dict[str, Any]]]:
+def device_end(settings: EmulatorSettings) -> Iterator[tuple[Link, Table]]:
     """The device's end of a wire, open, and the driver options with which a bench finds the other end.
 
     Raises `ConfigurationError`, `rig.errors.DaqError`.
@@ -33,7 +34,7 @@ def device_end(settings: EmulatorSettings) -> Iterator[tuple[Link, dict[str, Any
         yield link, options
 
 
-def driver_options_of(settings: EmulatorSettings, path: str) -> dict[str, Any]:
+def driver_options_of(settings: EmulatorSettings, path: str) -> Table:
     """Driver options with which a bench finds a device at the other end of a port."""
     if settings.wire == "serial":
         return {"port": path}
@@ -56,7 +57,7 @@ def _slcan(settings: EmulatorSettings, descriptor: int) -> Link:
     return _can_link(settings, SlcanBus(descriptor, settings.timing, adapter=True))
 
 
-def _can_interface(settings: EmulatorSettings) -> tuple[Link, dict[str, Any]]:
+def _can_interface(settings: EmulatorSettings) -> tuple[Link, Table]:
     from rig.wire.can.bus import PythonCanBus
 
     assert settings.interface is not None
@@ -72,8 +73,8 @@ def _can_link(settings: EmulatorSettings, bus: "FrameBus") -> Link:
     return CanLink(bus, len(settings.bench.channels), settings.timing, settings.node, device=True)
 
 
-def _can_options(settings: EmulatorSettings) -> dict[str, Any]:
-    options: dict[str, Any] = {"fd": settings.fd, "node": settings.node, "bitrate": settings.bitrate}
+def _can_options(settings: EmulatorSettings) -> Table:
+    options: Table = {"fd": settings.fd, "node": settings.node, "bitrate": settings.bitrate}
     return {**options, "data_bitrate": settings.data_bitrate} if settings.fd else options
 
 

@@ -5,10 +5,10 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from rig.bench.configuration import Table
 from rig.emulator.device import Device
 from rig.emulator.faults import Faults
 from rig.emulator.firmware import started
@@ -21,7 +21,8 @@ from rig.wire.link import Link
 
 PRIORITY = 60
 """Of SCHED_FIFO: below the wall-clock loop's, above the kernel's interrupt threads."""
-MOST_AT_ONCE = 64  # messages read after a late deadline
+MOST_AT_ONCE = 64
+"""Most messages that are read after a late deadline; chosen: more than arrive in one stall."""
 
 
 def keep_serving(device: Device, should_end: Callable[[], bool], clock: Callable[[], float] = time.monotonic) -> None:
@@ -60,7 +61,7 @@ class Ready:
     """Facts on an emulator that can now be reached."""
 
     wire: str
-    options: dict[str, Any]
+    options: Table
     """Driver options of a bench that reaches it."""
     lockstep: bool
     scheduling: str

@@ -108,7 +108,7 @@ class Life:
         self._bring_down(now_s, DeviceState.LATCHED, flag=DeviceFlag.EMERGENCY_STOP)
 
     def begin_anew(self) -> None:
-        """Reset, as after a loss of supply: nobody is told of it."""
+        """Reset as after power loss, without notification."""
         self._sampling.stop()
         self._sampling.measured = 0
         self._fed_s = math.inf

@@ -10,7 +10,7 @@ FILES = 64
 LEAST = 8
 
 
-class Room(NamedTuple):
+class Capacity(NamedTuple):
     """For how many connections without a key there is room."""
 
     waiting: int = 2048
@@ -19,12 +19,12 @@ class Room(NamedTuple):
     """Those that are listened to. By TLS each takes a quarter of a megabyte."""
 
 
-def room() -> Room:
-    """Return the room for connections. The process's own limit of descriptors is raised for it as far as the system allows."""
-    kept, wanted = MOST_KNOWN + MOST_FEEDS + FILES, Room()
+def capacity() -> Capacity:
+    """Return how many connections there may be; raise the process's limit of descriptors as far as the system allows."""
+    kept, wanted = MOST_KNOWN + MOST_FEEDS + FILES, Capacity()
     found = _raised(kept + sum(wanted)) - kept
     strangers = max(min(wanted.strangers, found // 4), LEAST)
-    return Room(max(min(wanted.waiting, found - strangers), LEAST), strangers)
+    return Capacity(max(min(wanted.waiting, found - strangers), LEAST), strangers)
 
 
 def _raised(wanted: int) -> int:

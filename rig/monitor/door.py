@@ -15,7 +15,7 @@ import ssl
 from collections.abc import Callable
 from contextlib import suppress
 
-from rig.monitor.descriptors import Room, room
+from rig.monitor.descriptors import Capacity, capacity
 from rig.monitor.first_message import LARGEST, is_whole, shows_key
 from rig.monitor.security import Keys
 from rig.monitor.visits import Visit, Visits
@@ -43,10 +43,10 @@ class Door:
         tls: ssl.SSLContext | None,
         keys: Keys,
         connect: Callable[[Visit], asyncio.Protocol],
-        most: Room | None = None,
+        most: Capacity | None = None,
     ) -> None:
         self._listening, self._tls, self._keys, self._connect = listening, tls, keys, connect
-        self._most = most or room()
+        self._most = most or capacity()
         self._unfinished: dict[socket.socket, float] = {}
         self._queue: dict[socket.socket, float] = {}
         self._timers: dict[Callable[[], None], asyncio.TimerHandle] = {}

@@ -36,7 +36,7 @@ class Way:
             changes["block"] = max(bench.block, EMULATED_BLOCK)
         if self.rate_part != 1.0:
             rate_hz = self.rate_part * bench.sample_rate_hz
-            converter = {**bench.driver.options.get("converter", {}), "anti_alias_hz": FILTER_PART * rate_hz}
+            converter = {**bench.driver.table("converter"), "anti_alias_hz": FILTER_PART * rate_hz}
             options = {**bench.driver.options, "converter": converter}
             changes |= {"sample_rate_hz": rate_hz, "driver": bench.driver.model_copy(update={"options": options})}
         return bench.model_copy(update=changes)

@@ -112,7 +112,7 @@ def _bench(options: Options) -> Bench:
     if not options.scatter:
         return options.bench
     driver = options.bench.driver
-    scatter = {**driver.options.get("scatter", {}), "frequency": options.scatter}
+    scatter = {**driver.table("scatter"), "frequency": options.scatter}
     return options.bench.model_copy(
         update={"driver": driver.model_copy(update={"options": {**driver.options, "scatter": scatter}})}
     )

@@ -1,6 +1,6 @@
 """Options that all wires share, and the watchdog time that follows from them."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, field_validator
 from pydantic_core import PydanticCustomError
@@ -30,7 +30,7 @@ class WireOptions(Configured):
 
     @field_validator("queue_blocks", mode="wrap")
     @classmethod
-    def _number_or_auto(cls, value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+    def _number_or_auto(cls, value: object, validate: ValidatorFunctionWrapHandler) -> object:
         try:
             return validate(value)
         except ValidationError:  # one of each kind, which would be two faults of one key

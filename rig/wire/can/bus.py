@@ -6,21 +6,28 @@ import os
 import socket
 import time
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rig.errors import DaqDisconnected, DaqRefused
 from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.lean_import import lean_import
 from rig.wire.can.protocol import NODE_MASK
 
+if TYPE_CHECKING:
+    import can
+
 BUS_COUNTERS = ("error_frames", "expired_frames", "foreign_frames", "send_errors")
 """Counters of a bus: error frames, own frames not sent in time, foreign frames, failed sends."""
 
-_BUS_OFF = 0x40  # class of an error frame, in its identifier (Linux: can/error.h)
+_BUS_OFF = 0x40
+"""Class of an error frame, in its identifier (Linux: can/error.h)."""
 _RETRY_S = 2e-4
+"""Pause before a frame is sent again, s; chosen: about the duration of a classical frame at 1 Mbit/s."""
 _SOCKETS = ("socketcan", "udp_multicast")
-_ROOM_BYTES = 4 << 20
-_FORCED = 33  # SO_RCVBUFFORCE of Linux, beyond the system's limit where permitted
+_BUFFER_BYTES = 4 << 20
+"""Receive buffer that is asked for, bytes; chosen: seconds of a full bus."""
+_FORCED = 33
+"""SO_RCVBUFFORCE of Linux: a buffer beyond the system's limit, where permitted."""
 _GONE = {errno.ENODEV, errno.ENETDOWN, errno.ENXIO, errno.EIO, errno.EBADF}
 
 
@@ -66,11 +73,11 @@ class PythonCanBus(FrameBus):
         channel: str | int,
         timing: BusTiming,
         node: int | None = None,
-        options: dict[str, Any] | None = None,
+        options: dict[str, object] | None = None,
     ) -> None:
         super().__init__(f"{interface} {channel}")
         self._interface = interface
-        self._arguments: dict[str, Any] = {"interface": interface, "channel": channel, "bitrate": timing.bit_rate_hz}
+        self._arguments: dict[str, object] = {"interface": interface, "channel": channel, "bitrate": timing.bit_rate_hz}
         if timing.fd or interface == "udp_multicast":
             self._arguments["fd"] = timing.fd
         if timing.fd:
@@ -82,7 +89,7 @@ class PythonCanBus(FrameBus):
                 {"can_id": 0, "can_mask": 0x7FF, **shared},
             ]
         self._arguments.update(options or {})
-        self._bus: Any = None
+        self._bus: can.BusABC | None = None
 
     def open(self) -> None:
         """Open the interface. `DaqRefused` without its backend, `DaqDisconnected` without the interface itself."""
@@ -94,7 +101,7 @@ class PythonCanBus(FrameBus):
                 f"{self.name}: would send to the network; allowed only in a network namespace that has nothing but loopback"
             )
         try:
-            self._bus = can.Bus(**self._arguments)
+            self._bus = can.Bus(**self._arguments)  # type: ignore[arg-type]  # the backend checks them
         except (can.CanInterfaceNotImplementedError, ImportError) as error:
             raise DaqRefused(f"{self.name}: python-can has no such backend here: {_line(error)}") from None
         except (can.CanInitializationError, OSError) as error:
@@ -119,7 +126,7 @@ class PythonCanBus(FrameBus):
         left_s = timeout_s  # kept the same from call to call: backends are slow to change it
         while True:
             try:
-                self._bus.send(message, timeout=left_s)
+                self._opened().send(message, timeout=left_s)
                 return True
             except (can.CanError, OSError) as error:
                 if _code(error) in _GONE:
@@ -127,8 +134,6 @@ class PythonCanBus(FrameBus):
                 if time.monotonic() + _RETRY_S >= deadline:
                     self.counters["expired_frames" if _code(error) == errno.ENOBUFS else "send_errors"] += 1
                     return False
-            except AttributeError:
-                raise DaqDisconnected(f"{self.name}: is not open") from None
             time.sleep(_RETRY_S)
             left_s = max(deadline - time.monotonic(), 0.0)
 
@@ -137,11 +142,9 @@ class PythonCanBus(FrameBus):
         import can
 
         try:
-            message = self._bus.recv(timeout=timeout_s)
+            message = self._opened().recv(timeout=timeout_s)
         except (can.CanError, OSError, ValueError) as error:
             raise DaqDisconnected(f"{self.name}: is gone: {_line(error)}") from None
-        except AttributeError:
-            raise DaqDisconnected(f"{self.name}: is not open") from None
         if message is None:
             return None
         if message.is_error_frame:
@@ -153,6 +156,11 @@ class PythonCanBus(FrameBus):
             self.counters["foreign_frames"] += 1
             return None
         return Frame(message.arbitration_id, bytes(message.data), message.is_fd, message.is_extended_id)
+
+    def _opened(self) -> "can.BusABC":
+        if self._bus is None:
+            raise DaqDisconnected(f"{self.name}: is not open")
+        return self._bus
 
     def close(self) -> None:
         """Shut the backend down."""
@@ -169,7 +177,7 @@ def _enlarge(descriptor: int) -> None:
     with socket.socket(fileno=os.dup(descriptor)) as copy:
         for option in (_FORCED, socket.SO_RCVBUF):
             with contextlib.suppress(OSError):
-                copy.setsockopt(socket.SOL_SOCKET, option, _ROOM_BYTES)
+                copy.setsockopt(socket.SOL_SOCKET, option, _BUFFER_BYTES)
                 return
 
 

@@ -5,13 +5,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
 from rig.wire.can.lean_import import lean_import
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message, Signal
 
 STRUCT_CODES = {
     "u1": "B",
@@ -31,7 +34,7 @@ STRUCT_CODES = {
 class _Run(NamedTuple):
     """Signals of one type side by side."""
 
-    kind: np.dtype[Any]
+    kind: np.dtype[np.number]
     first: int
     """Byte at which they begin."""
     n_signals: int
@@ -119,7 +122,7 @@ class CompiledMessage:
             end = at + kind.itemsize
         return out + f"{self.length - end}x" * (self.length > end)
 
-    def _field(self, name: str) -> tuple[np.dtype[Any], int]:
+    def _field(self, name: str) -> tuple[np.dtype[np.number], int]:
         fields = self.dtype.fields
         assert fields is not None
         return fields[name][0], fields[name][1]
@@ -162,6 +165,7 @@ class Layout:
 
 
 LARGEST_DBC_BYTES = 10_000_000
+"""Largest DBC file that is read, bytes; chosen: a hundred times the definition of a large vehicle bus."""
 
 
 def compile_layout(path: str | Path) -> Layout:
@@ -179,7 +183,8 @@ def compile_text(text: str, source: str = "definition") -> Layout:
         import cantools
 
     try:
-        database: Any = cantools.database.load_string(text, "dbc")
+        database = cantools.db.can.Database()
+        database.add_dbc_string(text)
     except Exception as error:  # cantools has no common base for what a broken file may raise
         line = " ".join(str(error).split())
         raise ConfigurationError(f"{source}: is not a DBC file: {line}") from None
@@ -187,7 +192,7 @@ def compile_text(text: str, source: str = "definition") -> Layout:
     return Layout({message.name: _compiled(message, source) for message in messages})
 
 
-def _compiled(message: Any, source: str) -> CompiledMessage:
+def _compiled(message: "Message", source: str) -> CompiledMessage:
     where = f"{source}: message {message.name}"
     if message.is_multiplexed():
         raise ConfigurationError(f"{where}: is multiplexed, which cannot be compiled")
@@ -208,7 +213,7 @@ def _compiled(message: Any, source: str) -> CompiledMessage:
     return CompiledMessage(message.name, message.frame_id, message.length, bool(message.is_fd), dtype, scale, offset)
 
 
-def _first_byte(signal: Any, where: str) -> int:
+def _first_byte(signal: "Signal", where: str) -> int:
     """Place of a signal; a big-endian one starts at the highest bit of its first byte."""
     little = signal.byte_order == "little_endian"
     if signal.start % 8 != (0 if little else 7):
@@ -218,7 +223,7 @@ def _first_byte(signal: Any, where: str) -> int:
     return int(signal.start) // 8
 
 
-def _format(signal: Any, where: str) -> str:
+def _format(signal: "Signal", where: str) -> str:
     n_bytes, rest = divmod(signal.length, 8)
     kind = "f" if signal.is_float else "i" if signal.is_signed else "u"
     if rest or f"{kind}{n_bytes}" not in STRUCT_CODES:

@@ -6,15 +6,20 @@ import os
 import time
 from collections.abc import Callable
 from select import select
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rig.errors import DaqDisconnected
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.frames import BusTiming, Frame
 from rig.wire.can.slcan_lines import SlcanLines, encode_line, opening
 
+if TYPE_CHECKING:
+    import serial
+
 _READ_BYTES = 4096
+"""Most bytes of a read: a pseudo-terminal holds no more."""
 _NOBODY_S = 0.01
+"""Pause between two reads of a line without another end, s; chosen: such a line is always ready to be read."""
 
 
 class TextPort:
@@ -99,7 +104,9 @@ class TextPort:
 
 
 _OPENING_S = 0.1
+"""Longest time for each command that opens an adapter, s; chosen."""
 _CLOSING_S = 0.05
+"""Longest time for the command that closes an adapter, s; chosen."""
 
 
 class SlcanBus(FrameBus):
@@ -119,7 +126,7 @@ class SlcanBus(FrameBus):
         super().__init__(f"slcan {port}" if isinstance(port, str) else "slcan")
         self._given, self._timing, self._baud = port, timing, baud
         self._adapter = adapter
-        self._port: Any = None
+        self._port: serial.Serial | None = None
         self._text: TextPort | None = None
         self._on_bus = not adapter
         self._lines = SlcanLines(self.counters)

@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import serial
 from serial.tools import list_ports
@@ -17,8 +17,10 @@ from rig.wire.serial.reading import wait_of_a_read
 if sys.platform != "win32":
     import termios
 
-MASTER_DEVICE = (5, 2)  # /dev/ptmx in Linux's list of devices
-SLAVE_MAJORS = range(136, 144)  # /dev/pts/*
+MASTER_DEVICE = (5, 2)
+"""Major and minor number of /dev/ptmx (Linux, admin-guide/devices.txt)."""
+SLAVE_MAJORS = range(136, 144)
+"""Major numbers of /dev/pts/* (the same list)."""
 
 
 class PseudoTerminal(NamedTuple):
@@ -57,9 +59,11 @@ def is_pseudo_terminal(descriptor: int) -> bool:
     return os.ttyname(descriptor).startswith("/dev/ttys")  # macOS names its serial ports /dev/tty.* and /dev/cu.*
 
 
-BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)  # the last two: another program holds its lock
+BUSY = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
+"""Errors of a port that somebody else holds; the last two where another program holds its lock."""
 LASTING_NAMES = "/dev/serial/by-id"
-ALIKE = 0.8  # similarity of two names from which one is suggested for the other
+ALIKE = 0.8
+"""Similarity of two names (0 to 1) from which on one is suggested for the other; chosen."""
 
 
 def port_names() -> list[str]:
@@ -68,7 +72,7 @@ def port_names() -> list[str]:
     return sorted({*(str(port.device) for port in list_ports.comports()), *lasting})
 
 
-def open_port(path: str, baud: int) -> Any:
+def open_port(path: str, baud: int) -> serial.Serial:
     """Open a pyserial port (8N1, exclusive) and discard old input. Reading its descriptor never blocks.
 
     Raises `DaqBusy`, `DaqDisconnected` or `DaqRefused`. The message says which ports there are and what to do.

@@ -7,14 +7,20 @@ An input's ``read(timeout_s)`` returns up to `CHUNK` bytes as soon as there are 
 import errno
 import os
 import select
-from typing import Any, Protocol
+from typing import Protocol
 
-CHUNK = 4096  # bytes a read; a pseudo-terminal holds no more
-CONTROL_CHARACTERS = 6  # in the list that termios returns
-COARSE_S = 0.01  # from this wait on, the milliseconds of epoll are fine enough
+CHUNK = 4096
+"""Most bytes of a read: a pseudo-terminal holds no more."""
+CONTROL_CHARACTERS = 6
+"""Index of the control characters in the list that termios returns."""
+COARSE_S = 0.01
+"""Wait from which on the milliseconds of epoll are fine enough, s; chosen."""
 MILLISECOND_S = 0.001
-SYSTEM_WAIT_S = 0.1  # VTIME = 1
-SYSTEM_SLACK_S = 0.02  # the system's own time-out may be this late, for it counts clock ticks
+"""Resolution of epoll's time-out, s."""
+SYSTEM_WAIT_S = 0.1
+"""Time-out of a read with VTIME = 1, s (termios counts tenths of a second)."""
+SYSTEM_SLACK_S = 0.02
+"""Largest delay of that time-out, s: the system counts clock ticks, of 10 ms at most."""
 
 
 def wait_of_a_read(descriptor: int, least_bytes: int, tenths_s: int) -> None:
@@ -53,7 +59,7 @@ class PolledInput:
         os.set_blocking(descriptor, False)
         self._descriptor = descriptor
         self._watched = (descriptor,)
-        self._epoll: Any = select.epoll() if hasattr(select, "epoll") else None
+        self._epoll = select.epoll() if hasattr(select, "epoll") else None
         if self._epoll is not None:
             try:
                 self._epoll.register(descriptor, select.EPOLLIN | select.EPOLLET)
@@ -95,7 +101,7 @@ class TimedInput:
         self._watched = (descriptor,)
 
     def read(self, timeout_s: float) -> bytes:
-        """Bytes that have arrived within the time; may return without any after 0.1 s already."""
+        """Read available bytes; return after at most 0.1 s, possibly empty."""
         if timeout_s < SYSTEM_WAIT_S + SYSTEM_SLACK_S and not self._ready(timeout_s):
             return b""
         data = os.read(self._descriptor, CHUNK)

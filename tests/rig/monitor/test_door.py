@@ -11,7 +11,7 @@ from contextlib import ExitStack, suppress
 import pytest
 
 from rig.monitor import descriptors, door, door_server, visits
-from rig.monitor.descriptors import Room, room
+from rig.monitor.descriptors import Capacity, capacity
 from rig.monitor.first_message import is_whole, shows_key
 from rig.monitor.process import Address
 from rig.monitor.security import Keys
@@ -22,7 +22,7 @@ from tests.waiting import LONG_S, wait_until
 
 CROWD = 30
 ANY = trusting_all()
-SMALL = Room(waiting=8, strangers=4)
+SMALL = Capacity(waiting=8, strangers=4)
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def run():
 def little_room(monkeypatch):
     """Few places, which strangers lose at once."""
     monkeypatch.setattr(visits, "TURN_S", 0.0)
-    monkeypatch.setattr(door, "room", lambda: SMALL)
+    monkeypatch.setattr(door, "capacity", lambda: SMALL)
 
 
 @pytest.fixture(params=["http", "https"])
@@ -169,7 +169,7 @@ def test_connections_fit_into_the_descriptors(limits, monkeypatch):
     now = list(limits)
     monkeypatch.setattr(resource, "getrlimit", lambda kind: tuple(now))
     monkeypatch.setattr(resource, "setrlimit", lambda kind, given: now.__setitem__(slice(None), given))
-    found = room()
+    found = capacity()
     kept = visits.MOST_KNOWN + visits.MOST_FEEDS + descriptors.FILES
     assert 0 < found.strangers <= 128
     assert now[1] == limits[1]

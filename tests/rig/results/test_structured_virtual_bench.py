@@ -8,13 +8,13 @@ import pytest
 from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, structured_backbone
 from identification.models import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
 from rig.authoring.new_files import new_file
-from rig.authoring.structured_rig import structured_bench
 from rig.bench import load_bench
 from rig.bench.cross_checks import cautions
 from rig.drivers import make_daq
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError
 from rig.results.files import save
+from rig.results.structured.virtual_bench import structured_bench
 from simulators import Simulation
 from simulators.analysis import phase_resonance_backbone
 from tests.identification.models.structured.models import beam

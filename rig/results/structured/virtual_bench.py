@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from identification.common import find_role
 from rig.bench import Bench, load_bench
 from rig.bench.bench import DriverChoice
 from rig.bench.channels import Channel
-from rig.bench.configuration import validated
+from rig.bench.configuration import Table, validated
 from rig.bench.cross_checks import refuse
 from rig.bench.user_code import refuse_code
 from rig.drivers.virtual import VirtualDAQ
@@ -63,7 +62,7 @@ def bench_like(name_or_path: str, *, trust_code: bool = False) -> Bench:
     return bench
 
 
-def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -> dict[str, Any]:
+def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -> Table:
     """Return the table of a bench whose virtual specimen is a structured model.
 
     Parameters
@@ -94,7 +93,7 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
     drive = _drive_of(model)
     points = {f"element_{number}": element for number, element in enumerate(model.elements, 1)}
     sensors = _channels(model, like)
-    options: dict[str, Any] = {
+    options: Table = {
         "structure": _structure(model, {name: element.direction for name, element in points.items()}),
         **_nonlinear(model, list(points)),
         **_exciter(like, shaker, drive),
@@ -112,7 +111,7 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
     return _with_modes(bench, model)
 
 
-def _structure(model: StructuredModel, directions: dict[str, Float]) -> dict[str, Any]:
+def _structure(model: StructuredModel, directions: dict[str, Float]) -> Table:
     """Return the modes at the places of outputs and elements, with a free mode for what lies below the band."""
     order = np.argsort(model.frequency_hz, kind="stable")
     shapes = {c.name: model.output_shapes[row, order] for row, c in enumerate(model.outputs)}
@@ -180,7 +179,7 @@ def _virtual(channel: Channel) -> Channel:
     )
 
 
-def _sensor(channel: Channel) -> dict[str, Any]:
+def _sensor(channel: Channel) -> Table:
     """Return the virtual sensor on a channel."""
     same = ("name", "sensitivity_v_per_unit", "range_v", "noise_rms", "high_pass_hz")
     of_force = channel.role == "force"
@@ -188,7 +187,7 @@ def _sensor(channel: Channel) -> dict[str, Any]:
     return {"kind": "force" if of_force else "acceleration", **place, **{key: getattr(channel, key) for key in same}}
 
 
-def _exciter(like: Bench, shaker: str, drive: str) -> dict[str, Any]:
+def _exciter(like: Bench, shaker: str, drive: str) -> Table:
     """Return exciter, stinger and converter: those of a virtual bench, else a shaker by name behind a steel stinger."""
     if like.driver.name != "virtual":
         if not shaker:
@@ -219,11 +218,11 @@ _DEVICE = ("queue_blocks", "delay_samples", "faults")
 """Options of a virtual device, which it keeps."""
 
 
-def _nonlinear(model: StructuredModel, points: list[str]) -> dict[str, Any]:
+def _nonlinear(model: StructuredModel, points: list[str]) -> Table:
     """Return elements and friction joints at the points of the model's elements."""
     tables = model.system.tables
-    elements: list[dict[str, Any]] = []
-    friction: list[dict[str, Any]] = []
+    elements: list[Table] = []
+    friction: list[Table] = []
     for e, (at, element) in enumerate(zip(points, model.elements, strict=True)):
         scale = element.scale_m
         force_n, damping = tables.springs[e, 0] / scale, tables.dampers[e] / scale**2
@@ -248,7 +247,7 @@ def _nonlinear(model: StructuredModel, points: list[str]) -> dict[str, Any]:
     return {"elements": elements, "friction": friction}
 
 
-def _force_table(at: str, element: NonlinearElement, force_n: Float, beyond_n_m: float) -> dict[str, Any]:
+def _force_table(at: str, element: NonlinearElement, force_n: Float, beyond_n_m: float) -> Table:
     middle = force_n.size // 2
     if abs(force_n[middle]) > _FAITHFUL * np.max(np.abs(force_n)):
         raise IdentificationError(f"{at}: its springs have {force_n[middle]:g} N at rest, allowed is 0")
@@ -260,7 +259,7 @@ def _force_table(at: str, element: NonlinearElement, force_n: Float, beyond_n_m:
 
 
 def _kept(element: NonlinearElement, values: Float, tolerance: float, *, smooth: bool) -> slice:
-    """Return every so-manieth node of a table, as few as follow it in the range of the training data and up to the reach."""
+    """Return the coarsest stride that keeps a table within tolerance, both in the training range and in the validity range."""
     from scipy.interpolate import CubicSpline  # only on use: it takes long to load
 
     x = element.nodes
@@ -274,7 +273,7 @@ def _kept(element: NonlinearElement, values: Float, tolerance: float, *, smooth:
     return kept
 
 
-def _deflections(element: NonlinearElement, kept: slice) -> dict[str, Any]:
+def _deflections(element: NonlinearElement, kept: slice) -> Table:
     z = element.nodes * element.scale_m
     z[z.size // 2] = 0.0
     return {"deflection_m": _short(z[kept])}
@@ -292,7 +291,7 @@ def _description(model: StructuredModel, like: Bench) -> str:
     return f"structured model of {model.specimen or 'a specimen'} behind the exciter of the bench {like.name}{left}"
 
 
-def _with_modes(bench: Bench, model: StructuredModel) -> dict[str, Any]:
+def _with_modes(bench: Bench, model: StructuredModel) -> Table:
     """Return the table of a bench with frequency and shapes of the tested mode of its virtual rig."""
     rig = VirtualDAQ(bench).rig
     modes = rig.linear_modes

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from rig.cli import page_beside as module
-from rig.cli.page_beside import page_beside
+from rig.cli import monitor_process as module
+from rig.cli.monitor_process import monitor_process
 
 
 def started(monkeypatch, code):
@@ -25,13 +25,13 @@ def started(monkeypatch, code):
 
 def test_without_the_option_nothing_is_started(monkeypatch):
     monkeypatch.setattr(module.subprocess, "Popen", lambda *_, **__: pytest.fail("started"))
-    with page_beside(False):
+    with monitor_process(False):
         pass
 
 
 def test_the_address_is_told_and_the_page_stays_until_it_has_lost_its_run(monkeypatch, capsys):
     (page,) = [started(monkeypatch, 'import os; print(\'{"address": "http://x"}\', flush=True); os.read(0, 1)')]
-    with page_beside(True):
+    with monitor_process(True):
         pass
     assert capsys.readouterr().err == "note: the page is at http://x\n"
     page[0].returncode = None
@@ -48,7 +48,7 @@ def test_the_address_is_told_and_the_page_stays_until_it_has_lost_its_run(monkey
 )
 def test_a_page_that_cannot_be_started_is_told_of(monkeypatch, capsys, code, said):
     pages = started(monkeypatch, code)
-    with page_beside(True):
+    with monitor_process(True):
         run = "goes on"
     assert run == "goes on"
     assert capsys.readouterr().err == said
@@ -61,14 +61,14 @@ def test_where_no_process_can_be_had_the_run_goes_on(monkeypatch, capsys):
         raise OSError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr(module.subprocess, "Popen", fail)
-    with page_beside(True):
+    with monitor_process(True):
         pass
     assert capsys.readouterr().err == "note: the page cannot be started (Resource temporarily unavailable)\n"
 
 
 def test_an_error_of_the_run_is_its_own(monkeypatch, capsys):
     pages = started(monkeypatch, 'print(\'{"address": "http://x"}\', flush=True)')
-    with pytest.raises(ValueError, match="of the run"), page_beside(True):
+    with pytest.raises(ValueError, match="of the run"), monitor_process(True):
         raise ValueError("of the run")
     assert "http://x" in capsys.readouterr().err
     pages[0].returncode = None

@@ -17,7 +17,7 @@ START_S = 20.0
 
 
 @contextmanager
-def page_beside(wanted: bool) -> Iterator[None]:
+def monitor_process(wanted: bool) -> Iterator[None]:
     """Show the runs of this process on a page, if ``wanted``; say on standard error where it is. It stays after the run.
 
     However it goes with the page, the run takes no harm: one line says so.
