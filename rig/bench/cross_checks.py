@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.bench.channels import Channel
 
-LONGEST_BLOCK_S = (
-    0.2  # a person's reaction time at the stop button: a loop that checks less often protects less than a person
-)
+LONGEST_BLOCK_S = 0.2  # s; reaction time of a person at the stop button: a loop must not check less often
 OVERTRAVEL_FACTOR = 1.25
 """Multiple of a limit beyond which a ramp would take too long and the output drops to 0 V."""
 RANGES = {

@@ -34,7 +34,7 @@ from rig.cli.studies import StudyCommand, reproduce_
 from rig.cli.tune import tune_
 from rig.cli.watch import watch_
 
-STOPPED = 130
+STOPPED = 130  # exit status after Ctrl-C: 128 and SIGINT (2), as shells have it
 
 app = typer.Typer(
     cls=Group,

@@ -6,7 +6,7 @@ import time
 from vibrolock.compiling import on_compiling
 
 FEW = 5  # kernels that are compiled without a word
-EVERY_S = 5.0
+EVERY_S = 5.0  # s between two lines on the terminal; chosen
 
 
 class _Lines:

@@ -99,7 +99,7 @@ def _show(facts: Mapping[str, Any], json: bool) -> None:
         raise typer.Exit(1)
 
 
-def _print(name: str, value: Any) -> None:
+def _print(name: str, value: object) -> None:
     text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
     text = "; ".join(value) or "none" if isinstance(value, list) else text
     print(f"{name.replace('_', ' '):22} {text}")

@@ -3,9 +3,12 @@
 from importlib import resources
 from json import dumps
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from rig.drivers.virtual.parts import Key, Part, PartKeys
 
 
 def list_(
@@ -13,31 +16,28 @@ def list_(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
     """Shipped benches, plans, specimens and shakers, installed drivers, and the parts that a virtual rig is built from."""
-    from rig.drivers.virtual.parts import part_keys
-    from rig.text.console import print_json
-
-    if part is not None:
-        keys = part_keys(part)
-        print_json(keys) if json else _print_part(keys)
-        return
-    everything = _everything()
-    print_json(everything) if json else _print_everything(everything)
-
-
-def _everything() -> dict[str, Any]:
     from rig.drivers import driver_names
-    from rig.drivers.virtual.parts import parts, specimens
+    from rig.drivers.virtual.parts import part_keys, parts, specimens
+    from rig.text.console import print_json
     from simulators.parts import shaker_descriptions
 
-    shakers = [{"name": name, "description": text} for name, text in shaker_descriptions().items()]
-    return {
+    if part is not None:
+        found = part_keys(part)
+        if json:
+            print_json({**found._asdict(), "keys": [key._asdict() for key in found.keys]})
+        else:
+            _print_part(found)
+        return
+    named = {
         "benches": _shipped_in("rig.bench"),
         "plans": _shipped_in("rig.campaigns"),
-        "drivers": driver_names(),
         "specimens": specimens(),
-        "shakers": shakers,
-        "parts": parts(),
+        "shakers": [{"name": name, "description": text} for name, text in shaker_descriptions().items()],
     }
+    if json:
+        print_json({**named, "drivers": driver_names(), "parts": [one._asdict() for one in parts()]})
+    else:
+        _print_everything(named, driver_names(), parts())
 
 
 def _shipped_in(package: str) -> list[dict[str, str]]:
@@ -47,31 +47,28 @@ def _shipped_in(package: str) -> list[dict[str, str]]:
     return [{"name": name, "description": description} for name, description in found.items()]
 
 
-def _print_everything(everything: dict[str, Any]) -> None:
-    headings = ("benches", "plans", "specimens", "shakers")
-    width = max(len(row["name"]) for heading in headings for row in everything[heading])
-    for heading in headings:
+def _print_everything(named: dict[str, list[dict[str, str]]], drivers: list[str], parts: "list[Part]") -> None:
+    width = max(len(row["name"]) for rows in named.values() for row in rows)
+    for heading, rows in named.items():
         print(f"{heading}:")
-        for row in everything[heading]:
+        for row in rows:
             print(f"  {row['name']:{width}}  {' '.join(row['description'].split())}")
-    print(f"drivers:\n  {', '.join(everything['drivers'])}")
+    print(f"drivers:\n  {', '.join(drivers)}")
     print("parts of a virtual rig (rig list NAME for the keys of one):")
-    for part in everything["parts"]:
-        choices = "; ".join(f"{key}: {', '.join(words)}" for key, words in part["choices"].items())
-        line = f"  {part['group']:10} {part['name']:23} {part['description']}"
-        print(line + (f" ({choices})" if choices else ""))
+    for part in parts:
+        choices = "; ".join(f"{key}: {', '.join(words)}" for key, words in part.choices.items())
+        print(f"  {part.group:10} {part.name:23} {part.description}" + (f" ({choices})" if choices else ""))
 
 
-def _print_part(part: dict[str, Any]) -> None:
-    group = part["group"]
-    where = group if part["name"] == group else f"{group}, {part['name']}"
-    print(f"{where}\n\n{part['description'].replace('``', '')}\n")
-    for key in part["keys"]:
-        facts = ", ".join(text for text in (key["type"], key["unit"], _default(key)) if text)
-        print(f"{key['key']}: {facts}\n    {key['description']}")
+def _print_part(part: "PartKeys") -> None:
+    where = part.group if part.name == part.group else f"{part.group}, {part.name}"
+    print(f"{where}\n\n{part.description.replace('``', '')}\n")
+    for key in part.keys:
+        facts = ", ".join(text for text in (key.type, key.unit, _default(key)) if text)
+        print(f"{key.key}: {facts}\n    {key.description}")
 
 
-def _default(key: dict[str, Any]) -> str:
-    if key["required"]:
+def _default(key: "Key") -> str:
+    if key.required:
         return "required"
-    return "optional" if key["default"] is None else f"default {dumps(key['default'])}"
+    return "optional" if key.default is None else f"default {dumps(key.default)}"

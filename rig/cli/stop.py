@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-LOOK_S = 0.02
+POLL_S = 0.02  # s between two looks at the runs; chosen: shorter than a person notices
 
 
 def stop(
@@ -48,6 +48,6 @@ def stop(
                 failed = failed or not outcome.at_0_v
                 one.close()
                 left.remove(one)
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
     if failed:
         raise typer.Exit(1)

@@ -11,8 +11,8 @@ import typer
 if TYPE_CHECKING:
     from rig.live.reader import LiveRun
 
-LOOK_S = 0.2
-NICE = 5
+POLL_S = 0.2  # s between two looks for a run; chosen: shorter than a person notices
+NICE = 5  # niceness of the view (0 to 19); chosen: the loop goes first
 
 
 def watch_(
@@ -45,5 +45,5 @@ def _found(file: Path | None) -> "LiveRun":
         if not waiting:
             print(f"no run {'' if file is None else f'into {file} '}is under way; waiting", file=sys.stderr)
             waiting = True
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
     return run

@@ -13,7 +13,7 @@ from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
 from rig.daq import CONTINUED, DAQ, HELD, LOST, Channel, flag_names
 
 FILTER_SAMPLES = 32  # over which a filter spreads an output
-LONGEST_RUN_S = 30.0
+LONGEST_RUN_S = 30.0  # s; chosen: longest run of a test that a person waits for
 SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks
 TOO_LATE = (
     HELD,

@@ -13,9 +13,9 @@ from rig.errors import DaqWatchdog
 PERIOD = 12.4
 """Samples: no whole number, and few, so that a copy of a copy shows after a while."""
 OFF_SHARE = 0.1  # of the amplitude: the cut of a peak between two samples takes 3 %, the cubic 0.2 %
-FIT_SAMPLES = 2000
-FIRST_BLOCKS = 20
-SINE_BLOCKS = 60
+FIT_SAMPLES = 2000  # samples of random output that the answer is fitted to; chosen
+FIRST_BLOCKS = 20  # blocks of 0 V before anything is driven; chosen
+SINE_BLOCKS = 60  # blocks of the sine about the pause; chosen
 PAUSE_SHARE = 0.5  # of the watchdog
 FARTHEST = 6.0  # times its RMS: beyond it there is no noise
 MEDIAN_TO_RMS = 1.4826  # of the magnitude of a normal variable

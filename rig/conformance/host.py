@@ -6,7 +6,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-NAP_S = 0.002
+NAP_S = 0.002  # s between two looks at the clock; chosen: far below the lateness that is judged
 LATE_S = 0.004  # beyond a nap: more than a quiet machine is, and far below what a device is judged by
 AROUND_S = 0.1  # before and after: who was not run then may not have been run in between
 FACTOR = 3.0  # a device in another process of this machine may be late by so much more than this one

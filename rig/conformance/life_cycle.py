@@ -11,7 +11,7 @@ from rig.conformance.subject import DriverUnderTest
 from rig.daq import State
 from rig.errors import DaqRefused
 
-CYCLES = 3
+CYCLES = 3  # openings that are compared; chosen: what is left behind by each of them is a leak
 DESCRIPTORS = Path("/proc/self/fd")
 
 

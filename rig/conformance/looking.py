@@ -12,7 +12,7 @@ from rig.daq import DAQ, State
 from rig.errors import DaqError
 
 STILL = 0.1  # of the amplitude: an output below it counts as 0 V
-LOOKS_S = 0.02
+POLL_S = 0.02  # s between two looks at the witness; chosen
 UNSEEN = (
     "nobody sees the output: connect it to a channel with loopback = true, or override witness (voltmeter, second DAQ)"
 )
@@ -69,7 +69,7 @@ class LookingAtTheOutput(DriverUnderTest):
         """What is on the output once a message has had its time; without a witness by the loopback, which needs a block."""
         end = time.monotonic() + self.message_s
         while (seen := self.witness(daq)) is not None and seen > STILL * self.amplitude_v and time.monotonic() < end:
-            time.sleep(LOOKS_S)
+            time.sleep(POLL_S)
         if seen is not None:
             return Seen(seen, after_restart=False)
         was_running = daq.state is State.RUNNING

@@ -14,7 +14,7 @@ RANGE_SHARE = 0.95  # of the range that is declared
 SURE = 3.0  # standard errors
 FARTHEST = 6.0  # times its RMS: beyond it there is no noise in any number of samples that is tried
 MEDIAN_TO_RMS = 1.4826  # of the magnitude of a normal variable
-FIT_SAMPLES = 4000
+FIT_SAMPLES = 4000  # samples that the answer is fitted to; chosen
 
 
 class LoopbackTests(HearingTheOutput):

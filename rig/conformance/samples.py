@@ -7,12 +7,12 @@ import numpy as np
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest
 from rig.daq import DAQ, HELD, LOST
 
-KEPT_BLOCKS = 50
-KNOWN_SAMPLES = 2000
+KEPT_BLOCKS = 50  # blocks whose inputs are compared later; chosen
+KNOWN_SAMPLES = 2000  # samples that are compared with known ones; chosen
 KNOWN_SHARE = 0.05  # of what is known, RMS
-LARGEST_LAG = 100
+LARGEST_LAG = 100  # samples of delay that are searched; chosen
 LEAST_V = 1e-9  # RMS that is taken for something
-REPEATED_SAMPLES = 400
+REPEATED_SAMPLES = 400  # samples of a run that is repeated; chosen
 
 
 class SamplesTests(DriverUnderTest):

@@ -13,15 +13,15 @@ from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
 from rig.daq import DAQ
 
 SLOW_TEST = "test_a_block_takes_no_longer_than_it_lasts"
-BLOCK_S = 0.05
-BLOCKS = 5
+BLOCK_S = 0.05  # s; duration of the blocks that are timed; chosen: long beside the clock, short beside a test
+BLOCKS = 5  # number of them; chosen
 PACED_FACTOR = 2.0  # of a block's own time: the median block of a device with a clock
 WAITING_FACTOR = 10.0  # of one that returns at once, or waits for the host
 SHORTEST_S = 0.1  # that a busy machine may need for any block
 TRIES = 3  # what happens in all of them is the driver's
 FIRST_BLOCKS = 20  # in which compilers run and buffers fill
-ENOUGH_STALLS = 3
-BINS = 20
+ENOUGH_STALLS = 3  # stalls after which a run is judged; chosen
+BINS = 20  # parts of a run for the slope of the clock; chosen: an odd stall spoils one or two
 MEDIAN_TO_ERROR = 1.4826 * 1.2533  # median deviation to the standard error of a median, times the root of the count
 SURE = 3.0  # standard errors
 

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from rig.bench import Bench
-from rig.conformance.looking import LOOKS_S, STILL, LookingAtTheOutput, Seen, loopback_of
+from rig.conformance.looking import POLL_S, STILL, LookingAtTheOutput, Seen, loopback_of
 
 KILLING_TEST = "test_the_output_comes_to_0_v_without_the_host"
 NOTHING_TO_LOOK_AT = "nothing is left to look at once the process is dead: no witness (override witness), no loopback"
@@ -64,7 +64,7 @@ class WithoutHostTests(LookingAtTheOutput):
             seen = self.witness(None)
             if seen is not None and seen <= STILL * self.amplitude_v:
                 return Seen(seen, after_restart=False)
-            time.sleep(LOOKS_S)
+            time.sleep(POLL_S)
         seen = self.witness(None)
         if seen is not None:
             return Seen(seen, after_restart=False)

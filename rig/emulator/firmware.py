@@ -25,11 +25,11 @@ from rig.wire.messages import DeviceFlag
 
 STARTING_S = 30.0
 """Time in which a program has to say that it can be reached, s."""
-ENDING_S = 5.0
-LOOKS_S = 0.1
+ENDING_S = 5.0  # s that a program may take to end; chosen
+POLL_S = 0.1
 """How often the order to end is looked for, s."""
 BAD_DESCRIPTION = 2  # status with which a program refuses its description
-MOST_TEXT = 32
+MOST_TEXT = 32  # bytes of a text parameter (docs/reference/wire-protocol.md)
 HEADER = struct.Struct("<I")
 
 
@@ -64,7 +64,7 @@ class Firmware:
         return True
 
     def _has_asked(self) -> bool:
-        return bool(select.select((self._requests,), (), (), LOOKS_S)[0])
+        return bool(select.select((self._requests,), (), (), POLL_S)[0])
 
     def _answer(self) -> bool:
         """Answer a request; False at the end of the program."""
@@ -119,7 +119,7 @@ class Firmware:
         until_s = time.monotonic() + ENDING_S
         self.serve(lambda: time.monotonic() > until_s)  # for it may wait for an answer
         try:
-            self.child.wait(LOOKS_S)
+            self.child.wait(POLL_S)
         except subprocess.TimeoutExpired:
             self.child.kill()
             self.child.wait()

@@ -9,11 +9,11 @@ from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_
 Words = dict[tuple[int, int], int]
 """Words by parameter and item."""
 
-LARGEST_BLOCK = 1000
-LARGEST_QUEUE = 64
-SHORTEST_WATCHDOG_US = 1000
-LONGEST_WATCHDOG_US = 4_000_000_000
-LONGEST_PERIOD = 16384
+LARGEST_BLOCK = 1000  # samples; chosen: 0.2 s at 5 kHz
+LARGEST_QUEUE = 64  # blocks; of the protocol (docs/reference/wire-protocol.md)
+SHORTEST_WATCHDOG_US = 1000  # us; chosen
+LONGEST_WATCHDOG_US = 4_000_000_000  # us; chosen: below 32 bits
+LONGEST_PERIOD = 16384  # samples of a period that can be continued; chosen
 
 SETTINGS = {
     Parameter.VERSION: (Parameter.LOWEST_VERSION, Parameter.HIGHEST_VERSION),

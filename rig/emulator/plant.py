@@ -5,7 +5,7 @@ import re
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from rig.errors import ConfigurationError
 from rig.wire.messages import DeviceFlag
 from simulators.kernels import Flag
 
-WHOLE_RANGE = 2.0**31  # counts of full scale where the virtual converter has no steps
+WHOLE_RANGE = 2.0**31
+"""Counts of full scale where the virtual converter has no steps: 32 bits, signed."""
 
 
 class Plant(Protocol):
@@ -231,7 +232,7 @@ class LoggedPlant:
     rate_hz: float
     filter_delay_s: float
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         """Everything else is the plant's."""
         return getattr(self._plant, name)
 

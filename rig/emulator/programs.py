@@ -19,8 +19,8 @@ from rig.errors import ConfigurationError, DaqRefused
 
 ARM_MACHINE = 40  # e_machine of an ELF file
 QEMU = "qemu-system-arm"
-STARTING_S = 30.0
-LOOKS_S = 0.02
+STARTING_S = 30.0  # s that a program may take to start; chosen
+POLL_S = 0.02  # s between two looks at a program that starts; chosen
 PORT = re.compile(rb"char device redirected to (/dev/\S+)")
 
 
@@ -121,7 +121,7 @@ def _port_of(child: "subprocess.Popen[bytes]") -> str:
 
     def has_said() -> bool:
         nonlocal said
-        if child.stdout is not None and select.select((child.stdout,), (), (), LOOKS_S)[0]:
+        if child.stdout is not None and select.select((child.stdout,), (), (), POLL_S)[0]:
             said += os.read(child.stdout.fileno(), 4096)
         return PORT.search(said) is not None
 
@@ -139,7 +139,7 @@ def _opened(fifo: Path, child: "subprocess.Popen[bytes]") -> int:
         try:
             out.append(os.open(fifo, os.O_WRONLY | os.O_NONBLOCK))
         except OSError:  # nobody reads yet
-            time.sleep(LOOKS_S)
+            time.sleep(POLL_S)
         return bool(out)
 
     _wait(is_open, child, "opens its structure")

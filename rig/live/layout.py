@@ -49,9 +49,9 @@ follow the record."""
 
 HEAD = 8
 """Bytes before a frame (its checksum; 0: there is no frame) and before the bins (their number)."""
-WINDOW_BYTES = 1 << 18
-MOST_ROWS = 4096
-BINS = 3000
+WINDOW_BYTES = 1 << 18  # bytes of the last rows in a frame, at most; chosen
+MOST_ROWS = 4096  # rows in a frame, at most; chosen
+BINS = 3000  # bins that are kept; chosen: five minutes
 BIN_S = 0.1
 """Least duration of a bin of the traces, s of the test: five minutes are kept of a test by the clock."""
 

@@ -27,8 +27,8 @@ from rig.recording.jsontext import encode
 from rig.tick.layout import recorded_row
 from vibrolock.printable import error_text
 
-FRAMES_PER_S = 30.0
-LATENESS_S = 1.0
+FRAMES_PER_S = 30.0  # frames per second, at most; chosen: twice as often as the page looks
+LATENESS_S = 1.0  # s between two statistics of the lateness; chosen
 Arguments = ParamSpec("Arguments")
 
 

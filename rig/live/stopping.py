@@ -15,8 +15,8 @@ from rig.errors import RecordingError
 from rig.live.place import STOP
 from vibrolock.printable import printable
 
-POLL_S = 0.05
-LARGEST_CAUSE_BYTES = 300
+POLL_S = 0.05  # s between two looks for a request; chosen: twenty times a second
+LARGEST_CAUSE_BYTES = 300  # of a cause; chosen: a line
 
 
 def request_stop(folder: Path, cause: str) -> None:

@@ -13,7 +13,7 @@ from rig.errors import ConfigurationError
 from rig.live.place import base_folder
 from vibrolock.printable import error_text
 
-VALID_D = 30
+VALID_D = 30  # days; chosen: longer than any test
 EARLIER_D = 1  # the phone's clock may be behind
 
 

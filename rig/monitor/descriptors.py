@@ -7,7 +7,7 @@ from rig.monitor.visits import MOST_FEEDS, MOST_KNOWN
 
 FILES = 64
 """Descriptors for everything but connections."""
-LEAST = 8
+LEAST = 8  # connections that are held however few descriptors there are; chosen
 
 
 class Capacity(NamedTuple):

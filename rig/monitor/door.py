@@ -24,7 +24,7 @@ BACKLOG = 1024
 """Connections that the system keeps until they are accepted."""
 AT_ONCE = 16
 """Connections that are accepted, or have their turn, before the others are looked after."""
-LOOK_S = 0.02
+POLL_S = 0.02
 """Shortest time after which a message that has begun is looked at again."""
 HANDSHAKE_S = 5.0
 """Time in which a TLS handshake must be over."""
@@ -106,7 +106,7 @@ class Door:
             self._drop(connection, self._unfinished)
         elif not is_whole(come, self._tls is not None):
             waited_s = loop.time() - self._unfinished[connection]
-            loop.call_later(max(LOOK_S, waited_s / 2.0), self._look, connection)  # a reader would be called without end
+            loop.call_later(max(POLL_S, waited_s / 2.0), self._look, connection)  # a reader would be called without end
         elif self._tls is None and shows_key(come, self._keys):
             del self._unfinished[connection]
             self._open(connection, self.visits.known_at_once())

@@ -7,8 +7,8 @@ from starlette.datastructures import Headers
 
 from rig.monitor.security import Keys
 
-LARGEST_HEADERS = 16384
-RECORD_HEAD, LARGEST_RECORD = 5, 16384
+LARGEST_HEADERS = 16384  # bytes of the headers of a request; chosen
+RECORD_HEAD, LARGEST_RECORD = 5, 16384  # bytes of a record of TLS (RFC 8446, 5.1)
 HANDSHAKE = 22
 """Type of a record of TLS (RFC 8446, 5.1): type, version, length, and what it holds."""
 LARGEST = RECORD_HEAD + LARGEST_RECORD

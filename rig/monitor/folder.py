@@ -16,11 +16,11 @@ from rig.text.json_values import JsonValue
 
 MOST_FILES = 500
 """So many files are listed, the youngest."""
-MOST_KEPT = 64
-LARGEST_BYTES = 16 * 2**20
+MOST_KEPT = 64  # figures and tables that are kept; chosen
+LARGEST_BYTES = 16 * 2**20  # bytes of a figure or table; chosen
 CHILD = "rig.monitor.folder_child"
 TIMEOUT_S = {"kinds": 20.0, "figure": 120.0, "table": 60.0}
-AT_ONCE = 50
+AT_ONCE = 50  # files that one child looks into; chosen
 SUFFIX = ".h5"
 
 

@@ -3,7 +3,7 @@
 import os
 from contextlib import suppress
 
-NICE = 5
+NICE = 5  # niceness (0 to 19); chosen: the loop goes first
 
 
 def lower_priority() -> None:

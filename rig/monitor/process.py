@@ -33,8 +33,8 @@ from rig.system.stop_signals import ended_in_order
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 DEFAULT_PORTS = {"http": 80, "https": 443}
-LARGEST_MESSAGE = 1024
-GRACE_S = 2
+LARGEST_MESSAGE = 1024  # bytes of a message from the page; chosen: it says "stop" alone
+GRACE_S = 2  # s for connections to end in order; chosen
 LINGER_S = 60.0
 """Time after which a server whose run is over ends, once nobody watches any more."""
 

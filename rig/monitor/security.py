@@ -25,7 +25,7 @@ HEADERS = {
 }
 """Headers of every answer."""
 
-TOKEN_BYTES = 32
+TOKEN_BYTES = 32  # bytes of a secret: 256 bits, as for keys
 
 
 def same(given: str, expected: str) -> bool:

@@ -39,9 +39,9 @@ TYPES = {
     ".png": "image/png",
     ".txt": "text/plain; charset=utf-8",
 }
-LARGEST_FORM = 1024
-FORM_S = 5.0
-READ_S = 3.0
+LARGEST_FORM = 1024  # bytes of a form; chosen: tokens and a number
+FORM_S = 5.0  # s in which a form must come; chosen
+READ_S = 3.0  # s in which a run must be read; chosen: then the stop is answered anyway
 STOP = "stop"
 NOT_STOPPED = f"NOT STOPPED: {HARDWARE}"
 ELSEWHERE = "Or type in a terminal of the same user: rig stop"

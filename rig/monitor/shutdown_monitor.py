@@ -27,11 +27,7 @@ class Outcome(NamedTuple):
 
 
 class ShutdownMonitor:
-<<<<<<<< HEAD:rig/monitor/shutdown_monitor.py
     """Requests the ramp-down of the run in this folder and polls its outcome. Holds files open until `close`.
-========
-    """Asks the run with this folder to ramp down, and looks what becomes of it. Holds files open until `close`.
->>>>>>>> a232a437 (Devices, benches, authoring: tables and schemas are types; a structured model becomes a bench in the folder of its kind; the field's names):rig/monitor/shutdown.py
 
     ``timeout_s``: how long the output may take to be at 0 V; by default the run's own ramp and ten seconds.
     """

@@ -9,7 +9,7 @@ from rig.monitor.plain_pages import HARDWARE
 from rig.monitor.shown import Shown
 from vibrolock.printable import error_text
 
-SILENT_S = 2.0
+SILENT_S = 2.0  # s without a frame after which a run counts as silent; chosen: sixty frames
 REST_S = 10.0
 """Time beyond the ramp for what a run may be doing before it looks."""
 BY_PAGE = "stopped on the page"

@@ -21,7 +21,7 @@ from simulators.parts import LOWEST_INTERNAL_RATE_HZ
 from vibrolock.compiled import bound
 from vibrolock.one_thread import one_thread
 
-FACT_TOLERANCE = 1e-3
+FACT_TOLERANCE = 1e-3  # relative difference from the bench that is worth a remark; chosen: as facts are rounded
 SKEW_TOLERANCE = 0.01  # samples; 0.02 degrees at a hundredth of the sample rate
 COUNTED = (*(str(flag.name).lower() for flag in Flag), *FAULT_FLAGS, "lost_samples")
 GROWTH = 1e-3  # a step; of a plant that does not grow there is rounding alone, far below

@@ -24,7 +24,7 @@ FAULT_FLAGS = (HELD, CONTINUED)
 """Names of the bits behind those of the rig."""
 LONGEST_PERIOD = 16384
 """Longest period of outputs, samples, with which the virtual device goes on; beyond, outputs are held."""
-V_PER_COUNT = 2.0**-20
+V_PER_COUNT = 2.0**-20  # V; counts in which late outputs are continued; chosen: a microvolt, below any converter
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _HELD, _LOST, _LATE = (

@@ -2,17 +2,51 @@
 
 from collections.abc import Iterator
 from functools import cache
-from typing import Any
+from typing import NamedTuple
+
+from pydantic.json_schema import JsonSchemaValue as Schema
 
 from rig.errors import ConfigurationError
+from rig.text.json_values import JsonValue
 from rig.text.units import unit_of
 from simulators import VirtualRig
-
-Schema = dict[str, Any]
 
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "none"}
 _BOUNDS = {"exclusiveMinimum": "above", "minimum": "from", "exclusiveMaximum": "below", "maximum": "to"}
 _FEW = 4
+"""Most words of a key that are listed as its choices; chosen to fit in a line."""
+
+
+class Part(NamedTuple):
+    """A part of a virtual rig."""
+
+    group: str
+    """Key of the rig's table that holds it."""
+    name: str
+    description: str
+    choices: dict[str, list[str]]
+    """Words that its keys may take, where they are few."""
+
+
+class Key(NamedTuple):
+    """A key of a part."""
+
+    key: str
+    """Name, with those of the tables in which it stands (``shape[].at``)."""
+    type: str
+    unit: str
+    required: bool
+    default: JsonValue
+    description: str
+
+
+class PartKeys(NamedTuple):
+    """A part in full."""
+
+    group: str
+    name: str
+    description: str
+    keys: list[Key]
 
 
 def specimens() -> list[dict[str, str]]:
@@ -29,23 +63,19 @@ def specimens() -> list[dict[str, str]]:
     return rows
 
 
-def parts() -> list[dict[str, Any]]:
+def parts() -> list[Part]:
     """Every part: its group in the rig's table, its name, its first line, and the choices it offers."""
-    return [
-        {"group": group, "name": name, "description": _first_line(schema), "choices": _choices(name, schema)}
-        for group, name, schema in _named_parts()
-    ]
+    return [Part(group, name, _first_line(schema), _choices(name, schema)) for group, name, schema in _named_parts()]
 
 
-def part_keys(name: str) -> dict[str, Any]:
+def part_keys(name: str) -> PartKeys:
     """A part in full: its description and its keys with type, unit, default and description.
 
     Raises `ConfigurationError` for a name that no part has.
     """
     for group, known, schema in _named_parts():
         if known == name:
-            text = str(schema.get("description", ""))
-            return {"group": group, "name": name, "description": text, "keys": list(_keys(schema, name))}
+            return PartKeys(group, name, str(schema.get("description", "")), list(_keys(schema)))
     allowed = ", ".join(known for _, known, _ in _named_parts())
     raise ConfigurationError(f"part = {name!r}: there is no such part; allowed is {allowed}")
 
@@ -91,21 +121,15 @@ def _words(field: Schema) -> list[str]:
     return [str(word) for word in field.get("enum", [field["const"]] if "const" in field else [])]
 
 
-def _keys(schema: Schema, name: str, path: str = "") -> Iterator[dict[str, Any]]:
+def _keys(schema: Schema, path: str = "") -> Iterator[Key]:
     """All keys of a part, and those of the parts inside it under ``path[].key``."""
     required = schema.get("required", [])
     for key, field in sorted(schema["properties"].items(), key=lambda item: item[0] != "kind"):
         inner = field.get("items", field)
-        yield {
-            "key": path + key,
-            "type": _type(field),
-            "unit": unit_of(key),
-            "required": key in required,
-            "default": field.get("default"),
-            "description": _plain(str(field.get("description", ""))),
-        }
+        description = _plain(str(field.get("description", "")))
+        yield Key(path + key, _type(field), unit_of(key), key in required, field.get("default"), description)
         if "$ref" in inner:
-            yield from _keys(_resolved(inner["$ref"]), name, f"{path}{key}{'[]' if 'items' in field else ''}.")
+            yield from _keys(_resolved(inner["$ref"]), f"{path}{key}{'[]' if 'items' in field else ''}.")
 
 
 def _type(field: Schema) -> str:

@@ -13,7 +13,7 @@ from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeou
 from rig.wire.link import Link
 from rig.wire.messages import LOWEST_VERSION, VERSION, Command, DeviceFlag, DeviceState, Parameter, Status, Stream
 
-KEPT = 4096
+KEPT = 4096  # round trips that are kept; chosen: some minutes of pings
 
 
 class RoundTrips:
@@ -43,8 +43,8 @@ class RoundTrips:
 
 
 MOST_LOAD = 0.9  # part of the wire's capacity that a stream may use
-FIND_TRIES = 20
-OPENING_PINGS = 50
+FIND_TRIES = 20  # requests before a port counts as silent; chosen: 2 s in all
+OPENING_PINGS = 50  # pings for the first statistics; chosen
 NOTHING = DeviceFlag(0)
 HEARTBEAT_S = 0.25  # a device sends one every 0.1 s
 

@@ -35,10 +35,10 @@ def stopped(name: str, flags: int, text: str) -> DaqError:
     return kind(f"{name}: {text}")
 
 
-TRIES = 5
-ANSWER_S = 0.1
+TRIES = 5  # requests before a device counts as silent; chosen
+ANSWER_S = 0.1  # s that an answer may take; chosen
 DOUBLED_ANSWERS = 8  # from this many on two devices answer; the wire itself may repeat a single frame
-WAITING_BLOCKS = 4096
+WAITING_BLOCKS = 4096  # messages that are kept while an answer is awaited; chosen: seconds of a stream
 REMEMBERED_ANSWERS = 16  # a second device may answer several requests later than the first
 
 

@@ -12,8 +12,8 @@ from rig.wire.parameter_words import as_double
 
 FLOAT_TOLERANCE = 1e-6  # float32 on the wire
 MOST_CHANNELS = 31  # items of a text parameter are numbered by one byte
-SAME_RESOLUTION = 0.01
-SAME_SKEW_SAMPLES = 0.01
+SAME_RESOLUTION = 0.01  # relative difference of resolutions that is worth a remark; chosen
+SAME_SKEW_SAMPLES = 0.01  # samples; difference of skews that is worth a remark; chosen
 
 
 @dataclass(frozen=True, eq=False)

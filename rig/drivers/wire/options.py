@@ -9,7 +9,7 @@ from rig.bench.configuration import Configured
 from rig.drivers.wire.facts import DeviceFacts
 from rig.errors import DaqRefused
 
-LARGEST_QUEUE = 64
+LARGEST_QUEUE = 64  # blocks; of the protocol (docs/reference/wire-protocol.md)
 MOST_S = 4000.0  # microseconds in an unsigned word of four bytes
 
 
@@ -43,8 +43,8 @@ class WireOptions(Configured):
         return 1 if self.queue_blocks == "auto" else self.queue_blocks
 
 
-DEFAULT_S, DEFAULT_BLOCKS = 0.1, 4
-SHORTEST_BLOCKS = 2
+DEFAULT_S, DEFAULT_BLOCKS = 0.1, 4  # default watchdog, s and blocks, the longer of the two; chosen
+SHORTEST_BLOCKS = 2  # blocks of the shortest watchdog: one block may be under way
 LONGEST_S, LONGEST_BLOCKS = 1.0, 10  # where something moves: so long an output may be held
 
 

@@ -46,7 +46,7 @@ class Scaling:
         volts[put_out == sent] = np.nan
 
 
-PINGS_PER_S = 20.0
+PINGS_PER_S = 20.0  # pings per second while streaming; chosen: little beside the stream
 WAITED = 0.5  # of the time that the queue leaves once the next block has come, for one that this has overtaken
 FLAG_NAMES = tuple(str(flag.name).lower() for flag in DeviceFlag)
 

@@ -97,7 +97,7 @@ class StreamFrames:
 OPEN_BLOCKS = 4
 """Blocks that frames may belong to: the newest and those right before it. Older ones are given up."""
 
-_NEVER = 1 << 30
+_NEVER = 1 << 30  # more groups than any stream has
 INDICES = 1 << 32  # a frame has 32 bits for the index of a sample
 
 

@@ -31,8 +31,8 @@ COUNTERS = (
 """Counters of a codec: foreign frames, own frames returned, wrong lengths, frames that come twice or after their block was
 given up, frames that come after a later one and those of them whose block was given up, torn blocks, corrected indices."""
 
-_LARGEST_DROPPED = 255
-_NEVER = -(1 << 30)
+_LARGEST_DROPPED = 255  # samples: a heartbeat has one byte for them
+_NEVER = -(1 << 30)  # group before all others
 
 
 class CanCodec:

@@ -83,7 +83,7 @@ def bus_load(shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz:
 
 COMMAND_S = 0.1
 """How long a command may wait for the bus."""
-SHORTEST_DEADLINE_S = 0.005
+SHORTEST_DEADLINE_S = 0.005  # s in which samples and outputs must be sent, at least; chosen: some frames of others
 _FRAMES_A_CALL = 256  # bounds a call with a time-out of 0 on a bus full of foreign frames
 
 

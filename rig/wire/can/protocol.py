@@ -23,13 +23,13 @@ from rig.wire.can.layout import Layout, compile_layout, compile_text
 from rig.wire.can.readbacks import COUNTS_A_FRAME
 from rig.wire.messages import LOWEST_VERSION, VERSION
 
-HIGHEST_NODE = 15
-NODE_MASK = 0x00F
-CLASSICAL_OUTPUTS = 32
-FD_WRAP = 256
-CLASSICAL_SAMPLES = 64
-FD_PARTS = 8
-CLASSICAL_PARTS = 4
+HIGHEST_NODE = 15  # four bits of an identifier
+NODE_MASK = 0x00F  # bits of an identifier that are the node
+CLASSICAL_OUTPUTS = 32  # sequence numbers of outputs, in the identifier: 5 bits
+FD_WRAP = 256  # sequence numbers of CAN FD: one byte
+CLASSICAL_SAMPLES = 64  # identifiers of samples: 6 bits
+FD_PARTS = 8  # frames of a row, at most; chosen
+CLASSICAL_PARTS = 4  # frames of a row, at most; chosen: 16 sequence numbers are left
 CHANNELS_A_FRAME = {True: 31, False: 4}
 OUTPUTS_A_FRAME = {True: 31, False: 4}
 HEADER = {True: 2, False: 0}

@@ -39,7 +39,7 @@ READBACK_HEAD = struct.Struct("<BBHQ")  # first
 HEARTBEAT_BODY = struct.Struct("<BBHBBHII")  # state; boot; flags; dropped; samples
 STOP = struct.Struct("<BBHB")  # reason
 
-MOST_DROPPED = 2**32 - 1
+MOST_DROPPED = 2**32 - 1  # samples: 32 bits
 
 
 class Malformed(ValueError):  # noqa: N818 (a remark on a frame)

@@ -11,7 +11,7 @@ from cobs.cobs import DecodeError, decode, encode
 from rig.wire.messages import Message, Stream
 from rig.wire.serial.codec import LARGEST_PAYLOAD, Codec, Damaged, Malformed, Oversize
 
-CRC_SIZE = 4
+CRC_SIZE = 4  # bytes of a CRC-32
 CRC = struct.Struct("<I").pack
 RESIDUE = crc32(bytes(CRC_SIZE))  # of any bytes with their CRC-32 behind them, low byte first
 LONGEST_RUN = 254  # bytes of a COBS block

@@ -5,13 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-<<<<<<<< HEAD:tests/rig/monitor/test_shutdown_monitor.py
 from rig.monitor import shutdown_monitor
 from rig.monitor.shutdown_monitor import ShutdownMonitor
-========
-from rig.monitor import shutdown
-from rig.monitor.shutdown import ShutdownMonitor
->>>>>>>> a232a437 (Devices, benches, authoring: tables and schemas are types; a structured model becomes a bench in the folder of its kind; the field's names):tests/rig/monitor/test_shutdown.py
 from rig.tick.safety.layout import GuardMode
 from tests.rig.monitor.scripted import Scripted
 
@@ -34,13 +29,8 @@ def followed(monkeypatch, tmp_path):
         run = Held()
         run.facts = replace(run.facts, limits=replace(run.facts.limits, ramp_down_s=ramp_s))
         run.step(GuardMode.RAMPING, voltage_v=0.25)
-<<<<<<<< HEAD:tests/rig/monitor/test_shutdown_monitor.py
         monkeypatch.setattr(shutdown_monitor, "time", clock)
         monkeypatch.setattr(shutdown_monitor, "lives", lambda folder: True)
-========
-        monkeypatch.setattr(shutdown, "time", clock)
-        monkeypatch.setattr(shutdown, "lives", lambda folder: True)
->>>>>>>> a232a437 (Devices, benches, authoring: tables and schemas are types; a structured model becomes a bench in the folder of its kind; the field's names):tests/rig/monitor/test_shutdown.py
         monkeypatch.setattr(ShutdownMonitor, "_open", lambda self: setattr(self, "_run", run if begun else None))
         one = ShutdownMonitor(tmp_path, "stopped by a test", timeout_s)
 
@@ -60,11 +50,7 @@ def test_a_run_has_its_own_ramp_and_ten_seconds_to_be_at_0_v(followed, ramp_s, l
     outcome = after(longest_s + 0.01)
     assert not outcome.at_0_v
     assert outcome.text.startswith(f"not at 0 V within {longest_s:.1f} s (guard ramping, 0.250 V, ")
-<<<<<<<< HEAD:tests/rig/monitor/test_shutdown_monitor.py
     assert outcome.text.endswith(shutdown_monitor.HARDWARE)
-========
-    assert outcome.text.endswith(shutdown.HARDWARE)
->>>>>>>> a232a437 (Devices, benches, authoring: tables and schemas are types; a structured model becomes a bench in the folder of its kind; the field's names):tests/rig/monitor/test_shutdown.py
 
 
 def test_a_run_that_has_not_begun_has_ten_seconds(followed):
