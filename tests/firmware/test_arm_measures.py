@@ -10,12 +10,13 @@ from types import SimpleNamespace
 import pytest
 
 from tests.firmware.building import FOLDER
+from tests.firmware.test_arm import image  # noqa: F401 (fixture: skips or fails where programs are missing)
 
 MODULES = ("tools", "sizes", "stack", "execution", "instructions")
 
 
 @pytest.fixture(scope="module")
-def measures(image: Path) -> Iterator[SimpleNamespace]:
+def measures(image: Path) -> Iterator[SimpleNamespace]:  # noqa: F811
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(FOLDER / "checks" / "arm"))
         for name in MODULES:
