@@ -28,11 +28,12 @@ from rig.campaigns.plans import plan_from
 from rig.errors import RigError
 from rig.recording.reader import Recording
 from rig.rehearsal.hypotheses import Hypotheses
-from rig.rehearsal.knowledge import Knowledge, gathered
+from rig.rehearsal.knowledge import Knowledge, collect_knowledge
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
+from rig.rehearsal.statistics import Quantiles
 from rig.rehearsal.trial import run_trial
 from rig.rehearsal.twins import draw_twin
-from rig.rehearsal.verdict import Band, verdict_of
+from rig.rehearsal.verdict import verdict_of
 from rig.tuning import tune
 
 BENCHES = ("magnet-beam", "friction-beam", "magnet-beam-symmetric")
@@ -101,7 +102,7 @@ def _measured(bench: Any, recording: Path) -> tuple[Any, Plan, Knowledge]:
     """Tune a bench; return it with the tuned plan and what the recording tells."""
     tuning = tune(bench, recording, options=RunOptions(overwrite=True))
     with Recording(recording) as recorded:
-        return bench, tuning.plan, gathered(bench, tuning.plan, {recording.name: recorded})
+        return bench, tuning.plan, collect_knowledge(bench, tuning.plan, {recording.name: recorded})
 
 
 def judged(true: Any, plan: Plan, knowledge: Knowledge, draws: int, seed: int, jobs: int) -> dict[str, Any]:
@@ -116,7 +117,7 @@ def judged(true: Any, plan: Plan, knowledge: Knowledge, draws: int, seed: int, j
         if name in verdict.margins
     }
     bands = {
-        f"{name} {point.number}": _inside(found.bands[name], getattr(point, name))
+        f"{name} {point.number}": _inside(found.quantiles[name], getattr(point, name))
         for found in verdict.points
         for point in happened.points
         if point.number == found.number and point.accepted and found.accepted.count >= draws // 2
@@ -136,7 +137,7 @@ def judged(true: Any, plan: Plan, knowledge: Knowledge, draws: int, seed: int, j
     }
 
 
-def _inside(band: Band, value: float) -> bool:
+def _inside(band: Quantiles, value: float) -> bool:
     """Whether a value lies within the 5 to 95 % band; 0.1 % of it counts as touching."""
     return bool(band.low * (1.0 - 1e-3) <= value <= band.high * (1.0 + 1e-3))
 

@@ -43,7 +43,7 @@ class Rehearsed:
     trips_at_most: float
     """Upper end of its 95 % interval."""
     foreseen: Mapping[str, Any]
-    """What it foresees, point by point (`rig.rehearsal.foreseen`)."""
+    """What it foresees, point by point (`rig.rehearsal.forecast`)."""
 
 
 def subject_digest(plan: _Table, bench: _Table) -> str:

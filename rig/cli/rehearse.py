@@ -132,7 +132,7 @@ def _rehearse(
     from rig.rehearsal.report import lines, summary
     from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
     from rig.text.console import print_json
-    from vibrolock.printable import printable_strings
+    from vibrolock.printable import printable
 
     request = request_for(subject)
     with Rehearsing(subject.draws) as listener:
@@ -143,14 +143,15 @@ def _rehearse(
             found, second = improve_into(request, found, output, improve, listener=listener, jobs=jobs)
     if figure is not None:
         plot(output, figure)
-    facts = {**summary(found), "file": str(output)}
-    if improve is not None:
-        facts["improved"] = None if second is None else {**summary(second), "plan": str(improve)}
     if json:
+        facts = {**summary(found).model_dump(by_alias=True), "file": str(output)}
+        if improve is not None:
+            own = None if second is None else summary(second).model_dump(by_alias=True)
+            facts["improved"] = None if own is None else {**own, "plan": str(improve)}
         print_json(facts)
         return
-    for line in lines(printable_strings(facts)):
-        print(line)
+    for line in lines(summary(found)):
+        print(printable(line))
     print(f"rehearsal written to {output}" + (f", figure to {figure}" if figure else ""))
     if improve is None:
         return
@@ -158,8 +159,8 @@ def _rehearse(
         print(f"no change of the plan helped: nothing was written to {improve}")
         return
     print(f"improved plan written to {improve}, its own rehearsal to {improve.with_suffix('.h5')}:")
-    for line in lines(printable_strings(summary(second))):
-        print(line)
+    for line in lines(summary(second)):
+        print(printable(line))
 
 
 class Rehearsing:
@@ -203,12 +204,14 @@ class Rehearsing:
 
 
 def _compare(rehearsal: Path, recording: Path, json: bool) -> None:
+    from dataclasses import asdict
+
     from rig.results.rehearsal.rehearse import compare_with, load_rehearsal
     from rig.text.console import print_json
 
     found = compare_with(load_rehearsal(rehearsal), recording)
     if json:
-        print_json(found.to_dict())
+        print_json(asdict(found))
         return
     print_comparison(found)
 

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,7 @@ from rig.cli.run_options import of_a_recording, shown, with_run_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
+    from rig.rehearsal.report import Summary
     from rig.tuning.tuning import Tuning
 
 
@@ -78,18 +79,19 @@ def tune_(
     if figure is not None:
         draw_tuning(found, figure)
     facts = {**summary(found), "plan": str(output), "figure": None if figure is None else str(figure)}
-    facts["rehearsal"] = _rehearsal(found, output, recorded, rehearsed, rehearse) if rehearse else None
+    foreseen = _rehearsal(found, output, recorded, rehearsed, rehearse) if rehearse else None
+    facts["rehearsal"] = None if foreseen is None else foreseen.model_dump(by_alias=True)
     if json:
         print_json(facts)
         return
     for line in lines(printable_strings(facts)):
         print(line)
-    if facts["rehearsal"] is not None:
-        print(f"rehearsal      {verdict_in_one_line(facts['rehearsal'])}; `rig show {rehearsed}` has the page")
+    if foreseen is not None:
+        print(f"rehearsal      {verdict_in_one_line(foreseen)}; `rig show {rehearsed}` has the page")
     print(f"plan written to {output}, multisine recorded in {recorded}" + (f", figure in {figure}" if figure else ""))
 
 
-def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> dict[str, Any]:
+def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> "Summary":
     """Rehearse the plan on twins of what was measured, write its verdict above the plan, and return the summary."""
     from rig.cli.rehearse import Rehearsing
     from rig.rehearsal.report import summary, verdict_in_one_line

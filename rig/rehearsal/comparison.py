@@ -1,77 +1,76 @@
-"""Where a run lies within what its rehearsal foresaw, both as stored in the recording."""
+"""Comparison of a run with the forecast of its rehearsal, both as stored in the recording."""
 
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from rig.campaigns.evaluation.point import Point
+from rig.rehearsal.forecast import GRID, Forecast, PointForecast
 
-LIKELY = 0.95  # probability from which on something that did not happen is a finding
-GRID = tuple(np.linspace(0.0, 1.0, 21).tolist())
-"""Probabilities of the quantiles that are foreseen."""
-TOLERANCE = 1e-3  # relative: what is outside the draws by less is no finding
+LIKELY = 0.95
+"""Probability from which on it is a finding that something did not happen; chosen: the usual level of 95 %."""
+TOLERANCE = 1e-3
+"""Relative distance from all draws below which a value is no finding; chosen: the scatter of settled points."""
+_FORECAST = TypeAdapter(Forecast)
 
 
 @dataclass(frozen=True)
 class PointComparison:
-    """One point of a run beside what was foreseen."""
+    """One point of a run beside its forecast."""
 
     number: int
     """Number, from 0."""
     level: float
     """Level."""
     rank: Mapping[str, float]
-    """Share of the draws below the measured value, by quantity."""
+    """Proportion of the draws below the measured value, by quantity."""
     findings: tuple[str, ...]
     """Where it lies outside all draws, one line each."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A run beside what was foreseen."""
+    """A run beside its forecast."""
 
     points: tuple[PointComparison, ...]
     """Points that were measured or failed."""
     findings: tuple[str, ...]
     """Findings on the whole run and on its points, one line each."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the comparison as plain data."""
-        points = [
-            {"number": p.number, "level": p.level, "rank": dict(p.rank), "findings": list(p.findings)}
-            for p in self.points
-        ]
-        return {"points": points, "findings": list(self.findings)}
+
+def read_forecast(stored: object) -> Forecast:
+    """Return a forecast as a recording stores it; raise ValidationError for anything else."""
+    return _FORECAST.validate_python(stored)
 
 
-def compared(foreseen: Mapping[str, Any], points: Iterable[Point[object]], end: Mapping[str, Any] | None) -> Comparison:
-    """Compare points of a run, and how it ended, with what was foreseen.
+def compare(forecast: Forecast, points: Iterable[Point[object]], end: Mapping[str, object] | None) -> Comparison:
+    """Compare points of a run, and how it ended, with a forecast.
 
     A value outside all draws, a point refused that nearly all draws accept, and a trip that nearly none has, are findings.
     """
-    found = tuple(_point(foreseen["points"].get(str(point.number)), point) for point in points)
+    found = tuple(_point(forecast.points.get(str(point.number)), point) for point in points)
     findings = [f"point {one.number + 1}: {text}" for one in found for text in one.findings]
-    if end is not None and end["tripped"] and foreseen["trips"] <= 1.0 - LIKELY:
+    if end is not None and end["tripped"] and forecast.trips <= 1.0 - LIKELY:
         findings.insert(
-            0, f"the run tripped ({end['text']}); foreseen was a trip in {100.0 * foreseen['trips']:.2g} % of the draws"
+            0, f"the run tripped ({end['text']}); foreseen was a trip in {100.0 * forecast.trips:.2g} % of the draws"
         )
     return Comparison(found, tuple(findings))
 
 
-def _point(foreseen: Mapping[str, Any] | None, point: Point[object]) -> PointComparison:
+def _point(forecast: PointForecast | None, point: Point[object]) -> PointComparison:
     rank: dict[str, float] = {}
     findings: list[str] = []
-    if foreseen is None:
+    if forecast is None:
         return PointComparison(point.number, point.level, rank, ("no draw came as far",))
     if not point.accepted:
-        if foreseen["accepted"] >= LIKELY:
-            findings.append(f"refused ({point.reason}); {100.0 * foreseen['accepted']:.3g} % of the draws accept it")
+        if forecast.accepted >= LIKELY:
+            findings.append(f"refused ({point.reason}); {100.0 * forecast.accepted:.3g} % of the draws accept it")
         return PointComparison(point.number, point.level, rank, tuple(findings))
     for name, value in _values(point).items():
-        quantiles = foreseen.get(name) or []
+        quantiles: tuple[float, ...] = getattr(forecast, name)
         if not quantiles or not math.isfinite(value):
             continue
         rank[name] = float(np.interp(value, quantiles, GRID))

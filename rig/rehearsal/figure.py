@@ -1,6 +1,6 @@
 """The figure of a rehearsal: the points of every draw, how it ends, margins, accuracy, and what matters."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_LIMITS, MOST_INFLUENCES = 4, 5
+MAX_LIMITS, MAX_INFLUENCES = 4, 5
+"""Limits and influences that are drawn, the closest and strongest; chosen: as many as a panel holds."""
 ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"
+"""Colours of points that are accepted, refused and not begun."""
 
 
 def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
@@ -30,7 +32,7 @@ def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
     well, trips = verdict.ends_well, verdict.trips
     title(
         page,
-        f"{facts['bench']['specimen']['name']}: {facts['plan']['kind']} rehearsed on {len(rehearsal.draws)} twins; ends well "
+        f"{facts.specimen}: {facts.plan_kind} rehearsed on {len(rehearsal.draws)} twins; ends well "
         f"{100.0 * well.value:.0f} % ({100.0 * well.interval[0]:.0f} to {100.0 * well.interval[1]:.0f}), trips "
         f"{100.0 * trips.value:.1f} % ({100.0 * trips.interval[0]:.1f} to {100.0 * trips.interval[1]:.1f})",
     )
@@ -47,9 +49,11 @@ def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) ->
         drawn = True
         amplitude = np.array([1e3 * p.amplitude_m for p in points])
         colour = MAIN if draw.trial.completed else REJECTED if not draw.trial.tripped else SECOND
-        style: dict[str, Any] = {"lw": 0.7, "alpha": 0.45, "color": colour}
-        frequency.semilogx(amplitude, [p.modal_frequency_hz for p in points], "-", **style)
-        damping.semilogx(amplitude, [100.0 * p.damping_ratio for p in points], "-", **style)
+        for axis, y in (
+            (frequency, [p.modal_frequency_hz for p in points]),
+            (damping, [100.0 * p.damping_ratio for p in points]),
+        ):
+            axis.semilogx(amplitude, y, "-", lw=0.7, alpha=0.45, color=colour)
     if not drawn:
         for axis in (frequency, damping):
             say_why_empty(axis, "no accepted point has modal properties")
@@ -70,7 +74,7 @@ def _draw_points(axis: "Axes", verdict: Verdict) -> None:
         say_why_empty(axis, "no point was begun")
         return
     x = np.array([point.number + 1 for point in verdict.points])
-    n = np.array([point.accepted.n for point in verdict.points])
+    n = np.array([point.accepted.of for point in verdict.points])
     accepted = np.array([point.accepted.count for point in verdict.points]) / n
     missing = np.array([point.qualities.get("not begun", 0) for point in verdict.points]) / n
     axis.bar(x, 100.0 * accepted, color=ACCEPTED, label="accepted")
@@ -81,14 +85,16 @@ def _draw_points(axis: "Axes", verdict: Verdict) -> None:
 
 
 def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
-    shown = list(verdict.margins.items())[:MOST_LIMITS][::-1]
+    shown = list(verdict.margins.items())[:MAX_LIMITS][::-1]
     if not shown:
         say_why_empty(axis, "nothing moved")
         return
-    for row, (_, band) in enumerate(shown):
-        axis.plot([100.0 * band.low, 100.0 * band.high], [row, row], color=MAIN, lw=4.0, solid_capstyle="butt")
-        axis.plot(100.0 * band.middle, row, "o", color="w", mec=MAIN)
-        axis.plot(100.0 * band.largest, row, "|", color=SECOND, mew=2.0)
+    for row, (_, quantiles) in enumerate(shown):
+        axis.plot(
+            [100.0 * quantiles.low, 100.0 * quantiles.high], [row, row], color=MAIN, lw=4.0, solid_capstyle="butt"
+        )
+        axis.plot(100.0 * quantiles.middle, row, "o", color="w", mec=MAIN)
+        axis.plot(100.0 * quantiles.largest, row, "|", color=SECOND, mew=2.0)
     axis.axvline(100.0, color=SECOND, lw=0.8, ls="--")
     axis.set_yticks(range(len(shown)), [name.replace(" ", "\n", 1) for name, _ in shown])
     axis.set(xlabel="largest value over its limit, %", xlim=(0.0, None))
@@ -111,7 +117,7 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
 def _closest(verdict: Verdict) -> str:
     """Say how many of the limits are drawn, if not all."""
     count = len(verdict.margins)
-    return f"the closest {MOST_LIMITS} of {count} limits" if count > MOST_LIMITS else ""
+    return f"the closest {MAX_LIMITS} of {count} limits" if count > MAX_LIMITS else ""
 
 
 def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
@@ -125,7 +131,7 @@ def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:
 
 
 def _draw_influences(axis: "Axes", verdict: Verdict) -> None:
-    shown = verdict.influences[:MOST_INFLUENCES][::-1]
+    shown = verdict.influences[:MAX_INFLUENCES][::-1]
     if not shown:
         axis.set_axis_off()
         say_why_empty(axis, "no unknown matters\nmore than by chance")

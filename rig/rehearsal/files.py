@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
 
 import tomli_w
 
@@ -28,7 +27,7 @@ def write_plan(improvement: Improvement, path: Path, comments: Sequence[str]) ->
     _write(path, {"kind": improvement.plan.kind, **table}, [*comments, *tried])
 
 
-def _write(path: Path, table: Mapping[str, Any], comments: Sequence[str]) -> None:
+def _write(path: Path, table: Mapping[str, object], comments: Sequence[str]) -> None:
     lines = [line for text in comments for line in wrap(text, 118, initial_indent="# ", subsequent_indent="#   ")]
     with whole_file(path) as part:
         part.write_text("\n".join([*lines, tomli_w.dumps(dict(table))]), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Hypotheses on what nobody has measured of a rig, as a table (TOML)."""
+"""Prior ranges of unmeasured properties of a twin, as a table (TOML)."""
 
 from pathlib import Path
 from typing import Self
@@ -9,10 +9,10 @@ from rig.bench.configuration import Configured, read_toml, validated
 
 
 class Hypotheses(Configured):
-    """What is drawn from for a twin beyond what was measured.
+    """Prior ranges of unmeasured properties of a twin.
 
-    Probabilities are those with which one twin has the property; sizes are drawn between the bounds, evenly in their logarithm
-    unless something else is said. The highest level is the largest displacement that the plan asks for on the linear rig.
+    Probabilities are those with which a twin has a property. Sizes are drawn log-uniformly between their bounds unless
+    something else is said. The highest level is the largest displacement that the plan asks for on the linear rig.
     """
 
     hardening: float = Field(0.35, ge=0.0, le=1.0)

@@ -1,8 +1,7 @@
-"""What is known of a rig before a rehearsal, gathered from recordings, models and the plan."""
+"""What is known of a rig before a rehearsal, collect_knowledge from recordings, models and the plan."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import scipy
@@ -23,23 +22,30 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
 from rig.measurements import spectra
 from rig.recording.reader import Recording
-from rig.rehearsal.linear_rig import LinearKnowledge, Prior, Responses, known_rig
+from rig.rehearsal.linear.fit import posterior
+from rig.rehearsal.linear.model import Prior, Responses
+from rig.rehearsal.linear.posterior import Posterior
 from vibrolock.arrays import Float
 
-BAND = (0.5, 2.2)  # of the linear frequency: band in which the linear rig is fitted
-LINES = 400  # lines at which a rig is fitted
-SMOOTHED = 15  # lines over which variances are averaged: those of a few realisations scatter by themselves
+BAND = (0.5, 2.2)
+"""Band in which the linear rig is fitted, over the linear frequency; chosen."""
+LINES = 400
+"""Largest number of lines of a fit; chosen: more take time and narrow nothing."""
+AVERAGED_LINES = 15
+"""Lines over which variances are averaged; chosen: those of a few realisations scatter by themselves."""
+Source = Recording | ModalAnalysis | LinearModes | Exciter | NonlinearMode
+"""Recordings of multisines and models from which knowledge is collected."""
 
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
     """What is known of a rig."""
 
-    linear: LinearKnowledge
-    """The linear rig."""
+    linear: Posterior
+    """Posterior of the linear rig."""
     noise_rms: Mapping[str, float]
     """Noise of the channels that were listened to, RMS in the channel's unit."""
-    lead_samples: float | None
+    loop_delay_samples: float | None
     """Samples from an output to the input that shows it, block included; None if it was not measured."""
     shape_measured: bool
     """Whether the drive point's mode shape comes from a measurement, and not from the bench."""
@@ -50,30 +56,30 @@ class Knowledge:
 
 
 @dataclass
-class _Found:
-    """What has been gathered so far."""
+class _Evidence:
+    """What has been collect_knowledge so far."""
 
     responses: Responses | None = None
     priors: dict[str, Prior] = field(default_factory=dict)
     start: dict[str, float] = field(default_factory=dict)
     noise: dict[str, float] = field(default_factory=dict)
-    lead: float | None = None
+    delay: float | None = None
     exciter: bool = False
     shape: bool = False
     mode: NonlinearMode | None = None
     sources: list[str] = field(default_factory=list)
 
 
-def gathered(bench: Bench, plan: Plan, sources: Mapping[str, Any]) -> Knowledge:
-    """Gather what the plan's ``[plant]`` and the ``sources`` tell of a rig.
+def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -> Knowledge:
+    """Collect what the plan's ``[plant]`` and the ``sources`` tell of a rig.
 
     ``sources`` are objects by the name of their file: a `Recording` of ``rig tune``, ``rig check`` or any multisine, a
     `ModalAnalysis` or `LinearModes`, an `Exciter`, a `NonlinearMode`. Raises `ConfigurationError` for anything else, and if
     nothing tells of exciter and structure.
     """
-    found = _Found()
+    found = _Evidence()
     for name, source in sources.items():
-        _take(found, bench, name, source)
+        _add(found, bench, name, source)
     plant = plan.known_plant
     if found.responses is None and plant is not None:
         _plant(found, bench, plant, _ratios(plan, bench))
@@ -91,16 +97,16 @@ def gathered(bench: Bench, plan: Plan, sources: Mapping[str, Any]) -> Knowledge:
         **found.start,
     }
     return Knowledge(
-        linear=known_rig(channels, start, found.priors, found.responses),
+        linear=posterior(channels, start, found.priors, found.responses),
         noise_rms=found.noise,
-        lead_samples=found.lead,
+        loop_delay_samples=found.delay,
         shape_measured=found.shape,
         mode=found.mode,
         sources=tuple(found.sources),
     )
 
 
-def _take(found: _Found, bench: Bench, name: str, source: Any) -> None:
+def _add(found: _Evidence, bench: Bench, name: str, source: object) -> None:
     if isinstance(source, Recording):
         _recording(found, bench, name, source)
     elif isinstance(source, ModalAnalysis | LinearModes):
@@ -117,7 +123,7 @@ def _take(found: _Found, bench: Bench, name: str, source: Any) -> None:
         )
 
 
-def _recording(found: _Found, bench: Bench, name: str, recording: Recording) -> None:
+def _recording(found: _Evidence, bench: Bench, name: str, recording: Recording) -> None:
     if recording.kind != "multisine":
         raise ConfigurationError(f"`sources` = {name}: is a recording of kind {recording.kind}; allowed is a multisine")
     by_level = spectra(recording)
@@ -137,8 +143,8 @@ def _recording(found: _Found, bench: Bench, name: str, recording: Recording) -> 
         found.noise[one] = float(np.sqrt(0.5 * density * bench.sample_rate_hz))
     about = recording.parts[-1].information.get("about", {})
     as_a_loop = about.get("queue", {}).get("how") != "open loop"  # whose queue a test in closed loop does not have
-    lead = about.get("lead_samples") if as_a_loop else None
-    found.lead = None if lead is None else float(lead)
+    delay = about.get("lead_samples") if as_a_loop else None
+    found.delay = None if delay is None else float(delay)
     found.shape = True
     _start_from(found, bench, found.responses)
     found.sources.append(f"{name}: responses to a multisine of {level:.3g} V RMS, {int(inside.sum())} lines")
@@ -156,7 +162,7 @@ def _inside(bench: Bench, frequency_hz: Float) -> NDArray[np.bool_]:
 def _std(matrix: FrequencyResponseMatrix) -> Float:
     total, noise = matrix.total_std[:, :, 0], matrix.noise_std[:, :, 0]
     variance = np.nan_to_num(np.where(np.isfinite(total), total, noise)) ** 2
-    return np.asarray(np.sqrt(scipy.ndimage.uniform_filter1d(variance, SMOOTHED, axis=0, mode="nearest")))
+    return np.asarray(np.sqrt(scipy.ndimage.uniform_filter1d(variance, AVERAGED_LINES, axis=0, mode="nearest")))
 
 
 def _thinned(responses: Responses) -> Responses:
@@ -171,7 +177,7 @@ def _thinned(responses: Responses) -> Responses:
     return replace(responses, frequency_hz=frequency[kept], value=responses.value[kept], std=responses.std[kept])
 
 
-def _start_from(found: _Found, bench: Bench, responses: Responses) -> None:
+def _start_from(found: _Evidence, bench: Bench, responses: Responses) -> None:
     """Take start values from a fit of the plant, which needs none."""
     try:
         plant = PlantModel.from_frequency_responses(
@@ -189,7 +195,7 @@ def _start_from(found: _Found, bench: Bench, responses: Responses) -> None:
     _plant_start(found, plant)
 
 
-def _plant_start(found: _Found, plant: PlantModel) -> None:
+def _plant_start(found: _Evidence, plant: PlantModel) -> None:
     """Take start values from a plant: its polynomials are products of the exciter's parameters."""
     alpha, beta, w = plant.force_v_n, plant.acceleration_v_s2_m, plant.centre_rad_s
     per_volt = 1.0 / alpha[0] if alpha[0] > 0.0 else 1.0 / plant.volts_per_newton()
@@ -204,7 +210,7 @@ def _plant_start(found: _Found, plant: PlantModel) -> None:
     found.start |= start
 
 
-def _plant(found: _Found, bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> None:
+def _plant(found: _Evidence, bench: Bench, plant: PlantModel, ratios: Mapping[str, float]) -> None:
     """Take the plant that the plan has measured, as responses as uncertain as its misfit."""
     low, high = (max(plant.band_hz[0], BAND[0] * bench.specimen.linear_frequency_hz), plant.band_hz[1])
     frequency = np.linspace(low, high, LINES)
@@ -220,7 +226,7 @@ def _plant(found: _Found, bench: Bench, plant: PlantModel, ratios: Mapping[str, 
         if name not in ratios:
             std[:, column] = 2.0 * rms[column]
     found.responses = Responses(frequency, value, std, bench.sample_rate_hz)
-    found.lead = plant.latency_samples
+    found.delay = plant.latency_samples
     found.shape = True
     _plant_start(found, plant)
     found.sources.append(f"the plan's [plant]: {low:.4g} to {high:.4g} Hz, within {100.0 * plant.fit_error:.2g} %")
@@ -230,7 +236,7 @@ def _ratios(plan: Plan, bench: Bench) -> Mapping[str, float]:
     return plan.ratios_to_drive(bench) if isinstance(plan, Levels) else bench.response_ratios
 
 
-def _linear_modes(found: _Found, bench: Bench, name: str, modes: LinearModes) -> None:
+def _linear_modes(found: _Evidence, bench: Bench, name: str, modes: LinearModes) -> None:
     """Take frequency, damping and shape of the tested mode, with their standard errors."""
     tested = int(np.argmin(np.abs(modes.frequency_hz - bench.specimen.linear_frequency_hz)))
     drive = next(i for i, channel in enumerate(modes.channels) if channel.role == "drive")
@@ -253,7 +259,7 @@ def _linear_modes(found: _Found, bench: Bench, name: str, modes: LinearModes) ->
     )
 
 
-def _exciter(found: _Found, name: str, exciter: Exciter) -> None:
+def _exciter(found: _Evidence, name: str, exciter: Exciter) -> None:
     """Take the exciter's parameters, with their standard errors."""
     std = exciter.std
     damping, damping_std = exciter.damping_n_s_m

@@ -1,29 +1,33 @@
-"""A rehearsal: the plan on many twins, in parallel, resumable, with a journal of the draws."""
+"""Rehearsal of a plan on many twins, in parallel, resumable, with a journal of the draws."""
 
 import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+
+from pydantic import JsonValue, TypeAdapter
 
 import vibrolock
 from rig.arming.rehearsed import subject_digest
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
+from rig.rehearsal.effect import Effect
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
-from rig.rehearsal.trial import Trial, TrialPoint, not_computed, run_trial
+from rig.rehearsal.trial import Trial, not_computed, run_trial
 from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
 from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
 from vibrolock.results import Result
 
-MOST_DRAWS = 100_000
-_HEAD = '{"rehearsal": "'  # beginning of every journal of draws
+MAX_DRAWS = 100_000
+"""Largest number of draws; chosen: their file stays below some 100 MB."""
+_HEAD = '{"rehearsal": "'
+"""Beginning of every journal of draws."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +42,63 @@ class Draw:
     """How the plan ended."""
     truth: TrueBackbone
     """What harmonic balance of the twin finds."""
+
+
+_DRAWS = TypeAdapter(list[Draw])
+"""Reader of a journal's draws; keys of other versions are ignored."""
+
+
+Table = dict[str, JsonValue]
+"""Keys of a plan, a bench or hypotheses, as in JSON."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RehearsalFacts:
+    """Everything that the draws of a rehearsal depend on; the number of draws is not among it."""
+
+    plan: Table
+    """The plan."""
+    bench: Table
+    """The bench."""
+    hypotheses: Table | None = None
+    """The hypotheses; None where a virtual bench is rehearsed on itself."""
+    sources: tuple[str, ...] = ()
+    """Sources of the knowledge, one line each."""
+    most_likely: dict[str, float] = field(default_factory=dict)
+    """Most likely parameters of the linear rig."""
+    relative_std: dict[str, float] = field(default_factory=dict)
+    """Their standard deviations, relative where a parameter is positive."""
+    determined: float | None = None
+    """Proportion of the parameters' directions that the data determine."""
+    drawn_for: Table | None = None
+    """Plan for which the twins were drawn, if it is another one."""
+    tests: str
+    """Digest of plan and bench (`rig.arming.rehearsed.subject_digest`)."""
+    seed: int
+    """Seed of the draws."""
+    software_version: str
+    """Version of this program."""
+
+    @property
+    def plan_kind(self) -> str:
+        """Kind of the plan."""
+        return str(self.plan["kind"])
+
+    @property
+    def plan_text(self) -> str:
+        """Description of the plan, or else its kind."""
+        return str(self.plan["description"] or self.plan["kind"])
+
+    @property
+    def bench_name(self) -> str:
+        """Name of the bench."""
+        return str(self.bench["name"])
+
+    @property
+    def specimen(self) -> str:
+        """Name of the specimen."""
+        facts = self.bench["specimen"]
+        return str(facts["name"]) if isinstance(facts, dict) else ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,8 +127,8 @@ class RehearsalRequest:
     """Whether harmonic balance of each twin is wanted."""
 
     def __post_init__(self) -> None:
-        if not 1 <= self.draws <= MOST_DRAWS:
-            raise ConfigurationError(f"`draws` = {self.draws}: allowed is 1 to {MOST_DRAWS}")
+        if not 1 <= self.draws <= MAX_DRAWS:
+            raise ConfigurationError(f"`draws` = {self.draws}: allowed is 1 to {MAX_DRAWS}")
         if self.seed < 0:
             raise ConfigurationError(f"`seed` = {self.seed}: allowed is 0 or more")
         self.plan.check(self.bench)
@@ -95,51 +156,50 @@ class RehearsalRequest:
         return Draw(number=number, unknowns=twin.unknowns, trial=trial, truth=truth)
 
     @property
-    def facts(self) -> dict[str, Any]:
-        """Everything that the draws depend on, as plain data; the number of draws is not among it."""
+    def facts(self) -> RehearsalFacts:
+        """Everything that the draws depend on."""
         known = self.knowledge
-        return {
-            "plan": self.plan.model_dump(mode="json"),
-            "bench": self.bench.model_dump(mode="json"),
-            "hypotheses": None if known is None else self.hypotheses.model_dump(mode="json"),
-            "sources": [] if known is None else list(known.sources),
-            "most_likely": {} if known is None else dict(known.linear.rig().values),
-            "relative_std": {} if known is None else {name: known.linear.std(name) for name in known.linear.names},
-            "determined": None if known is None else known.linear.determined,
-            "drawn_for": None if self.drawn_for is None else self.drawn_for.model_dump(mode="json"),
-            "tests": subject_digest(self.plan, self.bench),
-            "seed": self.seed,
-            "software_version": vibrolock.__version__,
-        }
+        facts = RehearsalFacts(
+            plan=self.plan.model_dump(mode="json"),
+            bench=self.bench.model_dump(mode="json"),
+            drawn_for=None if self.drawn_for is None else self.drawn_for.model_dump(mode="json"),
+            tests=subject_digest(self.plan, self.bench),
+            seed=self.seed,
+            software_version=vibrolock.__version__,
+        )
+        if known is None:
+            return facts
+        return replace(
+            facts,
+            hypotheses=self.hypotheses.model_dump(mode="json"),
+            sources=known.sources,
+            most_likely=dict(known.linear.rig().values),
+            relative_std={name: known.linear.std(name) for name in known.linear.names},
+            determined=known.linear.determined,
+        )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rehearsal(Result):
     """The draws of a rehearsal and what they depend on."""
 
-    facts: Mapping[str, Any]
-    """`RehearsalRequest.facts`."""
+    facts: RehearsalFacts
+    """What the draws depend on."""
     draws: tuple[Draw, ...]
     """The draws, by number."""
     finished: str
     """When it was finished, ISO 8601."""
-    tried: tuple[Mapping[str, Any], ...] = ()
-    """Remedies that were tried on its twins, as plain data (`rig.rehearsal.remedies.Effect`)."""
+    tried: tuple[Effect, ...] = ()
+    """Remedies that were tried on its twins."""
 
     @property
     def digest(self) -> str:
         """Digest of facts and draws, which a recording names."""
-        draws = [asdict(draw) for draw in self.draws]
-        return _digest({"facts": self.facts, "draws": draws})
-
-    @property
-    def tests(self) -> str:
-        """Digest of plan and bench (`rig.arming.rehearsed.subject_digest`)."""
-        return str(self.facts["tests"])
+        return _digest({"facts": asdict(self.facts), "draws": [asdict(draw) for draw in self.draws]})
 
 
-def _digest(facts: Any) -> str:
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+def _digest(content: Mapping[str, object]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def draws_path(output: Path) -> Path:
@@ -177,7 +237,7 @@ def rehearse(
     one line of the caller. Raises `RecordingError` for a journal of another rehearsal, or one that cannot be written, and
     `ConfigurationError` if not a single twin could be computed.
     """
-    done = {} if journal is None else _begun(journal, request, begin_anew)
+    done = {} if journal is None else _completed_draws(journal, request, begin_anew)
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
     missing = [number for number in range(request.draws) if number not in done]
@@ -197,9 +257,9 @@ def _run(request: RehearsalRequest, numbers: Sequence[int], jobs: int | None) ->
         yield draw
 
 
-def _begun(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[int, Draw]:
+def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[int, Draw]:
     """Return the draws that a journal holds; begin it if it does not exist. A last line that was cut off is dropped."""
-    head = {"rehearsal": _digest(request.facts)}
+    head = {"rehearsal": _digest(asdict(request.facts))}
     if not journal.exists():
         _append(journal, head)
         return {}
@@ -207,7 +267,7 @@ def _begun(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[i
         lines = journal.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{journal}: cannot be read ({error})") from None
-    tables = list(_whole_lines(lines))
+    tables = list(_complete_lines(lines))
     if begin_anew and tables[:1] != [head]:
         discard_draws(journal)
         _append(journal, head)
@@ -219,11 +279,11 @@ def _begun(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[i
         )
     if len(tables) < len(lines):
         _write(journal, tables)
-    draws = [draw_from(table) for table in tables[1:]]
+    draws = _DRAWS.validate_python(tables[1:])
     return {draw.number: draw for draw in draws if draw.number < request.draws}
 
 
-def _whole_lines(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
+def _complete_lines(lines: Iterable[str]) -> Iterator[Mapping[str, object]]:
     for line in lines:
         try:
             yield json.loads(line)
@@ -231,13 +291,13 @@ def _whole_lines(lines: Iterable[str]) -> Iterator[dict[str, Any]]:
             return
 
 
-def _write(journal: Path, tables: Sequence[Mapping[str, Any]]) -> None:
+def _write(journal: Path, tables: Sequence[Mapping[str, object]]) -> None:
     discard_draws(journal)
     for table in tables:
         _append(journal, table)
 
 
-def _append(journal: Path, table: Mapping[str, Any]) -> None:
+def _append(journal: Path, table: Mapping[str, object]) -> None:
     try:
         with journal.open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(table) + "\n")
@@ -245,21 +305,3 @@ def _append(journal: Path, table: Mapping[str, Any]) -> None:
             os.fsync(stream.fileno())
     except OSError as error:
         raise RecordingError(f"{journal}: cannot be written ({error.strerror}); the draws so far are in it") from None
-
-
-def draw_from(table: Mapping[str, Any]) -> Draw:
-    """Return the draw of a table made by `dataclasses.asdict`."""
-    trial = dict(table["trial"])
-    trial["points"] = tuple(TrialPoint(**_known(TrialPoint, point)) for point in trial["points"])
-    truth = {name: tuple(values) for name, values in table["truth"].items()}
-    return Draw(
-        number=int(table["number"]),
-        unknowns=dict(table["unknowns"]),
-        trial=Trial(**_known(Trial, trial)),
-        truth=TrueBackbone(**_known(TrueBackbone, truth)),
-    )
-
-
-def _known(kind: type[Any], table: Mapping[str, Any]) -> dict[str, Any]:
-    names = {one.name for one in fields(kind)}
-    return {name: value for name, value in table.items() if name in names}

@@ -1,9 +1,8 @@
-"""What would help a plan: changes that are tried on the same twins, one at a time and then together."""
+"""Remedies for a plan: changes that are tried on the same twins, one at a time and then together."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -13,10 +12,9 @@ from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import plan_from
 from rig.errors import RigError
-from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest
+from rig.rehearsal.effect import Effect
+from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, Table
 from simulators.ensemble import ensemble
-
-Table = dict[str, Any]
 
 GAINS = (
     "k1",
@@ -25,10 +23,15 @@ GAINS = (
     "response_integral_per_s",
     "reference_integral_per_s",
 )
-MOST_EACH = 24  # draws that failed, and draws that ended well, on which a remedy is tried
-MOST_STEPS = 4
-WORTH = 0.02  # of the draws: rise of the score for which a remedy is taken
-TRIP_WEIGHT = 2.0  # a trip counts this many times a point that is missing
+"""Gains of a loop that a remedy scales."""
+MAX_EACH = 24
+"""Draws that failed, and draws that ended well, on which a remedy is tried; chosen: a compromise with the time it takes."""
+MAX_STEPS = 4
+"""Remedies that are combined at most; chosen."""
+MIN_RISE = 0.02
+"""Rise of the score for which a remedy is taken, over the draws; chosen."""
+TRIP_WEIGHT = 2.0
+"""Weight of a trip over that of a missing point; chosen."""
 
 
 @dataclass(frozen=True)
@@ -39,26 +42,6 @@ class Remedy:
     """What is changed, in a few words."""
     changes: Table
     """Keys of the plan with their new values."""
-
-
-@dataclass(frozen=True)
-class Effect:
-    """What a remedy did on the twins on which it was tried."""
-
-    name: str
-    """The remedy."""
-    changes: Table
-    """Keys of the plan with their new values."""
-    ends_well: tuple[float, float]
-    """Probability that the plan ends well, without and with it."""
-    trips: tuple[float, float]
-    """Probability of a trip, without and with it."""
-    points: tuple[float, float]
-    """Accepted points over those of the plan as it was given, in the mean, without and with it; at most 1."""
-    draws: int
-    """Number of twins on which it was tried."""
-    taken: bool = False
-    """Whether it is part of the improved plan."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,29 +63,31 @@ def remedies_for(plan: Plan, bench: Bench, draws: Sequence[Draw]) -> list[Remedy
         list(_ramps(table))
         + list(_windows(table, bench))
         + list(_levels(plan, draws))
-        + list(_loops(table))
-        + list(_patience(table))
+        + list(_gains(table))
+        + list(_waiting_times(table))
     )
 
 
 def _ramps(table: Table) -> Iterator[Remedy]:
-    if "ramp_periods" in table:
+    if isinstance(periods := table.get("ramp_periods"), int | float):
         for times in (4.0, 16.0):
-            yield Remedy(f"ramps {times:g} times as long", {"ramp_periods": times * table["ramp_periods"]})
-    if table.get("on_lost_lock") == "stop" and "dwell" not in table["kind"]:
+            yield Remedy(f"ramps {times:g} times as long", {"ramp_periods": times * periods})
+    if table.get("on_lost_lock") == "stop" and "dwell" not in str(table["kind"]):
         yield Remedy("a lost lock skips its point", {"on_lost_lock": "skip"})
 
 
 def _windows(table: Table, bench: Bench) -> Iterator[Remedy]:
-    window = (table.get("controller") or {}).get("frequency_window_hz")
-    if window is None:
+    window = _section(table, "controller").get("frequency_window_hz")
+    if not isinstance(window, list):
         return
+    low, high = (end for end in window if isinstance(end, int | float))
     lowest, highest = bench.limits.frequency_hz
-    middle, half = 0.5 * (window[0] + window[1]), 0.5 * (window[1] - window[0])
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for times in (1.5, 2.5):
-        wider = [max(middle - times * half, lowest), min(middle + times * half, highest)]
-        if wider[0] > 0.4 * middle and wider != window:
-            yield Remedy(f"a frequency window {times:g} times as wide", {"controller": {"frequency_window_hz": wider}})
+        start, end = max(middle - times * half, lowest), min(middle + times * half, highest)
+        if start > 0.4 * middle and [start, end] != window:
+            wider: Table = {"frequency_window_hz": [start, end]}
+            yield Remedy(f"a frequency window {times:g} times as wide", {"controller": wider})
 
 
 def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
@@ -126,25 +111,28 @@ def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
         yield Remedy(f"levels up to {below[-1]:.3g} {plan.level_unit}", {key: below})
 
 
-def _loops(table: Table) -> Iterator[Remedy]:
-    controller = table.get("controller") or {}
-    gains = {name: controller[name] for name in GAINS if controller.get(name)}
-    for times in (0.5, 2.0):
+def _gains(table: Table) -> Iterator[Remedy]:
+    controller = _section(table, "controller")
+    gains = {name: gain for name in GAINS if isinstance(gain := controller.get(name), int | float) and gain}
+    for words, times in (("half", 0.5), ("twice", 2.0)):
         if gains:
-            yield Remedy(
-                f"{'half' if times < 1.0 else 'twice'} the gains",
-                {"controller": {name: times * value for name, value in gains.items()}},
-            )
+            scaled: Table = {name: times * gain for name, gain in gains.items()}
+            yield Remedy(f"{words} the gains", {"controller": scaled})
 
 
-def _patience(table: Table) -> Iterator[Remedy]:
-    settle = table.get("settle")
-    if settle and "longest_periods" in settle:
-        yield Remedy("three times as long to settle", {"settle": {"longest_periods": 3.0 * settle["longest_periods"]}})
-    if isinstance(table.get("record_periods"), int):
-        yield Remedy("twice the recorded periods", {"record_periods": 2 * table["record_periods"]})
-    if isinstance(table.get("retries"), int):
-        yield Remedy("three more retries", {"retries": table["retries"] + 3})
+def _waiting_times(table: Table) -> Iterator[Remedy]:
+    if isinstance(longest := _section(table, "settle").get("longest_periods"), int | float):
+        yield Remedy("three times as long to settle", {"settle": {"longest_periods": 3.0 * longest}})
+    if isinstance(periods := table.get("record_periods"), int):
+        yield Remedy("twice the recorded periods", {"record_periods": 2 * periods})
+    if isinstance(retries := table.get("retries"), int):
+        yield Remedy("three more retries", {"retries": retries + 3})
+
+
+def _section(table: Table, key: str) -> Table:
+    """Return a table within a table; empty without one."""
+    section = table.get(key)
+    return section if isinstance(section, dict) else {}
 
 
 def improve(
@@ -163,14 +151,14 @@ def improve(
     """
     failed = [draw for draw in rehearsal.draws if draw.trial.computed and not draw.trial.completed]
     well = [draw for draw in rehearsal.draws if draw.trial.completed]
-    sample = [*_spread(failed), *_spread(well)]
-    weights = {d.number: len(failed) / max(len(_spread(failed)), 1) for d in failed}
-    weights |= {d.number: len(well) / max(len(_spread(well)), 1) for d in well}
+    sample = [*_evenly_chosen(failed), *_evenly_chosen(well)]
+    weights = {d.number: len(failed) / max(len(_evenly_chosen(failed)), 1) for d in failed}
+    weights |= {d.number: len(well) / max(len(_evenly_chosen(well)), 1) for d in well}
     plan, effects = request.plan, list[Effect]()
     changes: Table = {}
     asked = len(request.plan.targets())
     now, candidates = sample, remedies_for(plan, request.bench, rehearsal.draws)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         before = _rates(now, weights, max(asked, len(plan.targets())))
         if not any(not draw.trial.completed for draw in now):
             break
@@ -180,7 +168,7 @@ def improve(
             if changed is None:
                 continue
             on_the_same = replace(request, plan=changed, drawn_for=request.plan, balanced=False)
-            found = _again(on_the_same, sample, jobs)
+            found = _rerun(on_the_same, sample, jobs)
             after = _rates(found, weights, max(asked, len(changed.targets())))
             both = [(before[i], after[i]) for i in range(3)]
             effect = Effect(remedy.name, remedy.changes, both[0], both[1], both[2], len(sample))
@@ -190,7 +178,7 @@ def improve(
         if not tried:
             break
         rise, _, remedy, changed, found = max(tried, key=lambda entry: (round(entry[0], 6), entry[1]))
-        if rise <= WORTH:
+        if rise <= MIN_RISE:
             break
         effects = [
             replace(e, taken=True) if e.name == remedy.name and e.ends_well[0] == before[0] else e for e in effects
@@ -206,7 +194,7 @@ def _same_kind(one: Remedy, taken: Remedy) -> bool:
     return set(_paths(one.changes)) & set(_paths(taken.changes)) != set()
 
 
-def _paths(changes: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+def _paths(changes: Mapping[str, object], prefix: str = "") -> Iterator[str]:
     for key, value in changes.items():
         if isinstance(value, Mapping):
             yield from _paths(value, f"{prefix}{key}.")
@@ -214,11 +202,11 @@ def _paths(changes: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
             yield prefix + key
 
 
-def _spread(draws: Sequence[Draw]) -> list[Draw]:
-    """Return at most `MOST_EACH` draws, spread evenly."""
-    if len(draws) <= MOST_EACH:
+def _evenly_chosen(draws: Sequence[Draw]) -> list[Draw]:
+    """Return at most `MAX_EACH` draws, spread evenly."""
+    if len(draws) <= MAX_EACH:
         return list(draws)
-    return [draws[i] for i in np.linspace(0, len(draws) - 1, MOST_EACH).round().astype(int)]
+    return [draws[i] for i in np.linspace(0, len(draws) - 1, MAX_EACH).round().astype(int)]
 
 
 def _rates(draws: Sequence[Draw], weights: Mapping[int, float], asked: int) -> tuple[float, float, float]:
@@ -251,6 +239,6 @@ def _changed(plan: Plan, changes: Table, bench: Bench) -> Plan | None:
     return changed
 
 
-def _again(request: RehearsalRequest, sample: Sequence[Draw], jobs: int | None) -> list[Draw]:
+def _rerun(request: RehearsalRequest, sample: Sequence[Draw], jobs: int | None) -> list[Draw]:
     """Run a changed plan on some of the twins of the rehearsal."""
     return [draw for _, draw in ensemble({str(d.number): d.number for d in sample}, request, n_jobs=jobs)]

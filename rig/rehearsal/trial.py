@@ -1,12 +1,12 @@
-"""One trial of a rehearsal: the plan on one virtual rig, by the same runner, loop and evaluation as a test."""
+"""Trial of a rehearsal: the plan on one virtual rig, by the same runner, loop and evaluation as a test."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from rig.arming.run_options import Silent
 from rig.bench import Bench
@@ -21,7 +21,10 @@ from rig.errors import RigError
 from rig.loop.session import open_session
 from vibrolock.described import Described
 
-FURTHER_PART = 1 << 32  # between the seeds of the parts of a run: other noise in each
+FURTHER_PART = 1 << 32
+"""Difference between the seeds of the parts of a run, so that each has other noise; chosen: above all numbers of draws."""
+Rows = NDArray[np.void]
+"""Rows of a structured array."""
 REFUSED = "REFUSED"
 """End of a trial whose plan the bench refuses before anything moves."""
 NOT_COMPUTED = "NOT_COMPUTED"
@@ -108,7 +111,7 @@ class Trial:
 class _Peaks:
     """Largest value of every limited quantity over a run."""
 
-    def __init__(self, bench: Bench, limits: np.ndarray) -> None:
+    def __init__(self, bench: Bench, limits: Rows) -> None:
         self.bench = bench
         self.moving = [i for i, channel in enumerate(bench.channels) if channel.role in ("drive", "response")]
         gain, keep = float(limits["integrator_gain"][0]), 1.0 - float(limits["integrator_leak"][0])
@@ -118,8 +121,8 @@ class _Peaks:
         self.moved_m = np.zeros(len(self.moving))
         self.output_v = 0.0
 
-    def take(self, rows: np.ndarray) -> None:
-        """Take note of a chunk of rows. The displacement is integrated as the tick does (`rig.tick.safety.kernels`)."""
+    def update(self, rows: Rows) -> None:
+        """Update the peaks by a chunk of rows. The displacement is integrated as the tick does (`rig.tick.safety.kernels`)."""
         inputs = np.nan_to_num(rows["inputs"].astype(float))
         self.inputs = np.maximum(self.inputs, np.abs(inputs).max(axis=0))
         self.output_v = max(self.output_v, float(np.abs(rows["output_v"]).max()))
@@ -144,31 +147,31 @@ class _Peaks:
         return out
 
 
-class _Notebook:
-    """Takes what a run would write to its journal, and keeps the points and the end."""
+class _MemoryJournal:
+    """Journal of a run in memory, which keeps the points and the end."""
 
     def __init__(self) -> None:
-        self.points: list[Mapping[str, Any]] = []
-        self.ended: Mapping[str, Any] = {}
+        self.points: list[Mapping[str, object]] = []
+        self.ended: Mapping[str, object] = {}
         self.peaks: _Peaks | None = None
 
-    def part(self, information: Mapping[str, Any]) -> None:
-        """Take note of the beginning of the run."""
+    def part(self, information: Mapping[str, object]) -> None:
+        """Ignore the beginning of a part."""
 
-    def rows(self, rows: np.ndarray) -> None:
-        """Take note of telemetry rows."""
+    def rows(self, rows: Rows) -> None:
+        """Update the peaks by telemetry rows."""
         if self.peaks is not None and rows.size:
-            self.peaks.take(rows)
+            self.peaks.update(rows)
 
-    def event(self, event: Mapping[str, Any]) -> None:
-        """Take note of an event."""
+    def event(self, event: Mapping[str, object]) -> None:
+        """Ignore an event."""
 
-    def point(self, point: Mapping[str, Any]) -> None:
-        """Take note of a point."""
+    def point(self, point: Mapping[str, object]) -> None:
+        """Keep a point."""
         self.points.append(point)
 
-    def end(self, end: Mapping[str, Any]) -> None:
-        """Take note of the end of the run."""
+    def end(self, end: Mapping[str, object]) -> None:
+        """Keep the end of the run."""
         self.ended = end
 
 
@@ -178,23 +181,23 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
     A plan that the bench refuses is a result too, with ``end`` = ``REFUSED``. What a plan knows of its plant at the force's
     harmonics is left out, for a twin is like the rig near its mode only: the loop measures it by its step.
     """
-    plan = _measuring_harmonics(plan)
+    plan = _without_harmonic_plant(plan)
     try:
         plan.check(bench)
     except RigError as error:
         return _without_rows(REFUSED, str(error), 0.0)
-    notes = _Notebook()
-    execution, samples = _part(plan, bench, seed, notes, None)
+    journal = _MemoryJournal()
+    execution, samples = _part(plan, bench, seed, journal, None)
     for number in count(1):
         if not execution.to_repeat:
             break
-        before = execution.measured_before_repeat(notes.points)
-        execution, more = _part(plan, bench, seed + number * FURTHER_PART, notes, before)
+        before = execution.measured_before_repeat(journal.points)
+        execution, more = _part(plan, bench, seed + number * FURTHER_PART, journal, before)
         samples += more
-    return _trial(bench, execution, samples, notes)
+    return _trial(bench, execution, samples, journal)
 
 
-def _measuring_harmonics(plan: Plan) -> Plan:
+def _without_harmonic_plant(plan: Plan) -> Plan:
     law, loop = plan.law, plan.law.harmonics
     if loop is None or not loop.force_per_v or not isinstance(law, Described):
         return plan
@@ -203,21 +206,21 @@ def _measuring_harmonics(plan: Plan) -> Plan:
 
 
 def _part(
-    plan: Plan, bench: Bench, seed: int, notes: "_Notebook", before: MeasuredBefore | None
+    plan: Plan, bench: Bench, seed: int, journal: _MemoryJournal, before: MeasuredBefore | None
 ) -> tuple[Execution, int]:
     """Run a part of the test: all of the plan, or again what was refused for something that passes."""
     done = frozenset[int]() if before is None else before.done | before.given_up
     with open_session(bench, seed) as session:
         settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, done))
         loop = session.start(settings)
-        notes.peaks = notes.peaks or _Peaks(bench, loop.tick.arrays.limits)
-        execution = Execution(plan, bench, loop, notes, Silent(), before)
+        journal.peaks = journal.peaks or _Peaks(bench, loop.tick.arrays.limits)
+        execution = Execution(plan, bench, loop, journal, Silent(), before)
         execution.run({})
         return execution, loop.statistics.samples
 
 
-def _trial(bench: Bench, execution: Execution, samples: int, notes: "_Notebook") -> Trial:
-    end, tripped = notes.ended, bool(notes.ended["tripped"])
+def _trial(bench: Bench, execution: Execution, samples: int, journal: _MemoryJournal) -> Trial:
+    end, tripped = journal.ended, bool(journal.ended["tripped"])
     at, channel = end.get("tripped_at"), int(execution.tick.guard["channel"][0])
     return Trial(
         end=str(end["reason"]).upper(),
@@ -225,10 +228,10 @@ def _trial(bench: Bench, execution: Execution, samples: int, notes: "_Notebook")
         tripped=tripped,
         completed=bool(end["completed"]),
         channel=bench.channels[channel].name if tripped and channel >= 0 else "",
-        level=float(at["level"]) if at else float("nan"),
+        level=float(at["level"]) if isinstance(at, Mapping) else float("nan"),
         duration_s=samples / bench.sample_rate_hz,
-        shares=notes.peaks.shares() if notes.peaks is not None else {},
-        points=tuple(_points(execution.plan, notes.points)),
+        shares=journal.peaks.shares() if journal.peaks is not None else {},
+        points=tuple(_points(execution.plan, journal.points)),
     )
 
 
@@ -239,7 +242,6 @@ def not_computed(error: Exception) -> Trial:
 
 
 def _without_rows(end: str, text: str, duration_s: float) -> Trial:
-    nothing: dict[str, float] = {}
     return Trial(
         end=end,
         text=text,
@@ -248,13 +250,13 @@ def _without_rows(end: str, text: str, duration_s: float) -> Trial:
         channel="",
         level=float("nan"),
         duration_s=duration_s,
-        shares=nothing,
+        shares={},
         points=(),
     )
 
 
-def _points(plan: Plan, stored: Sequence[Mapping[str, Any]]) -> list[TrialPoint]:
-    result: type[Any] = KINDS[plan.kind].result
+def _points(plan: Plan, stored: Sequence[Mapping[str, object]]) -> list[TrialPoint]:
+    result = KINDS[plan.kind].result
     latest = {table["number"]: table for table in stored}
     return [_point(point_from(table, result)) for table in latest.values()]
 

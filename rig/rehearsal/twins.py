@@ -1,26 +1,29 @@
-"""Draw virtual twins of a bench: the linear rig from what is known, everything else from hypotheses."""
+"""Virtual twins of a bench: the linear rig is drawn from its posterior, everything else from hypotheses."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from identification import NonlinearMode
 from rig.bench import Bench
 from rig.bench.bench import DriverChoice
 from rig.campaigns.planning.plan import Plan
 from rig.drivers.virtual import VirtualDAQ
 from rig.errors import ConfigurationError, RigError
-from rig.rehearsal.forces import drag_for, hardening_for, softening_for
+from rig.rehearsal.forces import Element, damping_for, hardening_for, softening_for
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
-from rig.rehearsal.linear_rig import LinearRig
+from rig.rehearsal.linear.model import LinearRig
+from rig.rehearsal.measured_mode import INSIDE, elements_of
 
-MOST_TRIES = 50
-SUBSTEPS_HZ = 20_000.0  # least internal rate of a twin
-INSIDE = "inside"  # deflection of the structure itself, without that on its suspension: where springs and joints act
-REACH_WITHOUT_LEVELS = 0.3  # of the displacement limit: highest level of a plan whose levels tell of no displacement
+MAX_TRIES = 50
+"""Samples that are tried for one twin; chosen: even where one in ten can be computed, 1 in 200 twins fails."""
+SUBSTEPS_HZ = 20_000.0
+"""Least internal rate of a twin, Hz; chosen: ten steps in a period of the fastest mode of a twin."""
+DEFAULT_LEVEL = 0.3
+"""Highest level over the displacement limit, of a plan whose levels give no displacement; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +51,20 @@ def draw_twin(bench: Bench, plan: Plan, knowledge: Knowledge, hypotheses: Hypoth
     """
     generator = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(number,))))
     problem = ""
-    for _ in range(MOST_TRIES):
+    for _ in range(MAX_TRIES):
         try:
-            drawing = _Drawing(bench, plan, knowledge, hypotheses, generator)
-            twin = Twin(number, drawing.bench_of_it(number), drawing.unknowns)
+            sample = _Sample(bench, plan, knowledge, hypotheses, generator)
+            twin = Twin(number, sample.twin_bench(number), sample.unknowns)
             VirtualDAQ(twin.bench, number)
         except RigError as error:
             problem = str(error)
             continue
         return twin
-    raise ConfigurationError(f"draw {number + 1}: no rig that can be computed in {MOST_TRIES} tries ({problem})")
+    raise ConfigurationError(f"draw {number + 1}: no rig that can be computed in {MAX_TRIES} tries ({problem})")
 
 
-class _Drawing:
-    """One rig as it is drawn."""
+class _Sample:
+    """One rig that is drawn from posterior and hypotheses."""
 
     def __init__(
         self, bench: Bench, plan: Plan, knowledge: Knowledge, hypotheses: Hypotheses, generator: np.random.Generator
@@ -78,15 +81,15 @@ class _Drawing:
         self.unknowns["moving_mass_kg"] = values["moving_mass_kg"]
         self.omega = 2.0 * math.pi * values["frequency_hz"]
         self.highest_m = highest_displacement_m(bench, plan, self.linear)
-        self.elements: list[dict[str, Any]] = []
-        self.friction: list[dict[str, Any]] = []
+        self.elements: list[Element] = []
+        self.friction: list[Element] = []
         self.extra_mode: tuple[float, float] | None = None
         self._nonlinearities()
 
-    def _chance(self, probability: float) -> bool:
+    def _happens(self, probability: float) -> bool:
         return bool(self.generator.random() < probability)
 
-    def _between(self, bounds: tuple[float, float]) -> float:
+    def _log_uniform(self, bounds: tuple[float, float]) -> float:
         """Draw a number between two bounds, evenly in its logarithm."""
         low, high = bounds
         return float(low * (high / low) ** self.generator.random())
@@ -97,8 +100,8 @@ class _Drawing:
         values["damping_ratio"] *= math.exp(hypotheses.damping_drift * normal())
         if not self.knowledge.shape_measured:
             values["drive_shape"] *= math.exp(0.5 * math.log(hypotheses.mode_shape) * normal())
-        wrong = self._chance(hypotheses.gain)
-        factor = self._between(hypotheses.gain_factor)
+        wrong = self._happens(hypotheses.gain)
+        factor = self._log_uniform(hypotheses.gain_factor)
         self.unknowns["gain_factor"] = factor if wrong else 1.0
         values["force_per_volt_n_v"] *= self.unknowns["gain_factor"]
 
@@ -106,22 +109,22 @@ class _Drawing:
         """Draw every property, also those that this twin does not have, so that each keeps its random numbers."""
         hypotheses = self.hypotheses
         kind, place = self.generator.random(), self.generator.random()
-        shift = self._between(hypotheses.shift)
-        growth = self._between(hypotheses.damping_growth)
+        shift = self._log_uniform(hypotheses.shift)
+        growth = self._log_uniform(hypotheses.damping_growth)
         joint, joint_shift, slip = (
-            self._chance(hypotheses.joint),
-            self._between(hypotheses.joint_shift),
-            self._between(hypotheses.joint_slip),
+            self._happens(hypotheses.joint),
+            self._log_uniform(hypotheses.joint_shift),
+            self._log_uniform(hypotheses.joint_slip),
         )
         stop, gap, stiffness = (
-            self._chance(hypotheses.stop),
-            self._between(hypotheses.stop_gap),
-            self._between(hypotheses.stop_stiffness),
+            self._happens(hypotheses.stop),
+            self._log_uniform(hypotheses.stop_gap),
+            self._log_uniform(hypotheses.stop_stiffness),
         )
         second, at, shape = (
-            self._chance(hypotheses.second_mode),
-            self._between(hypotheses.second_mode_at),
-            self._between(hypotheses.second_mode_shape),
+            self._happens(hypotheses.second_mode),
+            self._log_uniform(hypotheses.second_mode_at),
+            self._log_uniform(hypotheses.second_mode_shape),
         )
         points = ["drive", *self.linear.channels]
         self.at = points[int(place * len(points))]
@@ -130,10 +133,10 @@ class _Drawing:
             if kind >= hypotheses.hardening + hypotheses.softening:
                 shift = 0.0
             self._spring(shift if kind < hypotheses.hardening else -shift)
-            self._drag(growth)
+            self._velocity_damping(growth)
             self._joint(joint_shift if joint else 0.0, slip)
         else:
-            self._measured(self.knowledge.mode)
+            self._measured_mode(self.knowledge.mode)
         self._stop(gap if stop else 0.0, stiffness)
         self.unknowns["second_mode"] = at if second and abs(at - 1.0) > 0.05 else 0.0
         if self.unknowns["second_mode"]:
@@ -150,12 +153,12 @@ class _Drawing:
             make = hardening_for if shift > 0.0 else softening_for
             self.elements.append(make(INSIDE, stiffness, self.highest_m))
 
-    def _drag(self, growth: float) -> None:
+    def _velocity_damping(self, growth: float) -> None:
         self.unknowns["damping_growth"] = growth
         if growth > 1.0:
             shape = self.linear.of("drive_shape")
             damping = 2.0 * (growth - 1.0) * self.linear.of("damping_ratio") * self.omega / shape**2
-            self.elements.append(drag_for(INSIDE, damping, self.omega * self.highest_m))
+            self.elements.append(damping_for(INSIDE, damping, self.omega * self.highest_m))
 
     def _joint(self, shift: float, slip: float) -> None:
         self.unknowns["joint_shift"] = shift
@@ -186,16 +189,14 @@ class _Drawing:
                 }
             )
 
-    def _measured(self, mode: Any) -> None:
-        """Take frequency and damping over the amplitude from a measured mode: springs and drag that give them."""
-        from rig.rehearsal.measured_mode import elements_of
-
+    def _measured_mode(self, mode: NonlinearMode) -> None:
+        """Add springs and dampers that give frequency and damping over the amplitude as measured."""
         self.elements.extend(elements_of(mode, self.linear, self.generator))
         self.unknowns |= {"shift": 0.0, "damping_growth": 1.0, "joint_shift": 0.0, "joint_slip": 0.0}
 
-    def bench_of_it(self, number: int) -> Bench:
+    def twin_bench(self, number: int) -> Bench:
         """Return the bench with this rig behind its driver."""
-        options: dict[str, Any] = {
+        options: Element = {
             "structure": self._structure(),
             "elements": self.elements,
             "friction": self.friction,
@@ -215,7 +216,7 @@ class _Drawing:
             }
         )
 
-    def _structure(self) -> dict[str, Any]:
+    def _structure(self) -> Element:
         rig = self.linear
         modes = [
             (
@@ -240,7 +241,7 @@ class _Drawing:
             "shapes": shapes,
         }
 
-    def _exciter(self) -> dict[str, Any]:
+    def _exciter(self) -> Element:
         """Return a voltage-driven shaker with the drawn force per volt g and back-EMF b: ``G = b / g``, ``R = b / g^2``."""
         v = self.linear.values
         half, per_volt = 0.5 * v["exciter_damping_n_s_m"], v["force_per_volt_n_v"]
@@ -254,7 +255,7 @@ class _Drawing:
             "inductance_h": v["coil_time_constant_s"] * resistance,
         }
 
-    def _stinger(self) -> dict[str, Any]:
+    def _stinger(self) -> Element:
         """Return the stinger, damped such that armature and drive point do not ring on it (5 % of critical)."""
         v = self.linear.values
         stiffness = v["stinger_stiffness_n_m"]
@@ -264,13 +265,13 @@ class _Drawing:
             "damping_n_s_m": 0.1 * math.sqrt(stiffness * v["moving_mass_kg"]),
         }
 
-    def _sensors(self) -> list[dict[str, Any]]:
+    def _sensors(self) -> list[Element]:
         out = []
         for channel in self.bench.channels:
             if channel.role == "monitor" or channel.loopback:
                 continue
             noise = self.knowledge.noise_rms.get(channel.name, channel.noise_rms)
-            table: dict[str, Any] = {
+            table: Element = {
                 "name": channel.name,
                 "kind": "force" if channel.role == "force" else "acceleration",
                 "sensitivity_v_per_unit": channel.sensitivity_v_per_unit,
@@ -283,17 +284,15 @@ class _Drawing:
             out.append(table)
         return out
 
-    def _device(self) -> dict[str, Any]:
+    def _device(self) -> Element:
         """Return converter, latency and faults: a virtual bench's own, else as the measurement saw them."""
         bench, hypotheses = self.bench, self.hypotheses
         faults = {name: getattr(hypotheses, name) for name in ("late_per_s", "held_per_s", "lost_per_s")}
         if bench.driver.name == "virtual":
             own = VirtualDAQ(bench)
             converter = own.rig.converter.model_dump()
-            kept: dict[str, Any] = {
-                key: bench.driver.options[key]
-                for key in ("queue_blocks", "delay_samples")
-                if key in bench.driver.options
+            kept = {
+                key: value for key, value in bench.driver.options.items() if key in ("queue_blocks", "delay_samples")
             }
             return {"converter": converter, **kept, "faults": faults}
         rate = bench.sample_rate_hz
@@ -305,8 +304,8 @@ class _Drawing:
             "substeps": max(1, math.ceil(SUBSTEPS_HZ / rate)),
             "oversampling": 1,
         }
-        lead = self.knowledge.lead_samples
-        late = 0 if lead is None else max(0, round(lead - bench.block - 0.5))
+        delay = self.knowledge.loop_delay_samples
+        late = 0 if delay is None else max(0, round(delay - bench.block - 0.5))
         return {"converter": converter, "delay_samples": late, "faults": faults}
 
 
@@ -322,5 +321,5 @@ def highest_displacement_m(bench: Bench, plan: Plan, rig: LinearRig) -> float:
         "N RMS": math.sqrt(2.0) * abs(receptance),
         "V": abs(receptance * complex(rig.force_per_v(s, np.array([receptance]))[0])),
     }.get(plan.level_unit)
-    reached = REACH_WITHOUT_LEVELS * limit if per_unit is None else highest * per_unit
+    reached = DEFAULT_LEVEL * limit if per_unit is None else highest * per_unit
     return float(min(max(reached, 1e-4 * limit), limit))

@@ -1,18 +1,23 @@
-"""The verdict of a rehearsal: how probable each end is, what it takes, how accurate it is, and what matters most for that."""
+"""Verdict of a rehearsal: probability of each end, margins, accuracy, and the unknowns that matter most."""
 
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy
+from pydantic import Field
 
 from rig.rehearsal.rehearsal import Draw, Rehearsal
+from rig.rehearsal.statistics import Proportion, Quantiles, Statistic
+from vibrolock.arrays import Float
 
-SIGNIFICANT = 0.01  # probability, over all that is tested, with which an influence may be chance
-FEW = 8  # draws with a finite value below which nothing is said of an influence
+SIGNIFICANCE = 0.01
+"""Probability, over all tests together, that an influence is found by chance; chosen."""
+MIN_DRAWS = 8
+"""Least number of draws with a finite value for which an influence is tested; chosen."""
+QUANTITIES = ("frequency_hz", "force_n", "amplitude_m", "voltage_v", "damping_ratio")
+"""Quantities of a point that a rehearsal evaluates."""
 ADVICE = {
     "frequency_hz": "measure the frequency again just before the test (`rig check`)",
     "damping_ratio": "measure the damping with finer lines (`rig tune`)",
@@ -27,99 +32,45 @@ ADVICE = {
     "stop_stiffness": "look for stops and rattling parts within the motion that the plan asks for",
     "second_mode": "measure the neighbourhood of the mode with a finer multisine",
 }
-"""What to measure where an unknown matters most."""
+"""Measurement that narrows an unknown, by the unknown."""
 
 
-@dataclass(frozen=True)
-class Share:
-    """A probability estimated from n draws, with its 95 % interval (Wilson's score interval)."""
+class LevelCount(Statistic):
+    """Number of draws that tripped at a level."""
 
+    level: float
     count: int
-    n: int
-
-    @property
-    def value(self) -> float:
-        """The estimate."""
-        return self.count / self.n if self.n else float("nan")
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Lower and upper end."""
-        if not self.n:
-            return 0.0, 1.0
-        found = scipy.stats.binomtest(self.count, self.n).proportion_ci(0.95, method="wilson")
-        return float(found.low), float(found.high)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return value and interval as plain data."""
-        return {
-            "value": self.value,
-            "low": self.interval[0],
-            "high": self.interval[1],
-            "count": self.count,
-            "of": self.n,
-        }
 
 
-@dataclass(frozen=True)
-class Band:
-    """Quantiles of a quantity over the draws: 5 %, 50 % and 95 %, and the largest; NaN if no draw has one."""
-
-    low: float
-    middle: float
-    high: float
-    largest: float
-    n: int
-
-    @classmethod
-    def of(cls, values: Sequence[float]) -> "Band":
-        """Return the band of the finite values."""
-        finite = np.array([v for v in values if np.isfinite(v)])
-        if not finite.size:
-            nothing = float("nan")
-            return cls(nothing, nothing, nothing, nothing, 0)
-        low, middle, high = np.quantile(finite, [0.05, 0.5, 0.95])
-        return cls(float(low), float(middle), float(high), float(finite.max()), finite.size)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the quantiles as plain data."""
-        return {"5 %": self.low, "50 %": self.middle, "95 %": self.high, "largest": self.largest, "n": self.n}
-
-
-@dataclass(frozen=True)
-class TripVerdict:
-    """One way to trip."""
+class TripVerdict(Proportion):
+    """One cause of a trip, and the proportion of draws that it ends."""
 
     cause: str
     """Name of the `rig.tick.safety.layout.EndReason`."""
     channel: str
     """Channel; empty for none."""
-    levels: dict[float, int]
-    """Number of draws by the level at which it happened."""
-    share: Share
-    """Share of the draws."""
+    levels: tuple[LevelCount, ...]
+    """Number of draws by the level at which it happened, the lowest level first."""
 
 
-@dataclass(frozen=True)
-class PointVerdict:
+class PointVerdict(Statistic):
     """One point of the plan over all draws."""
 
     number: int
     """Number in the plan, from 0."""
     level: float
     """Its level."""
-    accepted: Share
+    accepted: Proportion
     """Share of the draws in which it is accepted."""
     qualities: dict[str, int]
     """Number of draws by the quality of the point; ``not begun`` where the run ended before."""
     reasons: dict[str, int]
     """Why it is refused, without numbers, and how often; the most frequent first."""
-    bands: dict[str, Band]
-    """Bands of ``frequency_hz``, ``force_n``, ``amplitude_m``, ``voltage_v`` and ``damping_ratio`` where it is accepted."""
+    quantiles: dict[str, Quantiles] = Field(alias="bands")
+    """Quantiles of ``frequency_hz``, ``force_n``, ``amplitude_m``, ``voltage_v`` and ``damping_ratio`` where it is accepted."""
 
 
-@dataclass(frozen=True)
-class Influence:
+class Influence(Statistic):
     """How strongly an outcome depends on an unknown."""
 
     outcome: str
@@ -134,31 +85,30 @@ class Influence:
     """What to measure."""
 
 
-@dataclass(frozen=True, eq=False)
-class Verdict:
-    """The verdict on the twins that could be computed; all shares are of these."""
+class Verdict(Statistic):
+    """The verdict on the twins that could be computed; all proportions are of these."""
 
-    not_computed: Share
-    """Share of all draws whose twin could not be built or simulated."""
+    not_computed: Proportion
+    """Proportion of all draws whose twin could not be built or simulated."""
     why_not_computed: dict[str, int]
     """Why not, without numbers, and how often; the most frequent first."""
-    ends_well: Share
+    ends_well: Proportion
     """Every point accepted."""
-    trips: Share
+    trips: Proportion
     """The run trips, or the bench refuses the plan."""
-    lost_lock: Share
+    lost_lock: Proportion
     """The lock is lost, or never gained, at a point at least."""
     ways_to_trip: tuple[TripVerdict, ...]
     """Causes, the most frequent first."""
     points: tuple[PointVerdict, ...]
     """Points by number."""
-    duration_s: Band
+    duration_s: Quantiles
     """Time on the rig."""
-    margins: dict[str, Band]
+    margins: dict[str, Quantiles]
     """Largest value over its limit, by limit, the closest first."""
-    frequency_error: Band
+    frequency_error: Quantiles
     """Size of the relative error of the modal frequency against harmonic balance."""
-    damping_error: Band
+    damping_error: Quantiles
     """Size of the relative error of the damping ratio as reported."""
     influences: tuple[Influence, ...]
     """What matters most, the strongest first."""
@@ -167,42 +117,7 @@ class Verdict:
     def trips_at_most(self) -> float:
         """Upper end of the 95 % interval of a trip's probability, if each twin that could not be computed trips."""
         missing = self.not_computed.count
-        return Share(self.trips.count + missing, self.trips.n + missing).interval[1]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the verdict as plain data."""
-        return {
-            "not_computed": self.not_computed.to_dict(),
-            "why_not_computed": self.why_not_computed,
-            "ends_well": self.ends_well.to_dict(),
-            "trips": self.trips.to_dict(),
-            "lost_lock": self.lost_lock.to_dict(),
-            "ways_to_trip": [
-                {
-                    "cause": way.cause,
-                    "channel": way.channel,
-                    "levels": [{"level": level, "count": count} for level, count in way.levels.items()],
-                    **way.share.to_dict(),
-                }
-                for way in self.ways_to_trip
-            ],
-            "points": [
-                {
-                    "number": point.number,
-                    "level": point.level,
-                    "accepted": point.accepted.to_dict(),
-                    "qualities": point.qualities,
-                    "reasons": point.reasons,
-                    "bands": {name: band.to_dict() for name, band in point.bands.items()},
-                }
-                for point in self.points
-            ],
-            "duration_s": self.duration_s.to_dict(),
-            "margins": {name: band.to_dict() for name, band in self.margins.items()},
-            "frequency_error": self.frequency_error.to_dict(),
-            "damping_error": self.damping_error.to_dict(),
-            "influences": [vars(one) for one in self.influences],
-        }
+        return Proportion(count=self.trips.count + missing, of=self.trips.of + missing).interval[1]
 
 
 def verdict_of(rehearsal: Rehearsal) -> Verdict:
@@ -212,17 +127,17 @@ def verdict_of(rehearsal: Rehearsal) -> Verdict:
     n = len(draws)
     errors = [_errors(draw) for draw in draws]
     return Verdict(
-        not_computed=Share(len(missing), len(rehearsal.draws)),
+        not_computed=Proportion(count=len(missing), of=len(rehearsal.draws)),
         why_not_computed=dict(Counter(map(without_numbers, missing)).most_common()),
-        ends_well=Share(sum(d.trial.completed for d in draws), n),
-        trips=Share(sum(d.trial.tripped for d in draws), n),
-        lost_lock=Share(sum(d.trial.lost_lock for d in draws), n),
+        ends_well=Proportion(count=sum(d.trial.completed for d in draws), of=n),
+        trips=Proportion(count=sum(d.trial.tripped for d in draws), of=n),
+        lost_lock=Proportion(count=sum(d.trial.lost_lock for d in draws), of=n),
         ways_to_trip=_ways(draws),
         points=_points(draws),
-        duration_s=Band.of([d.trial.duration_s for d in draws]),
+        duration_s=Quantiles.of(d.trial.duration_s for d in draws),
         margins=_margins(draws),
-        frequency_error=Band.of([e for found in errors for e in found[0]]),
-        damping_error=Band.of([e for found in errors for e in found[1]]),
+        frequency_error=Quantiles.of(e for found in errors for e in found[0]),
+        damping_error=Quantiles.of(e for found in errors for e in found[1]),
         influences=_influences(draws),
     )
 
@@ -244,10 +159,16 @@ def _ways(draws: Sequence[Draw]) -> tuple[TripVerdict, ...]:
         if draw.trial.tripped:
             found.setdefault((draw.trial.end, draw.trial.channel), []).append(draw.trial.level)
     ways = [
-        TripVerdict(cause, channel, dict(sorted(Counter(levels).items())), Share(len(levels), len(draws)))
+        TripVerdict(
+            cause=cause,
+            channel=channel,
+            levels=tuple(LevelCount(level=level, count=n) for level, n in sorted(Counter(levels).items())),
+            count=len(levels),
+            of=len(draws),
+        )
         for (cause, channel), levels in found.items()
     ]
-    return tuple(sorted(ways, key=lambda way: -way.share.count))
+    return tuple(sorted(ways, key=lambda way: -way.count))
 
 
 def _points(draws: Sequence[Draw]) -> tuple[PointVerdict, ...]:
@@ -264,14 +185,13 @@ def _point(number: int, level: float, draws: Sequence[Draw]) -> PointVerdict:
     if len(found) < len(draws):
         qualities["not begun"] = len(draws) - len(found)
     reasons = Counter(without_numbers(point.reason) for point in found if point.reason)
-    names = ("frequency_hz", "force_n", "amplitude_m", "voltage_v", "damping_ratio")
     return PointVerdict(
-        number,
-        level,
-        Share(len(accepted), len(draws)),
-        dict(qualities.most_common()),
-        dict(reasons.most_common()),
-        {name: Band.of([getattr(point, name) for point in accepted]) for name in names},
+        number=number,
+        level=level,
+        accepted=Proportion(count=len(accepted), of=len(draws)),
+        qualities=dict(qualities.most_common()),
+        reasons=dict(reasons.most_common()),
+        quantiles={name: Quantiles.of(getattr(point, name) for point in accepted) for name in QUANTITIES},
     )
 
 
@@ -280,9 +200,9 @@ def without_numbers(text: str) -> str:
     return re.sub(r"(?<![A-Za-z_])[-+]?\d[\d.]*(?:e[-+]?\d+)?", "…", text)
 
 
-def _margins(draws: Sequence[Draw]) -> dict[str, Band]:
+def _margins(draws: Sequence[Draw]) -> dict[str, Quantiles]:
     names = {name for draw in draws for name in draw.trial.shares}
-    bands = {name: Band.of([d.trial.shares[name] for d in draws if name in d.trial.shares]) for name in names}
+    bands = {name: Quantiles.of(d.trial.shares[name] for d in draws if name in d.trial.shares) for name in names}
     return dict(sorted(bands.items(), key=lambda entry: (-entry[1].high, entry[0])))
 
 
@@ -294,7 +214,7 @@ OUTCOMES: dict[str, Callable[[Draw], float]] = {
     "closest limit": lambda draw: max(draw.trial.shares.values(), default=float("nan")),
     "damping error": lambda draw: float(np.mean(_errors(draw)[1])) if draw.truth.numbers else float("nan"),
 }
-"""What an influence may be on."""
+"""Outcomes whose dependence on the unknowns is tested."""
 
 
 def _influences(draws: Sequence[Draw]) -> tuple[Influence, ...]:
@@ -306,18 +226,24 @@ def _influences(draws: Sequence[Draw]) -> tuple[Influence, ...]:
         values = np.array([value(draw) for draw in draws])
         for name in names:
             drawn = np.array([draw.unknowns.get(name, np.nan) for draw in draws])
-            for of, x in _views(name, drawn):
+            for of, x in _transforms(name, drawn):
                 kept = np.isfinite(values) & np.isfinite(x)
-                if kept.sum() < FEW or np.ptp(values[kept]) == 0.0 or np.ptp(x[kept]) == 0.0:
+                if kept.sum() < MIN_DRAWS or np.ptp(values[kept]) == 0.0 or np.ptp(x[kept]) == 0.0:
                     continue
                 found = scipy.stats.spearmanr(x[kept], values[kept])
-                if found.pvalue < SIGNIFICANT / tested:
+                if found.pvalue < SIGNIFICANCE / tested:
                     out.append(
-                        Influence(outcome, of, float(found.statistic), float(found.pvalue), ADVICE.get(name, ""))
+                        Influence(
+                            outcome=outcome,
+                            unknown=of,
+                            correlation=float(found.statistic),
+                            p_value=float(found.pvalue),
+                            advice=ADVICE.get(name, ""),
+                        )
                     )
     return tuple(sorted(out, key=lambda one: -abs(one.correlation)))
 
 
-def _views(name: str, drawn: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """Return the forms of an unknown that may matter: a shift by its value and by its size."""
+def _transforms(name: str, drawn: Float) -> list[tuple[str, Float]]:
+    """Return the transforms of an unknown that are tested: of a shift, its value and its magnitude."""
     return [(name, drawn), (f"size of {name}", np.abs(drawn))] if name == "shift" else [(name, drawn)]

@@ -21,7 +21,7 @@ from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 from rig.recording.stored import End, StoredPoint
-from rig.rehearsal.comparison import compared
+from rig.rehearsal.comparison import compare, read_forecast
 from rig.results.files import load, understood
 from rig.results.kinds import KINDS
 from rig.text.message_pages import page_of
@@ -148,7 +148,7 @@ def _beside_rehearsal(part: Part) -> dict[str, Any] | None:
     foreseen = (part.information.get("about") or {}).get("rehearsal", {}).get("foreseen")
     if foreseen is None:
         return None
-    return compared(foreseen, [point_from(table) for table in part.points], part.end).to_dict()
+    return asdict(compare(read_forecast(foreseen), [point_from(table) for table in part.points], part.end))
 
 
 def _mode_shape(recording: Recording, points: Sequence[Point[object]], kind: str) -> dict[str, Any] | None:

@@ -1,18 +1,22 @@
 """Files of rehearsals: every draw with its unknowns, its end, its points and its harmonic balance."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
-from rig.rehearsal.rehearsal import Draw, Rehearsal
-from rig.rehearsal.report import lines, summary
+from rig.rehearsal.effect import Effect
+from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalFacts
+from rig.rehearsal.report import Summary, lines, summary
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
 from rig.results.kind import Arrays, Attributes, FileKind
 
+_FACTS, _TRIED = TypeAdapter(RehearsalFacts), TypeAdapter(tuple[Effect, ...])
+"""Readers of facts and remedies, as a file stores them."""
 TRIAL = ("end", "text", "tripped", "completed", "channel", "level", "duration_s")
 POINT = tuple(one.name for one in fields(TrialPoint))
 
@@ -37,11 +41,11 @@ def _pack(rehearsal: Rehearsal) -> tuple[Arrays, Attributes]:
     for name, column in (("number", "numbers"), ("frequency_hz", "frequency_hz"), ("damping_ratio", "damping_ratio")):
         arrays[f"balanced/{name}"] = np.array([value for draw in draws for value in getattr(draw.truth, column)], float)
     attributes = {
-        "facts": dict(rehearsal.facts),
+        "facts": asdict(rehearsal.facts),
         "finished": rehearsal.finished,
         "unknowns": unknowns,
         "limits": limits,
-        "tried": [dict(one) for one in rehearsal.tried],
+        "tried": [asdict(one) for one in rehearsal.tried],
     }
     return arrays, attributes
 
@@ -71,10 +75,10 @@ def _unpack(arrays: Arrays, attributes: Attributes) -> Rehearsal:
         unknowns = _row(arrays["unknowns"][row], attributes["unknowns"])
         draws.append(Draw(number=int(number), unknowns=unknowns, trial=trial, truth=truth))
     return Rehearsal(
-        facts=attributes["facts"],
+        facts=_FACTS.validate_python(attributes["facts"]),
         draws=tuple(draws),
         finished=str(attributes["finished"]),
-        tried=tuple(attributes.get("tried", ())),
+        tried=_TRIED.validate_python(attributes.get("tried", ())),
     )
 
 
@@ -84,7 +88,7 @@ def _row(values: NDArray[np.float64], names: Sequence[str]) -> dict[str, float]:
 
 def _say(found: dict[str, Any]) -> None:
     """Print the page; the specimen stands above it."""
-    for line in lines(found):
+    for line in lines(Summary.model_validate(found)):
         print(line)
 
 
@@ -93,7 +97,7 @@ REHEARSAL = FileKind(
     holds=Rehearsal,
     pack=_pack,
     unpack=_unpack,
-    summarise=summary,
+    summarise=lambda rehearsal: summary(rehearsal).model_dump(by_alias=True),
     say=_say,
     draw="rig.rehearsal.figure:draw_rehearsal",
     figure_in=(12.0, 8.4),

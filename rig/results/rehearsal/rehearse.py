@@ -2,9 +2,8 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from rig.bench import Bench
 from rig.campaigns.evaluation.recorded import points_of
@@ -12,13 +11,14 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
-from rig.rehearsal.comparison import Comparison, compared
+from rig.rehearsal.comparison import Comparison, compare
+from rig.rehearsal.effect import Effect
 from rig.rehearsal.files import write_bench, write_plan
-from rig.rehearsal.foreseen import foreseen_by
+from rig.rehearsal.forecast import forecast
 from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
-from rig.rehearsal.knowledge import gathered
+from rig.rehearsal.knowledge import collect_knowledge
 from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse
-from rig.rehearsal.remedies import Effect, improve
+from rig.rehearsal.remedies import improve
 from rig.results.files import load, load_as, save
 from rig.results.kinds import KINDS
 from rig.results.rehearsal.kind import REHEARSAL
@@ -70,7 +70,7 @@ def request_for(subject: Subject) -> RehearsalRequest:
         )
     hypotheses = Hypotheses() if subject.hypotheses is None else load_hypotheses(subject.hypotheses)
     with _opened(subject.sources) as sources:
-        knowledge = None if subject.exact else gathered(subject.bench, subject.plan, sources)
+        knowledge = None if subject.exact else collect_knowledge(subject.bench, subject.plan, sources)
     return RehearsalRequest(
         plan=subject.plan,
         bench=subject.bench,
@@ -82,9 +82,9 @@ def request_for(subject: Subject) -> RehearsalRequest:
 
 
 @contextmanager
-def _opened(paths: Sequence[Path]) -> Iterator[dict[str, Any]]:
+def _opened(paths: Sequence[Path]) -> Iterator[dict[str, object]]:
     with ExitStack() as stack:
-        found: dict[str, Any] = {}
+        found: dict[str, object] = {}
         for path in paths:
             found[str(path)] = load(path) if kind_of(path) in KINDS else stack.enter_context(Recording(path))
         yield found
@@ -132,8 +132,7 @@ def improve_into(
     """
     listener = listener or Listener()
     found = improve(request, rehearsal, progress=listener.effect, jobs=jobs)
-    tried = tuple(asdict(effect) for effect in found.effects)
-    first = replace(rehearsal, tried=tried)
+    first = replace(rehearsal, tried=found.effects)
     save(first, output)
     if not found.changes:
         return first, None
@@ -165,9 +164,9 @@ def load_rehearsal(path: Path) -> Rehearsal:
 
 def compare_with(rehearsal: Rehearsal, path: Path) -> Comparison:
     """Compare a recording with what a rehearsal of its plan foresaw. Raises `RecordingError` for one of another kind."""
-    kind = rehearsal.facts["plan"]["kind"]
+    kind = rehearsal.facts.plan_kind
     with Recording(path) as recording:
         if recording.kind != kind:
             raise RecordingError(f"{path}: is a recording of kind {recording.kind}; rehearsed was a {kind}")
         end = recording.parts[-1].end if recording.parts else None
-        return compared(foreseen_by(rehearsal), points_of(recording), end)
+        return compare(forecast(rehearsal), points_of(recording), end)

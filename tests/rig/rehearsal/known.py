@@ -3,7 +3,8 @@
 import numpy as np
 
 from rig.rehearsal.knowledge import Knowledge
-from rig.rehearsal.linear_rig import Prior, known_rig
+from rig.rehearsal.linear.fit import posterior
+from rig.rehearsal.linear.model import Prior
 
 MODE = {"frequency_hz": 24.37, "damping_ratio": 0.004, "drive_shape": 0.908}
 EXCITER = {
@@ -23,9 +24,9 @@ def knowledge_of_the_magnet_beam(log_std=1e-3, **changes):
     priors = {name: Prior(value, log_std) for name, value in values.items()}
     priors |= {f"ratio {name}": Prior(value, log_std) for name, value in RATIOS.items()}
     priors |= {"drive_shape low": Prior(1e-3, log_std), "drive_shape high": Prior(0.5, log_std)}
-    linear = known_rig(tuple(RATIOS), values, priors, None)
+    linear = posterior(tuple(RATIOS), values, priors, None)
     return Knowledge(
-        linear=linear, noise_rms={}, lead_samples=None, shape_measured=True, mode=None, sources=("stated",)
+        linear=linear, noise_rms={}, loop_delay_samples=None, shape_measured=True, mode=None, sources=("stated",)
     )
 
 

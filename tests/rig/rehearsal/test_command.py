@@ -41,7 +41,7 @@ def test_a_twin_is_written_and_an_improved_plan_too(command):
     assert load_plan("patient.toml").settle.longest_periods == 120.0
     assert "# taken: three times as long to settle, ends well 0 -> 100 %" in Path("patient.toml").read_text()
     assert len(load_rehearsal(Path("patient.h5")).draws) == 2
-    assert any(one["taken"] for one in load_rehearsal(Path("r.h5")).tried)
+    assert any(one.taken for one in load_rehearsal(Path("r.h5")).tried)
     assert "twin 1 written to t.toml" in command("rehearse plan.toml --exact --twin 1 -o t.toml").succeeded().out
     command("run plan.toml --bench t.toml -o run.h5").succeeded()
 

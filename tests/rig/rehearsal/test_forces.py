@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.drivers.virtual import VirtualDAQ
-from rig.rehearsal.forces import describing_function, drag_for, hardening_for, softening_for
+from rig.rehearsal.forces import damping_for, describing_function, hardening_for, softening_for
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.twins import draw_twin
 from simulators.analysis import phase_resonance_backbone
@@ -58,5 +58,5 @@ def test_a_twins_damping_grows_by_what_was_drawn():
 
 
 def test_drag_dissipates_what_a_damper_would():
-    table = drag_for("drive", 3.0, 0.4)
+    table = damping_for("drive", 3.0, 0.4)
     assert 8.0 / (3.0 * math.pi) * table["parameters"][0] * 0.4 == pytest.approx(3.0)

@@ -5,7 +5,7 @@ import pytest
 from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.recording.reader import Recording
-from rig.rehearsal.knowledge import gathered
+from rig.rehearsal.knowledge import collect_knowledge
 from tests.recorded import recorded
 
 
@@ -15,5 +15,5 @@ def test_the_delay_of_a_multisine_is_that_of_a_loop_unless_its_queue_was_chosen_
         about = recording.parts[-1].information["about"]
         if how is not None:
             about["queue"] = {"how": how}
-        known = gathered(load_bench("magnet-beam"), load_plan("magnet-beam/backbone"), {"a": recording})
-        assert known.lead_samples == (about["lead_samples"] if taken else None)
+        known = collect_knowledge(load_bench("magnet-beam"), load_plan("magnet-beam/backbone"), {"a": recording})
+        assert known.loop_delay_samples == (about["lead_samples"] if taken else None)

@@ -8,11 +8,12 @@ import pytest
 from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
-from rig.rehearsal.foreseen import rehearsed_in
+from rig.rehearsal.forecast import rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.report import lines, summary, verdict_in_one_line
+from rig.rehearsal.statistics import Proportion
 from rig.rehearsal.truth import NOT_BALANCED
-from rig.rehearsal.verdict import Share, verdict_of
+from rig.rehearsal.verdict import verdict_of
 from rig.results.rehearsal.rehearse import Subject, request_for
 from simulators.ensemble import VariantError
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
@@ -55,9 +56,9 @@ def test_a_twin_that_cannot_be_computed_is_counted_and_the_others_go_on():
     assert found.draws[2].trial.text == "ZeroDivisionError: float division by zero"
     assert found.draws[2].truth == NOT_BALANCED
     verdict = verdict_of(found)
-    assert verdict.not_computed == Share(1, 4)
-    assert verdict.ends_well == Share(3, 3)
-    assert all(point.accepted == Share(3, 3) for point in verdict.points)
+    assert verdict.not_computed == Proportion(count=1, of=4)
+    assert verdict.ends_well == Proportion(count=3, of=3)
+    assert all(point.accepted == Proportion(count=3, of=3) for point in verdict.points)
     assert np.isfinite(verdict.duration_s.high)
     says = "1 of 4 twins could not be computed (1 x ZeroDivisionError: float division by zero), all shares are of the others"
     assert any(line.startswith(f"not computed    {says}") for line in lines(summary(found)))
@@ -66,8 +67,8 @@ def test_a_twin_that_cannot_be_computed_is_counted_and_the_others_go_on():
 
 def test_a_twin_that_cannot_be_computed_counts_as_a_trip_when_a_bench_asks_for_a_largest_probability():
     found = rehearse(request_of(4))
-    assert verdict_of(found).trips == Share(0, 3)
-    assert rehearsed_in(found, "r.h5").trips_at_most == pytest.approx(Share(1, 4).interval[1])
+    assert verdict_of(found).trips == Proportion(count=0, of=3)
+    assert rehearsed_in(found, "r.h5").trips_at_most == pytest.approx(Proportion(count=1, of=4).interval[1])
 
 
 @pytest.mark.parametrize("kind", [OSError, MemoryError])

@@ -9,7 +9,7 @@ from rig.campaigns.plans import load_plan, plan_from
 from rig.rehearsal import remedies
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
-from rig.rehearsal.remedies import Remedy, _rates, _spread, improve, remedies_for
+from rig.rehearsal.remedies import Remedy, _evenly_chosen, _rates, improve, remedies_for
 from tests.rig.rehearsal.known import knowledge_of_the_magnet_beam
 from tests.rig.rehearsal.plans import SHORT, magnet_beam
 
@@ -97,7 +97,7 @@ def draw(number, *, completed, tripped=False, accepted=0, computed=True):
 
 @pytest.mark.parametrize("number", [25, 60, 100, 241])
 def test_a_sample_of_draws_reaches_from_the_first_to_the_last_in_even_steps(number):
-    sample = _spread(range(number))
+    sample = _evenly_chosen(range(number))
     assert (len(sample), sample[0], sample[-1]) == (24, 0, number - 1)
     steps = np.diff(sample)
     assert steps.min() >= 1
@@ -106,7 +106,7 @@ def test_a_sample_of_draws_reaches_from_the_first_to_the_last_in_even_steps(numb
 
 @pytest.mark.parametrize("number", [0, 1, 24])
 def test_few_draws_are_all_in_the_sample(number):
-    assert _spread(range(number)) == list(range(number))
+    assert _evenly_chosen(range(number)) == list(range(number))
 
 
 @pytest.mark.parametrize(("failed", "well"), [(30, 90), (90, 30), (1, 100), (30, 1), (30, 0)])
@@ -126,7 +126,7 @@ def test_probabilities_of_a_sample_are_those_of_all_draws_that_it_stands_for(mon
         asked.append([one.number for one in sample])
         return [draw(one.number, completed=True, accepted=8) for one in sample]
 
-    monkeypatch.setattr(remedies, "_again", again)
+    monkeypatch.setattr(remedies, "_rerun", again)
     told = []
     found = improve(SimpleNamespace(plan=plan, bench=None), SimpleNamespace(draws=draws), progress=told.append)
     share = failed / (failed + well)

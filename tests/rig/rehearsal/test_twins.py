@@ -89,7 +89,7 @@ def test_a_twin_as_a_file_is_the_same_rig(tmp_path):
 
 def test_a_device_of_another_driver_keeps_its_block_and_its_latency():
     known = knowledge_of_the_magnet_beam()
-    measured = type(known)(**{**vars(known), "lead_samples": 10 + 0.5 + 20})
+    measured = type(known)(**{**vars(known), "loop_delay_samples": 10 + 0.5 + 20})
     bench = magnet_beam(driver=DriverChoice(name="serial", options={"port": "nowhere"}), block=10)
     daq = VirtualDAQ(draw(0, bench=bench, knowledge=measured).bench)
     assert daq.latency_samples == pytest.approx(20.5)

@@ -3,22 +3,21 @@
 import numpy as np
 import pytest
 
-from rig.rehearsal.rehearsal import Draw, Rehearsal
+from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalFacts
 from rig.rehearsal.report import lines, summary
+from rig.rehearsal.statistics import Proportion, Quantiles
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
-from rig.rehearsal.verdict import Band, Share, verdict_of, without_numbers
+from rig.rehearsal.verdict import LevelCount, verdict_of, without_numbers
 
-FACTS = {
-    "bench": {"name": "b", "specimen": {"name": "s"}},
-    "plan": {"kind": "backbone", "description": "", "levels_v": [1.0, 2.0]},
-    "sources": [],
-    "determined": None,
-    "hypotheses": {},
-    "seed": 0,
-    "software_version": "0",
-    "tests": "t",
-}
+FACTS = RehearsalFacts(
+    bench={"name": "b", "specimen": {"name": "s"}},
+    plan={"kind": "backbone", "description": "", "levels_v": [1.0, 2.0]},
+    hypotheses={},
+    seed=0,
+    software_version="0",
+    tests="t",
+)
 
 
 def draw_of(
@@ -70,8 +69,8 @@ def test_ends_are_counted_by_cause_and_level():
     found = verdict_of(rehearsal_of(draws))
     assert (found.ends_well.count, found.trips.count, found.lost_lock.count) == (6, 3, 2)
     assert [(way.cause, way.levels) for way in found.ways_to_trip] == [
-        ("FORCE_LIMIT", {1.0: 1, 2.0: 1}),
-        ("LOST_LOCK", {2.0: 1}),
+        ("FORCE_LIMIT", (LevelCount(level=1.0, count=1), LevelCount(level=2.0, count=1))),
+        ("LOST_LOCK", (LevelCount(level=2.0, count=1),)),
     ]
     first, second = found.points
     assert (first.accepted.count, second.accepted.count) == (9, 7)
@@ -90,13 +89,13 @@ def test_intervals_are_wilsons():
         p = count / n
         middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
         half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
-        assert Share(count, n).interval == pytest.approx((middle - half, middle + half), abs=1e-9)
+        assert Proportion(count=count, of=n).interval == pytest.approx((middle - half, middle + half), abs=1e-9)
 
 
 def test_bands_leave_out_what_is_not_a_number():
-    band = Band.of([1.0, 2.0, 3.0, float("nan")])
+    band = Quantiles.of([1.0, 2.0, 3.0, float("nan")])
     assert (band.middle, band.largest, band.n) == (2.0, 3.0, 3)
-    assert Band.of([]).n == 0
+    assert Quantiles.of([]).n == 0
 
 
 def test_what_matters_is_found_and_chance_is_not():

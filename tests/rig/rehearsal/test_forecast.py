@@ -1,4 +1,4 @@
-"""A run is compared with what was foreseen, and a bench may ask for that before it is armed."""
+"""A run is compare with what was foreseen, and a bench may ask for that before it is armed."""
 
 from dataclasses import replace
 
@@ -12,8 +12,8 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.running.runner import resume_run, run_plan
 from rig.errors import NotArmed
 from rig.recording.reader import Recording
-from rig.rehearsal.comparison import compared
-from rig.rehearsal.foreseen import foreseen_by, rehearsed_in
+from rig.rehearsal.comparison import compare
+from rig.rehearsal.forecast import forecast, rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
@@ -34,7 +34,7 @@ def points_on(bench):
 
 
 def test_the_rig_that_was_known_lies_within(foreseeing):
-    found = compared(foreseen_by(foreseeing), *points_on(magnet_beam()))
+    found = compare(forecast(foreseeing), *points_on(magnet_beam()))
     assert not found.findings
     assert all(0.0 <= rank <= 1.0 for point in found.points for rank in point.rank.values())
     assert len(found.points[0].rank) == 5
@@ -44,13 +44,13 @@ def test_another_rig_is_a_finding(foreseeing):
     stiffer = bench_with(
         {"specimen": {"linear_frequency_hz": 25.6}}, deviation={"frequency": [0.05, 0.0, 0.0, 0.0], "damping": []}
     )
-    found = compared(foreseen_by(foreseeing), *points_on(stiffer))
+    found = compare(forecast(foreseeing), *points_on(stiffer))
     assert any("point 1: frequency_hz = 25." in text and "outside all draws" in text for text in found.findings)
 
 
 def test_a_trip_that_no_draw_had_is_a_finding(foreseeing):
     tight = bench_with({"limits": {"displacement_m": 3e-4}})
-    found = compared(foreseen_by(foreseeing), *points_on(tight))
+    found = compare(forecast(foreseeing), *points_on(tight))
     assert found.findings[0].startswith("the run tripped (displacement above its limit")
 
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from rig.rehearsal.linear_rig import POSSIBLE, LinearRig, Prior, Responses, known_rig
+from rig.rehearsal.linear.fit import posterior
+from rig.rehearsal.linear.model import LinearRig, Prior, Responses
+from rig.rehearsal.linear.parameters import POSSIBLE
 from simulators import VirtualRig
 from simulators.analysis import frequency_response
 from tests.rig.rehearsal.known import EXCITER, MODE, RATIOS
@@ -75,7 +77,7 @@ LINES = np.linspace(12.0, 52.0, 300)
 
 
 def test_parameters_are_recovered_within_their_standard_errors():
-    found = known_rig(("tip",), START, {}, responses_of(rig_of(TRUE), LINES, 0.001))
+    found = posterior(("tip",), START, {}, responses_of(rig_of(TRUE), LINES, 0.001))
     rig = found.rig()
     for name, value in TRUE.items():
         assert abs(np.log(rig.values[name] / value)) < 4.0 * found.std(name) + 2e-3, name
@@ -87,15 +89,15 @@ def test_stated_intervals_cover_the_truth_over_many_noises():
     inside = {"frequency_hz": 0, "damping_ratio": 0, "drive_shape": 0, "moving_mass_kg": 0}
     rig, n = rig_of(TRUE), 16
     for seed in range(n):
-        found = known_rig(("tip",), START, {}, responses_of(rig, LINES, 0.02, seed))
+        found = posterior(("tip",), START, {}, responses_of(rig, LINES, 0.02, seed))
         for name in inside:
             inside[name] += abs(np.log(found.rig().values[name] / TRUE[name])) < 2.0 * found.std(name)
     assert all(count >= 0.75 * n for count in inside.values()), inside
 
 
 def test_what_a_narrow_band_does_not_determine_stays_as_wide_as_before():
-    narrow = known_rig(("tip",), START, {}, responses_of(rig_of(TRUE), np.linspace(23.0, 25.0, 200), 0.001))
-    wide = known_rig(("tip",), START, {}, responses_of(rig_of(TRUE), LINES, 0.001))
+    narrow = posterior(("tip",), START, {}, responses_of(rig_of(TRUE), np.linspace(23.0, 25.0, 200), 0.001))
+    wide = posterior(("tip",), START, {}, responses_of(rig_of(TRUE), LINES, 0.001))
     assert narrow.std("moving_mass_kg") > 2.0 * wide.std("moving_mass_kg")
     assert narrow.determined < wide.determined
     drawn = [narrow.draw(np.random.default_rng(seed)) for seed in range(60)]
@@ -108,7 +110,7 @@ def test_what_a_narrow_band_does_not_determine_stays_as_wide_as_before():
 
 def test_draws_fit_the_responses_within_their_noise():
     responses = responses_of(rig_of(TRUE), LINES, 0.01)
-    found = known_rig(("tip",), START, {}, responses)
+    found = posterior(("tip",), START, {}, responses)
     best = np.abs((found.rig().responses(LINES, RATE_HZ) - responses.value) / responses.std)
     for seed in range(10):
         drawn = found.draw(np.random.default_rng(seed)).responses(LINES, RATE_HZ)
@@ -116,7 +118,7 @@ def test_draws_fit_the_responses_within_their_noise():
 
 
 def test_a_mode_beside_is_found():
-    found = known_rig(("tip",), START, {}, responses_of(rig_of(TRUE, [(31.0, 0.005, 0.4)]), LINES, 0.005))
+    found = posterior(("tip",), START, {}, responses_of(rig_of(TRUE, [(31.0, 0.005, 0.4)]), LINES, 0.005))
     rig = found.rig()
     assert rig.values["frequency_hz 2"] == pytest.approx(31.0, rel=2e-3)
     assert rig.values["drive_shape 2"] == pytest.approx(0.4, rel=0.05)
@@ -125,7 +127,7 @@ def test_a_mode_beside_is_found():
 
 def test_without_responses_the_priors_are_all_there_is():
     priors = {name: Prior(value, 0.03) for name, value in {**MODE, **EXCITER}.items()}
-    found = known_rig(tuple(RATIOS), START, priors, None)
+    found = posterior(tuple(RATIOS), START, priors, None)
     assert found.std("moving_mass_kg") == pytest.approx(0.03)
     assert found.rig().values["moving_mass_kg"] == pytest.approx(EXCITER["moving_mass_kg"])
     assert found.determined == 0.0
@@ -153,7 +155,7 @@ def test_a_fit_never_leaves_what_a_rig_can_be(monkeypatch):
     monkeypatch.setattr(LinearRig, "responses", noted)
     right = responses_of(rig_of(TRUE), LINES[::10], 1e-3)
     reversed_force = right.value * np.array([-1.0, 1.0, 1.0])  # no rig answers so: the fit goes astray
-    known_rig(("tip",), START, {}, Responses(right.frequency_hz, reversed_force, 1e-5 * np.abs(right.value), RATE_HZ))
+    posterior(("tip",), START, {}, Responses(right.frequency_hz, reversed_force, 1e-5 * np.abs(right.value), RATE_HZ))
     for name in seen[0]:
         values = [one[name] for one in seen]
         assert min(values) > 0.0, name

@@ -1,0 +1,143 @@
+"""Fit of the linear rig to measured responses, together with what is known beforehand.
+
+Every parameter has a prior, wide for what nobody knows; it bounds the directions that the data do not determine. Masses,
+stiffnesses and all else that is positive are fitted and drawn by their logarithms.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from rig.errors import ConfigurationError
+from rig.rehearsal.linear.model import Prior, Responses
+from rig.rehearsal.linear.parameters import ParameterTable, parameters_of, start_values
+from rig.rehearsal.linear.posterior import Linearisation, Posterior
+from vibrolock.arrays import Complex, Float
+
+_MIN_UNEXPLAINED = 4.0
+"""Misfit over its expectation above which a further mode is sought; chosen."""
+_MAX_LEFT = 0.5
+"""Largest part of that misfit that may be left for the further mode to be kept; chosen."""
+_MAX_NEIGHBOURS = 3
+"""Largest number of modes beside the tested one; chosen."""
+_MODEL_FLOOR = 2e-3
+"""Smallest relative standard deviation of a response that is believed; chosen: the accuracy of calibrated sensors."""
+_MAX_EVALUATIONS, _TOLERANCE = 100, 1e-7
+"""Evaluations and relative tolerance of one fit; chosen: far below the standard errors."""
+_HALVED = 0.25
+"""Variance over that of the prior below which the data have at least halved a standard deviation."""
+
+
+def posterior(
+    channels: Sequence[str], start: Mapping[str, float], priors: Mapping[str, Prior], responses: Responses | None
+) -> Posterior:
+    """Return the posterior of the linear rig by responses and priors together.
+
+    Parameters
+    ----------
+    channels
+        Names of the response channels.
+    start
+        Start values of a mode, and of the exciter as far as they are known.
+    priors
+        Priors by name; without one, a shaker that suits the specimen is assumed.
+    responses
+        Measured responses; None leaves the priors as they are.
+
+    Raises
+    ------
+    ConfigurationError
+        If the responses are not those of such a rig.
+
+    The fit starts from several shakers, because it may have more than one minimum.
+    """
+    neighbours_hz: list[float] = []
+    fit = _fit(parameters_of(channels, start, priors, responses, neighbours_hz), responses, start_values(start))
+    while responses is not None and fit.posterior.inflation > _MIN_UNEXPLAINED and len(neighbours_hz) < _MAX_NEIGHBOURS:
+        neighbours_hz.append(fit.worst_hz)
+        parameters = parameters_of(channels, start, priors, responses, neighbours_hz)
+        better = _fit(parameters, responses, [fit.posterior.rig().values])
+        if better.posterior.inflation > _MAX_LEFT * fit.posterior.inflation:
+            break
+        fit = better
+    return fit.posterior
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Posterior of one fit, and the line (Hz) that fits worst."""
+
+    posterior: Posterior
+    worst_hz: float
+
+
+def _fit(table: ParameterTable, responses: Responses | None, starts: Sequence[Mapping[str, float]]) -> _Fit:
+    """Return the best of the fits from several starts."""
+    centre, std = np.array(table.centre), np.array(table.std)
+    if responses is None:
+        return _Fit(_posterior(table, centre, np.diag(std**2)), 0.0)
+    scale = np.sqrt(np.mean(np.abs(responses.value) ** 2, axis=0))
+    sigma = np.sqrt(
+        responses.std**2 + (_MODEL_FLOOR * np.abs(responses.value)) ** 2 + (0.2 * _MODEL_FLOOR * scale) ** 2
+    )
+
+    def misses(x: Float) -> Complex:
+        return np.asarray(_model(table, x, responses) - responses.value)
+
+    def residuals(x: Float) -> Float:
+        error = (misses(x) / sigma).ravel()
+        return np.concatenate([error.real, error.imag, (x - centre) / std])
+
+    bounds = table.bounds
+    fits = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for start in starts:
+            x = np.clip(_with_measured_force(table, table.vector(start), responses), *bounds)
+            fits.append(
+                scipy.optimize.least_squares(
+                    residuals,
+                    x,
+                    bounds=bounds,
+                    x_scale=std,
+                    max_nfev=_MAX_EVALUATIONS,
+                    ftol=_TOLERANCE,
+                    xtol=_TOLERANCE,
+                )
+            )
+    found = min(fits, key=lambda fit: float(fit.cost))
+    if not np.all(np.isfinite(found.fun)):
+        raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
+    error = misses(found.x)
+    expected = max(2 * error.size - centre.size, 1)
+    inflation = float(np.sum(np.abs(error / sigma) ** 2)) / expected
+    jacobian = np.asarray(found.jac)[: 2 * error.size] / np.sqrt(max(1.0, inflation))
+    covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(std**-2.0))
+    relative = np.abs(error) / scale
+    best = replace(
+        _posterior(table, found.x, covariance),
+        misfit=float(np.sqrt(np.mean(relative**2))),
+        inflation=inflation,
+        determined=float(np.mean(np.linalg.eigvalsh(covariance / np.outer(std, std)) < _HALVED)),
+        linearisation=Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), jacobian, std, bounds),
+    )
+    return _Fit(best, float(responses.frequency_hz[int(np.argmax(relative[:, 1]))]))
+
+
+def _model(table: ParameterTable, x: Float, responses: Responses) -> Complex:
+    rig = _posterior(table, x, np.empty(0)).rig()
+    return rig.responses(responses.frequency_hz, responses.sample_rate_hz)
+
+
+def _posterior(table: ParameterTable, x: Float, covariance: Float) -> Posterior:
+    return Posterior(tuple(table.names), np.array(table.positive), x, covariance, table.channels)
+
+
+def _with_measured_force(table: ParameterTable, x: Float, responses: Responses) -> Float:
+    """Return start values with the force per volt at which the median force is the measured one."""
+    model = _model(table, x, responses)
+    ratio = float(np.median(np.abs(responses.value[:, 0]) / np.abs(model[:, 0])))
+    out = x.copy()
+    out[table.names.index("force_per_volt_n_v")] += np.log(ratio)
+    return out
