@@ -1,21 +1,34 @@
-"""Values that a child process has read: written into a folder as a JSON document and a file of raw bytes, and read back."""
+"""Values that a child process has read, as a JSON document and a file of raw bytes in a folder."""
 
 import json
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import JsonValue
 
 from rig.errors import RigError
+from rig.exchange.file_data import ChannelFacts, FileData, StoredObject
+from rig.exchange.proposal.mapping_text import MappingText
+from rig.exchange.uff.datasets import Axis, Function, ModeShape, UnitSystem, UniversalFile
 from rig.recording.examination import LARGEST_RATIO, SMALL_BYTES
 from rig.system.child import MEMORY_BYTES
 
 MOST_BYTES = 2_000_000_000
-"""Data of a file of any size."""
+"""Most memory that the contents of a file of any size may take, bytes; chosen: half of what the child may use."""
 _ITEM_BYTES = 100
-"""What a text, a number or a table takes in memory beside its content, about."""
+"""Memory of a text, a number or a structure beside its content, bytes; measured, roughly, in CPython."""
 _TREE, _NUMBERS = "tree.json", "numbers.bin"
 _PLAIN = "biufcUS"
+"""Kinds of dtypes that are written as bytes."""
+_RECORDS = {
+    one.__name__: one
+    for one in (Axis, ChannelFacts, FileData, Function, MappingText, ModeShape, StoredObject, UnitSystem, UniversalFile)
+}
+"""Dataclasses that readers return, by name."""
 
 
 def most_bytes(path: Path) -> int:
@@ -23,20 +36,20 @@ def most_bytes(path: Path) -> int:
     return min(MOST_BYTES, max(SMALL_BYTES, LARGEST_RATIO * path.stat().st_size))
 
 
-def write_values(value: Any, folder: Path, most: int = MOST_BYTES) -> None:
-    """Write ``value`` into ``folder``; values other than numbers, texts and containers become the name of their type.
+def write_values(value: object, folder: Path, most: int = MOST_BYTES) -> None:
+    """Write ``value`` into ``folder``; values other than records, numbers, texts and containers become their type's name.
 
     Raises `TooMuchData` for values that take more than ``most`` bytes of memory when they are read back.
     """
     with (folder / _NUMBERS).open("wb") as numbers:
-        tree = _Taking(numbers, most).apart(value)
+        tree = _Encoder(numbers, most).encode(value)
     (folder / _TREE).write_text(json.dumps(tree), encoding="ascii")
 
 
-def read_values(folder: Path) -> Any:
+def read_values(folder: Path) -> object:
     """Read back the value that `write_values` wrote."""
     with (folder / _NUMBERS).open("rb") as numbers:
-        return _put_together(json.loads((folder / _TREE).read_text(encoding="ascii")), numbers)
+        return _decode(json.loads((folder / _TREE).read_text(encoding="ascii")), numbers)
 
 
 class TooMuchData(RigError):  # noqa: N818 (says what happened)
@@ -46,13 +59,13 @@ class TooMuchData(RigError):  # noqa: N818 (says what happened)
         super().__init__(f"holds more than {most} bytes of data, which are allowed in a file of this size")
 
 
-class _Taking:
-    """Takes values apart into a tree and numbers, as long as they are not too large."""
+class _Encoder:
+    """Encodes values as a tree and numbers, as long as they are not too large."""
 
     def __init__(self, numbers: BinaryIO, most: int) -> None:
         self._numbers, self._most, self._left = numbers, most, most
 
-    def apart(self, value: Any) -> Any:
+    def encode(self, value: object) -> JsonValue:
         """Return the tree of a value, with places among the numbers in place of arrays."""
         self._spend(_ITEM_BYTES)
         if value is None or isinstance(value, bool):
@@ -63,19 +76,22 @@ class _Taking:
         if isinstance(value, bytes):
             self._spend(len(value))
             return {"bytes": value.decode("latin-1")}
+        if is_dataclass(value) and not isinstance(value, type):
+            entries = {one.name: getattr(value, one.name) for one in fields(value)}
+            return {"record": type(value).__name__, "fields": self.encode(entries)}
         if isinstance(value, dict):
-            return {"table": [[str(key), self.apart(item)] for key, item in value.items()]}
+            return {"keys": [*map(str, value)], "values": [self.encode(item) for item in value.values()]}
         if isinstance(value, list | tuple):
-            return {"list": [self.apart(item) for item in value]}
-        if type(value) is np.ndarray and value.dtype.kind == "O":
-            return {"cells": list(value.shape), "items": [self.apart(item) for item in value.reshape(-1)]}
-        if type(value) is np.ndarray or isinstance(value, np.generic | int | float | complex):
+            return {"list": [self.encode(item) for item in value]}
+        if _is_array(value) and value.dtype.kind == "O":
+            return {"cells": list(value.shape), "items": [self.encode(item) for item in value.reshape(-1)]}
+        if _is_array(value) or isinstance(value, np.generic | int | float | complex):
             array = np.asarray(value)
             if array.dtype.kind in _PLAIN:
                 return {"array": [array.dtype.str, list(array.shape), self._written(array)], "as": _kind(value)}
         return f"<{type(value).__name__}>"
 
-    def _written(self, array: Any) -> int:
+    def _written(self, array: NDArray[np.generic]) -> int:
         self._spend(array.nbytes)
         place = self._numbers.tell()
         self._numbers.write(np.ascontiguousarray(array).data if array.nbytes else b"")
@@ -87,38 +103,53 @@ class _Taking:
             raise TooMuchData(self._most)
 
 
-def _kind(value: Any) -> str:
+def _is_array(value: object) -> TypeGuard[NDArray[np.generic]]:
+    """Return whether a value is an array, and of no subclass, such as a matrix."""
+    return type(value) is np.ndarray
+
+
+def _kind(value: object) -> str:
     if isinstance(value, np.ndarray):
         return "array"
     return "scalar" if isinstance(value, np.generic) else "number"
 
 
-def _put_together(tree: Any, numbers: BinaryIO) -> Any:
-    if not isinstance(tree, dict):
-        return tree
-    if "bytes" in tree:
-        return tree["bytes"].encode("latin-1")
-    if "table" in tree:
-        return {key: _put_together(item, numbers) for key, item in tree["table"]}
-    if "list" in tree:
-        return [_put_together(item, numbers) for item in tree["list"]]
-    if "cells" in tree:
-        cells = np.empty(len(tree["items"]), dtype=object)
-        for index, item in enumerate(tree["items"]):
-            cells[index] = _put_together(item, numbers)
-        return cells.reshape(tree["cells"])
-    dtype, shape, place = tree["array"]
+def _decode(tree: JsonValue, numbers: BinaryIO) -> object:
+    match tree:
+        case {"bytes": str(text)}:
+            return text.encode("latin-1")
+        case {"record": str(name), "fields": entries}:
+            decoded = _decode(entries, numbers)
+            return _RECORDS[name](**decoded) if isinstance(decoded, dict) else None
+        case {"keys": list(keys), "values": list(values)}:
+            return {str(key): _decode(item, numbers) for key, item in zip(keys, values, strict=True)}
+        case {"list": list(items)}:
+            return [_decode(item, numbers) for item in items]
+        case {"cells": list(shape), "items": list(items)}:
+            cells = np.empty(len(items), dtype=object)
+            for index, item in enumerate(items):
+                cells[index] = _decode(item, numbers)
+            return cells.reshape(_shape(shape))
+        case {"array": [str(dtype), list(shape), int(place)], "as": kind}:
+            array = _read_array(dtype, _shape(shape), place, numbers)
+            return array if kind == "array" else array[()] if kind == "scalar" else array.item()
+    return tree
+
+
+def _shape(sizes: Sequence[JsonValue]) -> tuple[int, ...]:
+    return tuple(size for size in sizes if isinstance(size, int))
+
+
+def _read_array(dtype: str, shape: Sequence[int], place: int, numbers: BinaryIO) -> NDArray[np.generic]:
     array = np.empty(shape, dtype)
     if array.nbytes:
         numbers.seek(place)
         numbers.readinto(array.reshape(-1).view(np.uint8).data)  # type: ignore[attr-defined]
-    if tree["as"] == "array":
-        return array
-    return array[()] if tree["as"] == "scalar" else array.item()
+    return array
 
 
 def reason(error: Exception, what: str) -> str:
-    """Return in words why a file is not read."""
+    """Return in words why a file cannot be read."""
     if isinstance(error, MemoryError):
         return f"takes more than {MEMORY_BYTES / 2**30:g} GiB of memory, or is damaged"
     if isinstance(error, OSError) and error.errno:

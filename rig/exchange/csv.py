@@ -11,19 +11,22 @@ from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.exchange.child_reading import ImportFailed
+from rig.exchange.child_reading import NOT_OURS, ImportFailed
+from rig.exchange.file_data import FileData, StoredObject, from_variables
 from rig.system.text_files import read_text
-from rig.text.contents import Contents
+from rig.text.contents import Array, Contents
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from identification.mapping import CsvLayout
 
 LARGEST_BYTES = 1_000_000_000
+"""Largest file that is read, bytes; chosen."""
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 _KIND, _OTHERS = "# vibrolock: ", "# others: "
 
@@ -43,7 +46,7 @@ def write_csv(items: Sequence[Contents], path: Path) -> None:
         writer.writerows(zip(*(values.tolist() for _, _, values in columns), strict=True))
 
 
-def _others(item: Contents) -> dict[str, Any]:
+def _others(item: Contents) -> dict[str, object]:
     """Return everything that is not in the table, and how its columns form arrays."""
     loose = {}
     for name, values in item.arrays.items():
@@ -61,22 +64,29 @@ def _others(item: Contents) -> dict[str, Any]:
     return {"attributes": dict(item.attributes), "table": table, "arrays": loose}
 
 
-def columns_in(path: Path, layout: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the columns of any CSV file by name, and the units in ``__file_units__`` where a line after the names has them.
+def columns_in(path: Path, layout: Mapping[str, object] | None = None) -> FileData:
+    """Return the columns of any CSV file by name, and their units where a line after the names has them.
 
     ``layout`` holds the keys of a `identification.mapping.csv_layout.CsvLayout`. Raises `ImportFailed`.
     """
     from identification.mapping import CsvLayout
 
     if layout is not None:
-        return {**read_csv(path, CsvLayout(**layout)), "__file_units__": {}}
-    if table_of_ours(path) is not None:
-        return read_csv(path)
-    return {**read_csv(path), "__file_units__": units_of_csv(path)}
+        return from_variables({**read_csv(path, CsvLayout.model_validate(layout))})
+    own = table_of_ours(path) is not None
+    return from_variables({**read_csv(path)}, {} if own else {**units_of_csv(path)})
 
 
-def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | None:
-    """Return kind, arrays and attributes of a file that `write_csv` wrote; None for other files.
+def stored_table(path: Path) -> StoredObject:
+    """Return the object in a file that `write_csv` wrote; raise `ImportFailed` for any other file."""
+    found = table_of_ours(path)
+    if found is None:
+        raise ImportFailed(f"{path}: {NOT_OURS}")
+    return found
+
+
+def table_of_ours(path: Path) -> StoredObject | None:
+    """Return the object in a file that `write_csv` wrote; None for other files.
 
     Raises `ImportFailed` if the file is damaged.
     """
@@ -87,7 +97,7 @@ def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | No
     try:
         others = json.loads(next(lines, "").removeprefix(_OTHERS))
         rows = _matrix(csv.reader(islice(lines, 2, None)))
-        arrays: dict[str, Any] = {}
+        arrays: dict[str, Array] = {}
         column = 0
         for name, told in others["table"].items():
             shape = list(told["shape"])
@@ -102,12 +112,12 @@ def table_of_ours(path: Path) -> tuple[str, dict[str, Any], dict[str, Any]] | No
         if column != rows.shape[1]:
             raise ValueError(f"{rows.shape[1]} columns, the comment tells of {column}")
         arrays |= {name: _loose(told) for name, told in others["arrays"].items()}
-        return first.removeprefix(_KIND).strip(), arrays, others["attributes"]
+        return StoredObject(first.removeprefix(_KIND).strip(), arrays, others["attributes"])
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, csv.Error) as error:
         raise ImportFailed(f"{path}: is a damaged or changed CSV file of ours ({error})") from None
 
 
-def _matrix(rows: Iterable[Sequence[str]]) -> Any:
+def _matrix(rows: Iterable[Sequence[str]]) -> Float:
     """float64[n_rows, n_columns] of rows of numbers; raise ValueError if their lengths differ."""
     found = array("d")
     width = count = 0
@@ -119,7 +129,7 @@ def _matrix(rows: Iterable[Sequence[str]]) -> Any:
     return np.frombuffer(found).reshape(count, width)
 
 
-def _loose(told: dict[str, Any]) -> Any:
+def _loose(told: Mapping[str, object]) -> Array:
     values = np.array(told["values"])
     return values[..., 0] + 1j * values[..., 1] if told["complex"] else values
 
@@ -134,7 +144,7 @@ def _lines(path: Path) -> Iterator[str]:
         start = stop
 
 
-def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Any]:
+def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Float]:
     """Read the columns of any CSV file, by name.
 
     Without a ``layout``, separators are comma, semicolon or tab, and the first line contains the names. Lines that begin with

@@ -7,15 +7,16 @@ A structure contains the arrays by name, ``units`` with the same names, ``channe
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.text.contents import Contents
+from rig.exchange.file_data import FileData, StoredObject, Value, from_variables
+from rig.text.contents import Array, Contents
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
-_LONGEST = 31  # largest number of characters of a field name that every reader of version 5 accepts
+_MAX_NAME = 31
+"""Most characters of a field name that every reader of version 5 accepts."""
 
 
 def write_mat(items: Sequence[Contents], path: Path) -> None:
@@ -29,26 +30,22 @@ def write_mat(items: Sequence[Contents], path: Path) -> None:
     savemat(str(path), variables, appendmat=False, oned_as="column", long_field_names=False)
 
 
-def _variable(structures: Sequence[Mapping[str, Any]]) -> Any:
+def _variable(structures: Sequence[Mapping[str, object]]) -> object:
     """Return a single structure unchanged, several as an array."""
     if len(structures) == 1:
         return structures[0]
-    names = _names(structures)
+    names = list(dict.fromkeys(key for structure in structures for key in structure))
     value = np.empty((1, len(structures)), dtype=[(name, object) for name in names])
     for column, structure in enumerate(structures):
         value[0, column] = tuple(structure.get(name, np.zeros((0, 0))) for name in names)
     return value
 
 
-def _names(structures: Sequence[Mapping[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(key for structure in structures for key in structure))
-
-
-def _structure(item: Contents) -> dict[str, Any]:
+def _structure(item: Contents) -> dict[str, object]:
     shapes = {name: list(np.shape(array)) for name, array in item.arrays.items()}
-    out: dict[str, Any] = {"title": item.title}
-    out |= {name[:_LONGEST]: np.asarray(array) for name, array in item.arrays.items()}
-    out["units"] = {name[:_LONGEST]: _text(item.unit(name)) for name in item.arrays}
+    out: dict[str, object] = {"title": item.title}
+    out |= {name[:_MAX_NAME]: np.asarray(array) for name, array in item.arrays.items()}
+    out["units"] = {name[:_MAX_NAME]: _text(item.unit(name)) for name in item.arrays}
     for name in ("channels", "outputs", "inputs"):
         if name in item.attributes:
             out[name] = _table(item.attributes[name])
@@ -57,12 +54,12 @@ def _structure(item: Contents) -> dict[str, Any]:
     return out
 
 
-def _text(unit: Any) -> Any:
+def _text(unit: str | Array) -> str | Array:
     """Return a unit as text, and several units as a cell array with the shape of their array."""
     return unit if isinstance(unit, str) else np.asarray(unit).astype(object)
 
 
-def _table(channels: Sequence[Mapping[str, str]]) -> Any:
+def _table(channels: Sequence[Mapping[str, str]]) -> Array:
     """Return channels as a structure array."""
     table = np.empty(len(channels), dtype=[(key, object) for key in ("name", "role", "unit")])
     for row, channel in enumerate(channels):
@@ -70,42 +67,41 @@ def _table(channels: Sequence[Mapping[str, str]]) -> Any:
     return table
 
 
-def read_mat(path: Path) -> dict[str, Any]:
-    """Read a MAT file (version 4 to 7.3) as nested dictionaries, lists and arrays; raise `ImportFailed` if this fails."""
-    found: dict[str, Any] = read_in_child("mat", path, NAMES["mat"])
-    return found
+def read_mat(path: Path) -> FileData:
+    """Read a MAT file (version 4 to 7.3); raise `ImportFailed` if this fails."""
+    return read_in_child("mat", path, NAMES["mat"], FileData)
 
 
-def parsed_mat(path: Path) -> dict[str, Any]:
+def parsed_mat(path: Path) -> FileData:
     """Read a MAT file in this process, which may crash; the child process does. May raise any error."""
     from scipy.io import loadmat
 
     from rig.exchange.foreign.matlab_hdf5 import read_matlab_hdf5
 
     try:
-        found: dict[str, Any] = loadmat(str(path), simplify_cells=True, appendmat=False)
+        variables: dict[str, Value] = loadmat(str(path), simplify_cells=True, appendmat=False)
     except NotImplementedError:  # version 7.3
-        return read_matlab_hdf5(path)
-    return found
+        variables = read_matlab_hdf5(path)
+    return from_variables(variables)
 
 
-def structures_of_ours(data: Mapping[str, Any]) -> list[tuple[str, dict[str, Any], dict[str, Any]]]:
-    """Return kind, arrays and attributes of every structure that `write_mat` wrote; raise `ImportFailed` for damaged ones."""
-    found = []
-    for value in data.values():
-        for entry in value if isinstance(value, list | np.ndarray) else [value]:
-            if isinstance(entry, Mapping) and _KIND in entry:
-                found.append(_restored(entry))
-    return found
+def stored_objects(data: FileData) -> list[StoredObject]:
+    """Return every structure that `write_mat` wrote; raise `ImportFailed` for damaged ones."""
+    return [
+        _restored(entry)
+        for value in data.values.values()
+        for entry in (value if isinstance(value, list | np.ndarray) else [value])
+        if isinstance(entry, dict) and _KIND in entry
+    ]
 
 
-def _restored(entry: Mapping[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any]]:
+def _restored(entry: Mapping[str, Value]) -> StoredObject:
     try:
-        told = json.loads(str(entry[_ATTRIBUTES]))
-        arrays = {name: np.asarray(entry[name[:_LONGEST]]).reshape(shape) for name, shape in told["shapes"].items()}
-        return str(entry[_KIND]), arrays, told["attributes"]
+        stored = json.loads(str(entry[_ATTRIBUTES]))
+        arrays = {name: np.asarray(entry[name[:_MAX_NAME]]).reshape(shape) for name, shape in stored["shapes"].items()}
+        return StoredObject(str(entry[_KIND]), arrays, stored["attributes"])
     except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ImportFailed(
-            f"the structure of kind {entry[_KIND]} was changed: {error}; its arrays must keep their names and sizes, "
+            f"the structure of kind {entry[_KIND]!s} was changed: {error}; its arrays must keep their names and sizes, "
             "or give a mapping"
         ) from None

@@ -1,10 +1,9 @@
-"""Child process that reads a file of somebody else (`rig.exchange.child_reading`)."""
+"""Child process that reads a file of another program (`rig.exchange.child_reading`)."""
 
 import json
 import sys
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any
 
 from identification import IdentificationError
 from rig.errors import RigError
@@ -19,7 +18,7 @@ _READERS = {
     "tdms": "rig.exchange.foreign.tdms:read_tdms",
     "mdf4": "rig.exchange.foreign.mdf4:read_mdf4",
     "csv": "rig.exchange.csv:columns_in",
-    "table of ours": "rig.exchange.csv:table_of_ours",
+    "table of ours": "rig.exchange.csv:stored_table",
     "uff": "rig.exchange.uff.reading:datasets_in",
     "sep005": "rig.exchange.sep005:series_in",
     "proposal": "rig.exchange.proposal.proposal:proposed",
@@ -27,7 +26,7 @@ _READERS = {
 """Readers by name; each takes the path, and the options by name."""
 
 
-def main(reader: str, options: dict[str, Any], path: Path, folder: Path) -> str:
+def main(reader: str, options: dict[str, object], path: Path, folder: Path) -> str:
     """Read ``path`` into ``folder``; return why it cannot be read, or an empty text."""
     try:
         write_values(resolve_name(_READERS[reader])(path, **options), folder, most_bytes(path))

@@ -1,26 +1,64 @@
 """Read measurements and models from files of other programs."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from rig.bench.configuration import read_toml, validated
 from rig.errors import ConfigurationError
-from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.mat import read_mat, structures_of_ours
+from rig.exchange.child_reading import NAMES, NOT_OURS, PROPOSAL, ImportFailed, read_in_child
+from rig.exchange.file_data import FileData, StoredObject
+from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.sources import format_of, read_data
 from vibrolock.printable import shown
 
 if TYPE_CHECKING:
-    from identification import FrequencyResponse, FrequencyResponseMatrix, PeriodicSpectra
+    import identification as i
+    from rig.exchange.time_data import TimeData
+
+    Measurement = (
+        i.Backbone
+        | tuple[i.FrequencyResponse, ...]
+        | i.FrequencyResponseMatrix
+        | i.HammerTest
+        | i.LinearModes
+        | i.NonlinearMode
+        | i.PnlssModel
+        | i.StructuredModel
+        | i.TimeRecords
+        | i.Transient
+        | TimeData
+    )
+    AnyMapping = (
+        i.FrequencyResponseMapping
+        | i.ResponseMatrixMapping
+        | i.MultisineMapping
+        | i.TimeDataMapping
+        | i.HammerTestMapping
+        | i.BackboneMapping
+        | i.PnlssMapping
+        | i.NonlinearModeMapping
+    )
 
 _DEFAULT_KIND = "frequency-responses"
-_PROPOSAL = "say by `mapping` what is where in it; `rig new mapping` proposes one for time data"
+"""Kind of a mapping that names none."""
+T = TypeVar("T")
+"""One of several objects in a file."""
+
+
+@dataclass(frozen=True)
+class _Options:
+    """Choices on what to read from a file without a mapping."""
+
+    units: str
+    drive: str
+    item: int
 
 
 def import_file(
     path: Path, format_: str = "", mapping: Path | None = None, *, units: str = "", drive: str = "", item: int = 0
-) -> Any:
+) -> "Measurement":
     """Read the measurement or model in a file.
 
     Parameters
@@ -49,17 +87,12 @@ def import_file(
     from identification import IdentificationError
 
     form = format_of(path, format_, "`format`")
-    readers = {"mat": _from_mat, "uff": _from_uff, "csv": _from_csv}
     if units not in ("", "labels", "file", "si"):
         raise ConfigurationError(f"`units` = {units!r}: allowed is labels, file or si")
     try:
         if mapping is not None:
             return _read_with(mapping, path, form, units)
-        if form == "hdf5":
-            read_data(path, form)  # refuses files of ours and damaged ones
-        if form not in readers:
-            raise ImportFailed(f"{path}: {_PROPOSAL}")
-        return readers[form](path, {"units": units, "drive": drive, "item": item})
+        return _read_without(path, form, _Options(units, drive, item))
     except ImportFailed as error:
         if str(path) in str(error):
             raise
@@ -69,13 +102,15 @@ def import_file(
         raise ImportFailed(f"{path}{fit}: {error}") from None
 
 
-def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> "tuple[FrequencyResponse, ...]":
+def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> "tuple[i.FrequencyResponse, ...]":
     """Read stepped-sine frequency responses from a MAT file (up to version 7), in SI; errors are as for `import_file`."""
-    found: tuple[FrequencyResponse, ...] = import_file(Path(mat_path), "mat", Path(mapping_path))
+    found = import_file(Path(mat_path), "mat", Path(mapping_path))
+    if not isinstance(found, tuple):
+        raise ConfigurationError(f"{mapping_path}: kind: allowed is {_DEFAULT_KIND}")
     return found
 
 
-def import_sep005(series: Sequence[Mapping[str, Any]], mapping: str | Path) -> Any:
+def import_sep005(series: Sequence[Mapping[str, object]], mapping: str | Path) -> "Measurement":
     """Read the measurement in time series of SEP005 (SDyPy), which a mapping describes by their names.
 
     Parameters
@@ -91,85 +126,97 @@ def import_sep005(series: Sequence[Mapping[str, Any]], mapping: str | Path) -> A
     from rig.exchange.sep005 import data_of_series
 
     try:
-        return _mapped(data_of_series(series), read_mapping(mapping))
+        return _mapped(data_of_series(series), read_mapping(mapping), {})
     except IdentificationError as error:
         raise ImportFailed(f"the series do not fit {mapping}: {error}") from None
 
 
-def _mappings() -> dict[str, tuple[Any, Callable[[Any, Any], Any]]]:
-    """Return model and reader of every kind of mapping."""
+def read_mapping(path: str | Path) -> "AnyMapping":
+    """Read a mapping from TOML; raise `ConfigurationError` that names each wrong key and its value."""
     import identification as i
 
-    return {
-        _DEFAULT_KIND: (i.FrequencyResponseMapping, i.map_frequency_responses),
-        "frequency-response-matrix": (i.ResponseMatrixMapping, i.map_response_matrix),
-        "multisine": (i.MultisineMapping, i.map_multisine),
-        "time-data": (i.TimeDataMapping, i.map_time_data),
-        "hammer-test": (i.HammerTestMapping, i.map_hammer_test),
-        "backbone": (i.BackboneMapping, i.map_backbone),
-        "pnlss": (i.PnlssMapping, i.map_pnlss),
-        "nonlinear-mode": (i.NonlinearModeMapping, i.map_nonlinear_mode),
+    kinds: dict[str, type[AnyMapping]] = {
+        _DEFAULT_KIND: i.FrequencyResponseMapping,
+        "frequency-response-matrix": i.ResponseMatrixMapping,
+        "multisine": i.MultisineMapping,
+        "time-data": i.TimeDataMapping,
+        "hammer-test": i.HammerTestMapping,
+        "backbone": i.BackboneMapping,
+        "pnlss": i.PnlssMapping,
+        "nonlinear-mode": i.NonlinearModeMapping,
     }
-
-
-def read_mapping(path: str | Path) -> Any:
-    """Read a mapping from TOML; raise `ConfigurationError` that names each wrong key and its value."""
     table = read_toml(Path(path))
-    kind, known = table.get("kind", _DEFAULT_KIND), _mappings()
-    if not isinstance(kind, str) or kind not in known:
-        raise ConfigurationError(f"{path}: kind = {shown(kind)}: allowed is {', '.join(known)}")
-    return validated(known[kind][0], table, str(path))
+    kind = table.get("kind", _DEFAULT_KIND)
+    if not isinstance(kind, str) or kind not in kinds:
+        raise ConfigurationError(f"{path}: kind = {shown(kind)}: allowed is {', '.join(kinds)}")
+    return validated(kinds[kind], table, str(path))
 
 
-def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> Any:
+def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> "Measurement":
     """Read a file, and the further files that the mapping names, and apply the mapping."""
-    mapping = read_mapping(
-        mapping_path
-    )  # errors in the mapping are reported before the file is read, which may be large
-    layout = getattr(mapping, "csv", None)
-    data = read_data(path, form, units=units, layout=layout)
-    files: dict[str, Any] = {}
-    for name in dict.fromkeys(getattr(channel, "file", "") for channel in getattr(mapping, "channels", ())):
-        if name:
-            beside = path.parent / name
-            form = format_of(beside, "", "another ending of `file`")
-            files[name] = read_data(beside, form, units=units, layout=layout if form == "csv" else None)
+    from identification import TimeDataMapping
+
+    mapping = read_mapping(mapping_path)  # before the file, which may be large
+    if not isinstance(mapping, TimeDataMapping):
+        return _mapped(read_data(path, form, units=units), mapping, {})
+    data = read_data(path, form, units=units, layout=mapping.csv)
+    files: dict[str, FileData] = {}
+    for name in dict.fromkeys(channel.file for channel in mapping.channels if channel.file):
+        beside = path.parent / name
+        form = format_of(beside, "", "another ending of `file`")
+        files[name] = read_data(beside, form, units=units, layout=mapping.csv if form == "csv" else None)
     return _mapped(data, mapping, files)
 
 
-def _mapped(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any] | None = None) -> Any:
+def _mapped(data: FileData, mapping: "AnyMapping", files: Mapping[str, FileData]) -> "Measurement":
     """Apply a mapping to data; spectra are converted to frequency responses."""
-    from identification import map_time_data
+    import identification as i
 
-    _check_units(data, mapping, files or {})
-    if mapping.kind == "time-data":
-        return map_time_data(data, mapping, files)
-    found = _mappings()[mapping.kind][1](data, mapping)
-    return _response_matrix(found, mapping.instrument, mapping.specimen) if mapping.kind == "multisine" else found
+    _check_units(data, mapping, files)
+    values = data.for_mapping()
+    match mapping:
+        case i.TimeDataMapping():
+            return i.map_time_data(values, mapping, {name: one.for_mapping() for name, one in files.items()})
+        case i.MultisineMapping():
+            return _response_matrix(i.map_multisine(values, mapping), mapping.instrument, mapping.specimen)
+        case i.ResponseMatrixMapping():
+            return i.map_response_matrix(values, mapping)
+        case i.HammerTestMapping():
+            return i.map_hammer_test(values, mapping)
+        case i.BackboneMapping():
+            return i.map_backbone(values, mapping)
+        case i.PnlssMapping():
+            return i.map_pnlss(values, mapping)
+        case i.NonlinearModeMapping():
+            return i.map_nonlinear_mode(values, mapping)
+        case _:
+            return i.map_frequency_responses(values, mapping)
 
 
-def _check_units(data: Mapping[str, Any], mapping: Any, files: Mapping[str, Any]) -> None:
-    """Refuse units in a mapping that contradict those that the file itself tells of its values."""
+def _check_units(data: FileData, mapping: "AnyMapping", files: Mapping[str, FileData]) -> None:
+    """Refuse units in a mapping that contradict those that the file itself gives for its values."""
+    import identification as i
     from identification import IdentificationError
-    from identification.mapping import si_of
+    from identification.mapping import SampledChannel, si_of
 
-    for channel in getattr(mapping, "channels", ()):
-        of_file = files.get(getattr(channel, "file", ""), data)
-        for key in ("units", "__file_units__"):
-            told = of_file[key].get(channel.value) if isinstance(of_file.get(key), dict) else None
-            if not isinstance(told, str) or not told or getattr(channel, "scale", 1.0) != 1.0:
-                continue  # with a scale, the numbers are another quantity: volts of a sensor, for example
-            try:
-                known = si_of(told, channel.name)
-            except IdentificationError:
-                continue
-            if si_of(channel.unit, channel.name) != known:
-                raise ImportFailed(
-                    f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {told}; write that"
-                )
+    if not isinstance(mapping, i.TimeDataMapping | i.HammerTestMapping | i.MultisineMapping | i.BackboneMapping):
+        return
+    for channel in mapping.channels:
+        file, scale = (channel.file, channel.scale) if isinstance(channel, SampledChannel) else ("", 1.0)
+        given = files.get(file, data).unit(channel.value) if isinstance(channel.value, str) else ""
+        if not given or scale != 1.0:
+            continue  # with a scale, the numbers are another quantity: volts of a sensor, for example
+        try:
+            known = si_of(given, channel.name)
+        except IdentificationError:
+            continue
+        if si_of(channel.unit, channel.name) != known:
+            raise ImportFailed(
+                f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {given}; write that"
+            )
 
 
-def _response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str) -> "FrequencyResponseMatrix":
+def _response_matrix(spectra: "i.PeriodicSpectra", instrument: str, specimen: str) -> "i.FrequencyResponseMatrix":
     """Return the frequency responses of all motions to the force, with an instrument or as H1."""
     from identification import best_linear_approximation
 
@@ -178,48 +225,53 @@ def _response_matrix(spectra: "PeriodicSpectra", instrument: str, specimen: str)
     return best_linear_approximation(spectra, instruments=(instrument,), specimen=specimen)
 
 
-def _chosen(found: list[Any], path: Path, item: int) -> Any:
+def _chosen(found: Sequence[T], path: Path, item: int) -> T:
     if not 0 <= item <= len(found) or (item == 0 and len(found) > 1):
         raise ImportFailed(f"{path}: holds {len(found)} objects; choose by `item` 1 to {len(found)}")
     return found[max(item - 1, 0)]
 
 
-def _from_mat(path: Path, options: Mapping[str, Any]) -> Any:
+def _read_without(path: Path, form: str, options: _Options) -> "Measurement":
+    """Read a file that needs no mapping."""
     from rig.exchange.kinds import put_together
 
-    ours = structures_of_ours(read_mat(path))
-    if not ours:
-        raise ImportFailed(f"{path}: was not written by this package; {_PROPOSAL}")
-    return put_together(*_chosen(ours, path, options["item"]))
+    match form:
+        case "uff":
+            return _from_uff(path, options)
+        case "mat":
+            if not (ours := stored_objects(read_mat(path))):
+                raise ImportFailed(f"{path}: {NOT_OURS}")
+            one = _chosen(ours, path, options.item)
+        case "csv":
+            one = read_in_child("table of ours", path, NAMES["csv"], StoredObject)
+        case "hdf5":
+            read_data(path, form)  # refuses files of ours and damaged ones
+            raise ImportFailed(f"{path}: {PROPOSAL}")
+        case _:
+            raise ImportFailed(f"{path}: {PROPOSAL}")
+    found: Measurement = put_together(one.kind, one.arrays, one.attributes)
+    return found
 
 
-def _from_csv(path: Path, options: Mapping[str, Any]) -> Any:
-    from rig.exchange.kinds import put_together
-
-    ours = read_in_child("table of ours", path, NAMES["csv"])
-    if ours is None:
-        raise ImportFailed(f"{path}: was not written by this package; {_PROPOSAL}")
-    return put_together(*ours)
-
-
-def _from_uff(path: Path, options: Mapping[str, Any]) -> Any:
+def _from_uff(path: Path, options: _Options) -> "Measurement":
+    from rig.exchange.uff.datasets import FREQUENCY_RESPONSE, TIME_RESPONSE
     from rig.exchange.uff.modes import modes_in
     from rig.exchange.uff.reading import read_uff
     from rig.exchange.uff.responses import responses_in
 
-    units = options["units"]
-    datasets = read_uff(path)
-    kinds = {(dataset["type"], dataset.get("func_type", 0)) for dataset in datasets}
-    modes = (55, 0) in kinds
-    if modes and (58, 4) in kinds and not options["item"]:
+    file = read_uff(path)
+    modes, responses = file.has_shapes, bool(file.of_type(FREQUENCY_RESPONSE))
+    if modes and responses and not options.item:
         raise ImportFailed(f"{path}: holds modes and frequency responses; choose by `item` 1 (modes) or 2 (responses)")
-    if modes and options["item"] in (0, 1):
-        return modes_in(datasets, units, options["drive"])
-    if (58, 4) in kinds:
+    if modes and options.item in (0, 1):
+        return modes_in(file, options.units, options.drive)
+    if responses:
         before = [None] if modes else []  # the modes are item 1
-        return _chosen([*before, *responses_in(datasets, units)], path, options["item"])
+        chosen = _chosen([*before, *responses_in(file, options.units)], path, options.item)
+        if chosen is not None:
+            return chosen
     if modes:
         raise ImportFailed(f"{path}: holds modes alone; choose by `item` 1")
-    if (58, 1) in kinds:
-        raise ImportFailed(f"{path}: holds time data; {_PROPOSAL}")
+    if file.of_type(TIME_RESPONSE):
+        raise ImportFailed(f"{path}: holds time data; {PROPOSAL}")
     raise ImportFailed(f"{path}: holds neither frequency responses (58, type 4), modes (55) nor time data (58, type 1)")

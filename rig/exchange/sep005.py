@@ -3,23 +3,28 @@
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from identification import IdentificationError
 from identification.mapping import si_of
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.file_data import ChannelFacts, FileData
 from rig.system.text_files import read_text
+from vibrolock.arrays import Float
 from vibrolock.printable import shown
 
 _LARGEST_JSON_BYTES = 500_000_000
-_HIGHEST_HZ = 1e100  # of any number
+"""Largest file that is read, bytes; chosen."""
+_MAX_RATE_HZ = 1e100
+"""Largest sample rate, Hz; chosen: any number with which one can still calculate."""
+_SAME_RATE = 1e-6
+"""Relative difference of sample rates that count as one; chosen."""
+_EVEN = 1e-3
+"""Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
 
-UNEVEN = 1e-6  # of the step
 
-
-def series_in(path: Path) -> dict[str, Any]:
+def series_in(path: Path) -> FileData:
     """Return what `data_of_series` makes of the series in a JSON file; raise `ImportFailed` as well if there are none."""
     try:
         series = json.loads(read_text(path, _LARGEST_JSON_BYTES, ImportFailed))
@@ -32,19 +37,19 @@ def series_in(path: Path) -> dict[str, Any]:
     return data_of_series(series)
 
 
-def data_of_series(series: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def data_of_series(series: Sequence[Mapping[str, object]]) -> FileData:
     """Return time series by name, in SI where their unit is understood, as a mapping takes them.
 
     Series of one name are the records (realisations) of one channel, in their order: float64[n, n_records], as long as the
-    shortest. The dictionary also has ``sample_rate_hz`` and ``units`` by name; a unit that is not understood is left out.
-    Raises `ImportFailed` for what does not follow SEP005, for uneven sampling and for different rates.
+    shortest. A unit that is not understood is left out. Raises `ImportFailed` for what does not follow SEP005, for uneven
+    sampling and for different rates.
     """
     if isinstance(series, Mapping) or not series:
         raise ImportFailed("series: allowed is a list of dictionaries, one a signal")
     rates = [_rate(one, number) for number, one in enumerate(series)]
-    if max(rates) / min(rates) - 1.0 > UNEVEN:
+    if max(rates) / min(rates) - 1.0 > _SAME_RATE:
         raise ImportFailed(f"series: sample rates from {min(rates):g} to {max(rates):g} Hz; wanted is one")
-    records: dict[str, list[Any]] = {}
+    records: dict[str, list[Float]] = {}
     units: dict[str, str] = {}
     for number, one in enumerate(series):
         name, told = (_text(one, key, number) for key in ("name", "unit_str"))
@@ -56,16 +61,17 @@ def data_of_series(series: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             raise ImportFailed(f"series[{number}].unit_str = {told!r}: {name} was in {units[name]!r} before")
         records.setdefault(name, []).append(_data(one, number) * factor)
     columns = {name: np.column_stack([r[: min(map(len, found))] for r in found]) for name, found in records.items()}
-    return {**columns, "units": {name: unit for name, unit in units.items() if unit}, "sample_rate_hz": rates[0]}
+    channels = {name: ChannelFacts(name=name, unit=unit, in_si=True) for name, unit in units.items() if unit}
+    return FileData(values={**columns}, channels=channels, sample_rate_hz=rates[0])
 
 
-def _text(one: Mapping[str, Any], key: str, number: int) -> str:
+def _text(one: Mapping[str, object], key: str, number: int) -> str:
     if not isinstance(value := one.get(key), str):
         raise ImportFailed(f"series[{number}].{key} = {shown(value)}: allowed is a text")
     return value
 
 
-def _data(one: Mapping[str, Any], number: int) -> Any:
+def _data(one: Mapping[str, object], number: int) -> Float:
     try:
         data = np.asarray(one["data"], np.float64)
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -75,7 +81,7 @@ def _data(one: Mapping[str, Any], number: int) -> Any:
     return data
 
 
-def _rate(one: Mapping[str, Any], number: int) -> float:
+def _rate(one: Mapping[str, object], number: int) -> float:
     """Return the sample rate by ``fs``, or else by ``time``."""
     data, fs, time = _data(one, number), one.get("fs"), one.get("time")
     if fs is None and time is None:
@@ -87,12 +93,12 @@ def _rate(one: Mapping[str, Any], number: int) -> float:
                 f"series[{number}].time: allowed are evenly spaced instants that increase, one for each of the data"
             )
         fs = 1.0 / step
-    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _HIGHEST_HZ:
+    if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _MAX_RATE_HZ:
         raise ImportFailed(f"series[{number}].fs = {shown(fs)}: allowed is a number above 0")
     return float(fs)
 
 
-def _step(time: Any, data: Any) -> float | None:
+def _step(time: object, data: Float) -> float | None:
     """Return the time between samples, s; None if these are no instants of evenly spaced samples."""
     try:
         instants = np.asarray(time, np.float64)
@@ -102,4 +108,4 @@ def _step(time: Any, data: Any) -> float | None:
         return None
     steps = np.diff(instants)
     step = float(steps.mean())
-    return step if step > 0.0 and np.all(np.abs(steps - step) <= 1e-3 * step) else None
+    return step if step > 0.0 and np.all(np.abs(steps - step) <= _EVEN * step) else None

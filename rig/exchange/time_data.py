@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
 
 from identification import Channel, IdentificationError, TimeRecord, TimeRecords, Transient
 from rig.campaigns.evaluation.point import point_name
-from rig.text.contents import Contents
+from rig.text.contents import Array, Contents
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def records_of_series(data: TimeData) -> TimeRecords:
     )
 
 
-def _named(channels: Sequence[Channel]) -> tuple[Any, tuple[tuple[str, ...]], list[dict[str, str]]]:
+def _named(channels: Sequence[Channel]) -> tuple[Array, tuple[tuple[str, ...]], list[dict[str, str]]]:
     """Return units, labels and description of channels."""
     units = np.array([channel.unit for channel in channels])
     return units, (tuple(channel.name for channel in channels),), [dict(vars(channel)) for channel in channels]
@@ -104,11 +104,22 @@ def time_data_parts(data: TimeData) -> Contents:
     )
 
 
-def time_data_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> TimeData:
-    """Convert the output of `time_data_parts` back; raise KeyError or TypeError for missing or unknown entries."""
-    rest = dict(attributes)
-    channels = tuple(Channel(**channel) for channel in rest.pop("channels"))
-    return TimeData(channels, np.asarray(arrays["samples"]), **rest)
+class _TimeDataFacts(BaseModel):
+    """Attributes of time data."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    channels: tuple[Channel, ...]
+    sample_rate_hz: float
+    start_s: float = 0.0
+    point: int = 0
+    specimen: str = ""
+
+
+def time_data_from(arrays: Mapping[str, Array], attributes: Mapping[str, object]) -> TimeData:
+    """Convert the output of `time_data_parts` back; raise KeyError or ValueError for missing or unknown entries."""
+    facts = _TimeDataFacts.model_validate(attributes)
+    return TimeData(samples=np.asarray(arrays["samples"]), **dict(facts))
 
 
 def transient_parts(transient: Transient) -> Contents:
@@ -125,8 +136,16 @@ def transient_parts(transient: Transient) -> Contents:
     )
 
 
-def transient_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Transient:
-    """Convert the output of `transient_parts` back; raise KeyError or TypeError for missing or unknown entries."""
-    channels = tuple(Channel(**channel) for channel in attributes["channels"])
-    time_s, frequency_hz, fundamentals = (arrays[name] for name in ("time_s", "frequency_hz", "fundamentals"))
-    return Transient(channels, time_s, frequency_hz, fundamentals, int(attributes["window_periods"]))
+class _SweepFacts(BaseModel):
+    """Attributes of a sweep."""
+
+    channels: tuple[Channel, ...]
+    window_periods: int
+
+
+def transient_from(arrays: Mapping[str, Array], attributes: Mapping[str, object]) -> Transient:
+    """Convert the output of `transient_parts` back; raise KeyError or ValueError for missing or unknown entries."""
+    facts = _SweepFacts.model_validate(attributes)
+    time_s, frequency_hz = (np.asarray(arrays[name], np.float64) for name in ("time_s", "frequency_hz"))
+    fundamentals = np.asarray(arrays["fundamentals"], np.complex128)
+    return Transient(facts.channels, time_s, frequency_hz, fundamentals, facts.window_periods)

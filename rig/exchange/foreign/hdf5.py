@@ -5,16 +5,27 @@ Links to other files, virtual and external datasets are not followed: a file fro
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.exchange.child_values import TooMuchData, most_bytes
+from rig.exchange.file_data import FileData, Value, from_variables
 
-DEEPEST = 32
-_MOST_ITEMS = 100_000
+if TYPE_CHECKING:
+    import h5py
+
+Type = np.dtype[np.void]
+"""Type of the values of a dataset."""
+MAX_DEPTH = 32
+"""Levels of groups that are read; chosen: deeper ones are links in a circle."""
+_MAX_ITEMS = 100_000
+"""Groups and datasets that are read; chosen."""
 _TEXT_BYTES = 100
+"""Memory of a text, bytes, about."""
 _PLAIN = "biufc"
+"""Kinds of dtypes that are numbers."""
 
 
 class Budget:
@@ -22,7 +33,7 @@ class Budget:
 
     def __init__(self, path: Path) -> None:
         self._most = self._bytes = most_bytes(path)
-        self._items = _MOST_ITEMS
+        self._items = _MAX_ITEMS
 
     def spend(self, size: int) -> None:
         """Count one item of ``size`` bytes."""
@@ -30,21 +41,21 @@ class Budget:
         if self._bytes < 0:
             raise TooMuchData(self._most)
         if self._items < 0:
-            raise ValueError(f"it holds more than {_MOST_ITEMS} items")
+            raise ValueError(f"it holds more than {_MAX_ITEMS} items")
 
 
-def read_hdf5(path: Path) -> dict[str, Any]:
+def read_hdf5(path: Path) -> FileData:
     """Return the groups and datasets of a file; raise OSError, ValueError or errors of h5py if it cannot be read."""
     import h5py
 
     with h5py.File(path, "r") as file:
-        return {**dict(_attributes(file, "")), **_group(file, Budget(path), ())}
+        return from_variables({**dict(_attributes(file, "")), **_group(file, Budget(path), ())})
 
 
-def _group(group: Any, budget: Budget, above: tuple[Any, ...]) -> dict[str, Any]:
+def _group(group: "h5py.Group", budget: Budget, above: "tuple[h5py.h5g.GroupID, ...]") -> dict[str, Value]:
     import h5py
 
-    found: dict[str, Any] = {}
+    found: dict[str, Value] = {}
     for name in group:
         budget.spend(0)
         if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
@@ -54,7 +65,7 @@ def _group(group: Any, budget: Budget, above: tuple[Any, ...]) -> dict[str, Any]
         if item is None:
             found[name] = "<broken link>"
         elif isinstance(item, h5py.Group):
-            inside = any(item.id == one for one in above) or len(above) >= DEEPEST
+            inside = any(item.id == one for one in above) or len(above) >= MAX_DEPTH
             found[name] = "<group above>" if inside else _group(item, budget, (*above, item.id))
         elif isinstance(item, h5py.Dataset):
             found[name] = plain_dataset(item, budget)
@@ -65,7 +76,7 @@ def _group(group: Any, budget: Budget, above: tuple[Any, ...]) -> dict[str, Any]
     return found
 
 
-def plain_dataset(item: Any, budget: Budget) -> Any:
+def plain_dataset(item: "h5py.Dataset", budget: Budget) -> Value:
     """Return numbers, texts, or the columns of a table; the name of its type for what is none of these."""
     if item.is_virtual or item.external:
         return "<data in another file>"
@@ -77,7 +88,7 @@ def plain_dataset(item: Any, budget: Budget) -> Any:
     return _plain(item[()], item.dtype)
 
 
-def _is_plain(dtype: Any) -> bool:
+def _is_plain(dtype: Type) -> bool:
     """Return whether a type has numbers or texts, at least in one column: others are not read, lists could be of any length."""
     import h5py
 
@@ -86,27 +97,29 @@ def _is_plain(dtype: Any) -> bool:
     return dtype.kind in f"{_PLAIN}S" or h5py.check_string_dtype(dtype) is not None
 
 
-def _size(dtype: Any) -> int:
+def _size(dtype: Type) -> int:
     """Return the memory of one value, bytes; each text becomes an object."""
     if dtype.names:
         return sum(_size(dtype[name]) for name in dtype.names)
     return int(dtype.itemsize) + (_TEXT_BYTES if dtype.kind in "SO" else 0)
 
 
-def _plain(value: Any, dtype: Any) -> Any:
+def _plain(value: NDArray[np.void], dtype: Type) -> Value:
     import h5py
 
     if dtype.names:
         return {name: _plain(value[name], dtype[name]) for name in dtype.names}
     if h5py.check_string_dtype(dtype) is not None:
-        texts = [one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in np.ravel(value)]
+        texts: list[Value] = [
+            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in np.ravel(value)
+        ]
         return texts[0] if np.ndim(value) == 0 else texts
     if dtype.kind == "S":
-        return [one.decode("utf-8", "replace") for one in np.ravel(value)]
+        return [one.decode("utf-8", "replace") for one in np.ravel(value).tolist()]
     return np.asarray(value) if dtype.kind in _PLAIN else f"<{dtype}>"
 
 
-def _attributes(item: Any, name: str) -> Iterator[tuple[str, Any]]:
+def _attributes(item: "h5py.Group | h5py.Dataset", name: str) -> Iterator[tuple[str, Value]]:
     """Yield the attributes that are numbers or texts."""
     for key in item.attrs:
         try:

@@ -5,14 +5,19 @@ versions, dimensions of length 1 are left out.
 """
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rig.exchange.foreign.hdf5 import DEEPEST, Budget
+from rig.exchange.file_data import Value
+from rig.exchange.foreign.hdf5 import MAX_DEPTH, Budget
+
+if TYPE_CHECKING:
+    import h5py
 
 
-def read_matlab_hdf5(path: Path) -> dict[str, Any]:
+def read_matlab_hdf5(path: Path) -> dict[str, Value]:
     """Return the variables of a file; raise OSError, ValueError or errors of h5py if it cannot be read."""
     import h5py
 
@@ -25,7 +30,7 @@ def read_matlab_hdf5(path: Path) -> dict[str, Any]:
         }
 
 
-def _link(group: Any, name: str, file: Any, budget: Budget, depth: int) -> Any:
+def _link(group: "h5py.Group", name: str, file: "h5py.File", budget: Budget, depth: int) -> Value:
     import h5py
 
     if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
@@ -33,12 +38,12 @@ def _link(group: Any, name: str, file: Any, budget: Budget, depth: int) -> Any:
     return _value(group[name], file, budget, depth)
 
 
-def _value(item: Any, file: Any, budget: Budget, depth: int) -> Any:
+def _value(item: "h5py.Group | h5py.Dataset", file: "h5py.File", budget: Budget, depth: int) -> Value:
     """Return a variable, a field or a cell."""
     import h5py
 
-    if depth > DEEPEST:
-        raise ValueError(f"it is nested deeper than {DEEPEST}")
+    if depth > MAX_DEPTH:
+        raise ValueError(f"it is nested deeper than {MAX_DEPTH}")
     if isinstance(item, h5py.Group):
         return _structure(item, file, budget, depth)
     if item.is_virtual or item.external:
@@ -65,7 +70,7 @@ def _value(item: Any, file: Any, budget: Budget, depth: int) -> Any:
     return array[()] if array.ndim == 0 else array
 
 
-def _structure(group: Any, file: Any, budget: Budget, depth: int) -> Any:
+def _structure(group: "h5py.Group", file: "h5py.File", budget: Budget, depth: int) -> Value:
     """Return a structure, or an array of structures, whose fields are references to the values of each."""
     import h5py
 
@@ -85,19 +90,19 @@ def _structure(group: Any, file: Any, budget: Budget, depth: int) -> Any:
     return [{name: several[index] for name, several in values.items()} for index in range(count)]
 
 
-def _list(item: Any, file: Any, budget: Budget, depth: int) -> list[Any]:
+def _list(item: "h5py.Group | h5py.Dataset", file: "h5py.File", budget: Budget, depth: int) -> list[Value]:
     return [_value(file[reference], file, budget, depth + 1) for reference in np.ravel(item[()].T, order="F")]
 
 
-def _cells(cells: Any, file: Any, budget: Budget, depth: int) -> Any:
+def _cells(cells: NDArray[np.generic], file: "h5py.File", budget: Budget, depth: int) -> Value:
     found = np.empty(np.shape(cells), dtype=object)
     for index, reference in np.ndenumerate(cells):
         found[index] = _value(file[reference], file, budget, depth + 1)
     return found if found.ndim else found[()]
 
 
-def _text(codes: Any) -> Any:
+def _text(codes: NDArray[np.generic]) -> Value:
     """Return a row of codes as a text, several as a list of texts."""
     rows = np.atleast_2d(np.asarray(codes).T)
-    texts = ["".join(map(chr, row.astype(np.uint32))) for row in rows]
+    texts: list[Value] = ["".join(map(chr, row.astype(np.uint32))) for row in rows]
     return texts[0] if len(texts) == 1 else texts

@@ -4,26 +4,31 @@ Channels that are converted by a formula are left out: the formula would be eval
 """
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.exchange.file_data import ChannelFacts, FileData, Value
+
+if TYPE_CHECKING:
+    from asammdf.blocks import v2_v3_blocks, v4_blocks
+
 _FORMULA = 3
+"""Type of a conversion by a formula (ASAM MDF 4.1, block CC)."""
 _EVEN = 1e-3
+"""Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
 
 
-def read_mdf4(path: Path) -> dict[str, Any]:
-    """Return the channels with numbers by name, and by the same names their rates, beginnings and units.
+def read_mdf4(path: Path) -> FileData:
+    """Return the channels with numbers by name, with their rates, start times and units.
 
     A name that several groups have is followed by ``#`` and the number of the group, from 0. Instants that are not evenly
     spaced give no rate. Raises ImportError without asammdf, ValueError or errors of asammdf if the file cannot be read.
     """
     from asammdf import MDF
 
-    out: dict[str, Any] = {}
-    rates: dict[str, float] = {}
-    starts: dict[str, float] = {}
-    units: dict[str, str] = {}
+    values: dict[str, Value] = {}
+    channels: dict[str, ChannelFacts] = {}
     with MDF(path) as file:
         if not str(file.version).startswith("4"):
             raise ValueError(f"it is of MDF version {file.version}, allowed is 4")
@@ -39,18 +44,21 @@ def read_mdf4(path: Path) -> dict[str, Any]:
                 if samples.dtype.kind not in "biuf" or samples.ndim != 1 or samples.size < 2:
                     continue
                 called = name if every.count(name) == 1 else f"{name}#{group}"
-                out[called] = samples
+                values[called] = samples
                 steps = np.diff(signal.timestamps)
                 step = float(np.mean(steps))
-                if step > 0.0 and np.all(np.abs(steps - step) <= _EVEN * step):
-                    rates[called], starts[called] = 1.0 / step, float(signal.timestamps[0])
-                if signal.unit:
-                    units[called] = str(signal.unit)
-    if not out:
+                even = step > 0.0 and bool(np.all(np.abs(steps - step) <= _EVEN * step))
+                channels[called] = ChannelFacts(
+                    name=name,
+                    unit=str(signal.unit or ""),
+                    sample_rate_hz=1.0 / step if even else None,
+                    start_s=float(signal.timestamps[0]) if even else None,
+                )
+    if not values:
         raise ValueError("it holds no channel of numbers")
-    return {**out, "__rates_hz__": rates, "__starts_s__": starts, "__file_units__": units}
+    return FileData(values=values, channels=channels)
 
 
-def _by_formula(channel: Any) -> bool:
+def _by_formula(channel: "v2_v3_blocks.Channel | v4_blocks.Channel") -> bool:
     conversion = getattr(channel, "conversion", None)
     return conversion is not None and conversion.conversion_type == _FORMULA

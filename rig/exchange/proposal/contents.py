@@ -3,19 +3,22 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification import IdentificationError
 from identification.mapping import si_of
+from rig.exchange.file_data import FileData, Value
 
-_TOLD = ("sample_rate_hz", "__rates_hz__", "__starts_s__", "units", "__file_units__")
-"""Keys by which readers tell of the data; they are no data."""
+_NO_DATA = ("sample_rate_hz", "units")
+"""Variables by which a file tells of its data."""
 _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]+)[\])]$")
-_DEEPEST = 8
-_MOST = 2000
+_MAX_DEPTH = 8
+"""Levels of structures that are listed; chosen."""
+_MAX_VALUES = 2000
+"""Values that are listed; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +38,7 @@ class Leaf:
     """
 
     path: str
-    values: NDArray[Any]
+    values: NDArray[np.generic]
     unit: str = ""
     file: str = ""
 
@@ -71,53 +74,50 @@ class FileContents:
     rate_hz: float | None = None
 
 
-def contents_of(data: Mapping[str, Any], file: str = "") -> FileContents:
+def contents_of(data: FileData, file: str = "") -> FileContents:
     """Return the contents of what `rig.exchange.sources.read_data` has read; ``file`` is the name of a further file."""
-    told = {key: data[key] for key in _TOLD if key in data}
-    units: dict[str, Any] = {}
-    for key in ("units", "__file_units__"):
-        units |= told[key] if isinstance(told.get(key), Mapping) else {}
-    in_full = any("/" in key for key in data)
+    full_names = any("/" in key for key in data.values)
     top = {
         key: value
-        for key, value in data.items()
-        if key not in told and not key.startswith("__") and not (in_full and isinstance(value, Mapping))
+        for key, value in data.values.items()
+        if key not in _NO_DATA and not key.startswith("__") and not (full_names and isinstance(value, dict))
     }
     records, inside = _list_of_structures(top)
-    arrays, single, others = [], {}, {}
-    for number, (path, value) in enumerate(_leaves(inside if records else top, "", 0)):
-        if number >= _MOST:
-            break
-        array = np.squeeze(value) if isinstance(value, np.ndarray | np.generic | int | float) else None
+    arrays: list[Leaf] = []
+    single, others = dict[str, float](), dict[str, str]()
+    for path, value in islice(_leaves(inside if records else top, "", 0), _MAX_VALUES):
+        array = np.squeeze(np.asarray(value)) if isinstance(value, np.ndarray | np.generic | int | float) else None
         if array is None or array.dtype.kind not in "biuf":
             others[path] = _what(value)
         elif array.size == 1:
             single[path] = float(array)
         elif array.size:
-            unit = units.get(path) or _unit_in(path)
-            arrays.append(Leaf(path, array, unit if isinstance(unit, str) else "", file))
-    return FileContents(tuple(arrays), single, others, records, _rate(told, [leaf.path for leaf in arrays]))
+            arrays.append(Leaf(path, array, data.unit(path) or _unit_in(path), file))
+    return FileContents(tuple(arrays), single, others, records, _rate(data, [leaf.path for leaf in arrays]))
 
 
-def _list_of_structures(top: Mapping[str, Any]) -> tuple[str, Any]:
+def _list_of_structures(top: Mapping[str, Value]) -> tuple[str, Mapping[str, Value]]:
     """Return path and first entry of a list of structures that holds the only arrays of a file, or an empty path."""
     for key, value in top.items():
         entries = list(value) if isinstance(value, list | np.ndarray) and not _is_numbers(value) else []
-        if entries and all(isinstance(entry, Mapping) for entry in entries):
-            return key, entries[0]
+        structures = [entry for entry in entries if isinstance(entry, dict)]
+        if entries and len(structures) == len(entries):
+            return key, structures[0]
     return "", {}
 
 
-def _is_numbers(value: Any) -> bool:
+def _is_numbers(value: Value) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
 
 
-def _leaves(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, Mapping) and depth < _DEEPEST:
-        for key, item in value.items():
-            yield from _leaves(item, f"{path}.{key}" if path else str(key), depth + 1)
-    elif path:
-        yield path, value
+def _leaves(structure: Mapping[str, Value], above: str, depth: int) -> Iterator[tuple[str, Value]]:
+    """Yield the values within a structure by their paths."""
+    for key, value in structure.items():
+        path = f"{above}.{key}" if above else str(key)
+        if isinstance(value, dict) and depth + 1 < _MAX_DEPTH:
+            yield from _leaves(value, path, depth + 1)
+        elif path:
+            yield path, value
 
 
 def _unit_in(path: str) -> str:
@@ -129,7 +129,7 @@ def _unit_in(path: str) -> str:
         return ""
 
 
-def _what(value: Any) -> str:
+def _what(value: Value) -> str:
     if isinstance(value, str):
         return f"text '{value[:40]}'"
     if isinstance(value, np.ndarray):
@@ -137,9 +137,10 @@ def _what(value: Any) -> str:
     return "a list" if isinstance(value, list | tuple) else f"a {type(value).__name__}"
 
 
-def _rate(told: Mapping[str, Any], paths: list[str]) -> float | None:
-    if isinstance(rate := told.get("sample_rate_hz"), float):
-        return rate
-    rates = told.get("__rates_hz__")
-    known = [rates[path] for path in paths if path in rates] if isinstance(rates, Mapping) else []
+def _rate(data: FileData, paths: list[str]) -> float | None:
+    """Return the sample rate of the file, or else the commonest one of its channels."""
+    if data.sample_rate_hz is not None:
+        return data.sample_rate_hz
+    rates = [data.channels[path].sample_rate_hz for path in paths if path in data.channels]
+    known = [rate for rate in rates if rate is not None]
     return max(set(known), key=known.count) if known else None

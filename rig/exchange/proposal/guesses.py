@@ -5,7 +5,6 @@ Guesses are proposals. What cannot be told from names and numbers is left open.
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import scipy
@@ -32,6 +31,7 @@ _LIKE = 0.88
 _LEVELS = 1.3
 """Least ratio of the RMS of two columns that are different levels."""
 _EXCITED = 1e-2
+"""Amplitude of an excited line, at least, over the strongest; chosen."""
 _MOST_TRIED = 200
 """Most lags that are tried as a period."""
 
@@ -45,7 +45,7 @@ def rate_in(single: Mapping[str, float]) -> tuple[str, float] | None:
     return None
 
 
-def is_time(name: str, values: NDArray[Any]) -> bool:
+def is_time(name: str, values: NDArray[np.generic]) -> bool:
     """Return whether an array is a vector of evenly spaced instants, by name and values."""
     if values.ndim != 1 or values.size < 3 or not _TIMES.match(name):
         return False
@@ -75,7 +75,7 @@ def role_of(name: str, unit: str) -> tuple[str, str]:
     return "", "1"
 
 
-def dimensions(values: NDArray[Any], samples: int) -> tuple[str, ...]:
+def dimensions(values: NDArray[np.generic], samples: int) -> tuple[str, ...]:
     """Return the meaning of each dimension of an array of a signal in which one has the length ``samples``.
 
     A dimension along which the last two entries are equal is ``period``, one along which the RMS differs ``level``, any other
@@ -112,9 +112,8 @@ def period_of(signal: Float) -> int:
     energy = float(np.sum(x**2))
     if n < 64 or not energy > 0.0:
         return 0
-    transform: Any = scipy.fft
-    size = transform.next_fast_len(2 * n)
-    lags = transform.irfft(np.abs(transform.rfft(x, size)) ** 2, size)[: n // 2 + 1]
+    size = scipy.fft.next_fast_len(2 * n)
+    lags = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, size)) ** 2, size)[: n // 2 + 1]
     likeness = lags / energy * (n / (n - np.arange(lags.size)))
     below = np.flatnonzero(likeness < 0.5)
     first = max(16, int(below[0]) if below.size else lags.size)

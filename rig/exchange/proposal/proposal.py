@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +11,14 @@ from rig.exchange.child_reading import ImportFailed, read_in_child
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
 from rig.exchange.proposal.csv_guess import guessed_layout
 from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_of, rate_in, role_of, transient_periods
+from rig.exchange.proposal.mapping_text import MappingText
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
 
-_FEWEST_SAMPLES = 16
-_MOST_CHANNELS = 16
+_MIN_SAMPLES = 16
+"""Samples of the shortest signal; chosen."""
+_MAX_CHANNELS = 16
+"""Channels that are proposed; chosen."""
 
 
 def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") -> tuple[str, tuple[str, ...]]:
@@ -39,11 +41,13 @@ def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") 
     for number, path in enumerate(paths):
         format_of(path, format_ if not number else "", "`format`")
     others = [str(path) for path in paths[1:]]
-    found = read_in_child("proposal", paths[0], "file of time data", others=others, format_=format_, units=units)
-    return found["text"], tuple(found["missing"])
+    found = read_in_child(
+        "proposal", paths[0], "file of time data", MappingText, others=others, format_=format_, units=units
+    )
+    return found.text, tuple(found.missing)
 
 
-def proposed(first: Path, others: Sequence[str], format_: str, units: str) -> dict[str, Any]:
+def proposed(first: Path, others: Sequence[str], format_: str, units: str) -> MappingText:
     """Return text and what is missing, see `proposed_mapping`; in a child process, for what files hold may be large."""
     layout = None
     found: list[FileContents] = []
@@ -60,7 +64,7 @@ def proposed(first: Path, others: Sequence[str], format_: str, units: str) -> di
     proposal = _proposal(found, first, layout)
     forms = [format_of(path, format_ if not number else "", "`format`") for number, path in enumerate(paths)]
     relative = {path.name if number else "" for number, path in enumerate(paths) if forms[number] == "wav"}
-    return {"text": text_of(proposal, found, [path.name for path in paths], relative), "missing": proposal.missing}
+    return MappingText(text_of(proposal, found, [path.name for path in paths], relative), proposal.missing)
 
 
 def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | None) -> Proposal:
@@ -69,15 +73,15 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
     times = [leaf for leaf in arrays if is_time(leaf.name, leaf.values)]
     signals = [leaf for leaf in arrays if samples in leaf.values.shape and leaf not in times]
     if not signals:
-        raise ImportFailed(f"{path}: holds no signals: arrays of {_FEWEST_SAMPLES} samples and more besides the time")
+        raise ImportFailed(f"{path}: holds no signals: arrays of {_MIN_SAMPLES} samples and more besides the time")
     channels = _channels(signals, samples)
     rate, rate_from, time = _rate(found, times)
     force = next((c for c in channels if c.role == "force"), channels[0])
     period, transient, band, at_rest = _periods(force, channels, rate, samples)
     missing = [] if rate else ["sample_rate_hz"]
     return Proposal(
-        channels=tuple(channels[:_MOST_CHANNELS]),
-        left_out=len(channels) - len(channels[:_MOST_CHANNELS]),
+        channels=tuple(channels[:_MAX_CHANNELS]),
+        left_out=len(channels) - len(channels[:_MAX_CHANNELS]),
         records=found[0].records,
         rate_hz=rate,
         rate_from=rate_from,
@@ -94,9 +98,9 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
 def _sample_count(arrays: Sequence[Leaf], path: Path) -> int:
     """Return the commonest largest dimension."""
     lengths = [max(leaf.values.shape) for leaf in arrays]
-    long = [length for length in lengths if length >= _FEWEST_SAMPLES]
+    long = [length for length in lengths if length >= _MIN_SAMPLES]
     if not long:
-        raise ImportFailed(f"{path}: holds no array of real numbers with {_FEWEST_SAMPLES} samples or more")
+        raise ImportFailed(f"{path}: holds no array of real numbers with {_MIN_SAMPLES} samples or more")
     return int(max(set(long), key=lambda length: (long.count(length), length)))
 
 

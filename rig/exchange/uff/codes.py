@@ -1,11 +1,13 @@
 """Codes of the universal file format (SDRC; as documented by the University of Cincinnati, SDRL) and their units."""
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from identification import Channel
+from identification.channels import Role
+from vibrolock.arrays import Float
 
 DATA_TYPE = {"m": 8, "m/s": 11, "m/s2": 12, "m/s^2": 12, "N": 13, "s": 17, "Hz": 18}
 """Specific data type of a quantity, by its SI unit; 0 means unknown."""
@@ -13,9 +15,12 @@ DATA_TYPE = {"m": 8, "m/s": 11, "m/s2": 12, "m/s^2": 12, "N": 13, "s": 17, "Hz":
 Degree = tuple[int, int]
 """Node and direction."""
 
-_UP = 3  # +Z: the bench does not say where its sensors point
+_UP = 3
+"""Direction +Z, of all sensors: the bench does not say where they point."""
 _SCALAR = 0
+"""Direction of a quantity without one."""
 _EVEN = 1e-9
+"""Relative difference of an abscissa from an even one that counts as none; chosen: rounding errors of double precision."""
 WIDTH = 80
 """Number of characters of an ID line."""
 
@@ -39,7 +44,7 @@ def degrees_of_freedom(channels: Sequence[Channel]) -> dict[str, Degree]:
     return out
 
 
-def axis(prefix: str, label: str, unit: str) -> dict[str, Any]:
+def axis(prefix: str, label: str, unit: str) -> dict[str, object]:
     """Return the fields of dataset 58 that describe an axis (``abscissa``, ``ordinate``, ``orddenom`` or ``z_axis``)."""
     return {
         f"{prefix}_spec_data_type": DATA_TYPE.get(unit, 0),
@@ -48,8 +53,8 @@ def axis(prefix: str, label: str, unit: str) -> dict[str, Any]:
     }
 
 
-def evenly(x: Any) -> bool:
-    """Whether all values follow from the first value and the step as stored in a header (six digits)."""
+def evenly(x: Float) -> bool:
+    """Return whether all values follow from the first value and the step as stored in a header (six digits)."""
     if len(x) < 2:
         return bool(float(f"{x[0]:.5e}") == x[0])
     first, step = float(f"{x[0]:.5e}"), float(f"{x[1] - x[0]:.5e}")
@@ -70,4 +75,4 @@ def channels_in(lines: Sequence[str]) -> tuple[Channel, ...] | None:
     parts = [entry.split("|") for entry in text.split(";")]
     if not all(len(part) == 3 for part in parts):
         return None
-    return tuple(Channel(name.strip(), cast(Any, role), unit) for name, role, unit in parts)
+    return tuple(Channel(name.strip(), cast(Role, role), unit) for name, role, unit in parts)

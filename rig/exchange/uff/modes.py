@@ -1,68 +1,68 @@
 """Normal modes in the datasets of a universal file."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from identification import Channel, LinearModes
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.codes import channels_in
-from rig.exchange.uff.reading import Dataset
+from rig.exchange.uff.datasets import ModeShape, UniversalFile
 from rig.exchange.uff.units import file_units
+from vibrolock.arrays import Float
 
 
-def modes_in(datasets: Sequence[Dataset], assumed: str = "", drive: str = "") -> LinearModes:
+def modes_in(file: UniversalFile, assumed: str = "", drive: str = "") -> LinearModes:
     """Return the normal modes (dataset 55, analysis type 2), mass-normalised by their modal mass.
 
     ``drive`` is the driven degree of freedom (``1+Z``), required if the file was not written by this package. Raises
     `ImportFailed` if there are no modes or no drive point, for modal masses that are not above zero, and for complex shapes.
     """
-    modes = sorted((d for d in datasets if d["type"] == 55 and d["analysis_type"] == 2), key=lambda d: d["freq"])
+    modes = sorted(file.modes, key=lambda mode: mode.frequency_hz)
     if not modes:
         raise ImportFailed(
             "no normal mode (dataset 55 of analysis type 2) in the file; complex modes are not understood"
         )
     first = modes[0]
-    to_kg = file_units(datasets, assumed).mass_factor(first["where"])
+    to_kg = file_units(file, assumed).mass_factor(first.where)
     for mode in modes:
-        if list(mode["node_nums"]) != list(first["node_nums"]):
-            raise ImportFailed(f"{mode['where']}: its nodes are not those of the first mode")
-        if np.iscomplexobj(mode["r1"]) or mode["modal_m"] <= 0.0:
+        if mode.nodes != first.nodes:
+            raise ImportFailed(f"{mode.where}: its nodes are not those of the first mode")
+        if np.iscomplexobj(mode.shape) or mode.modal_mass <= 0.0:
             raise ImportFailed(
-                f"{mode['where']}: modal mass {mode['modal_m']:g}, wanted is a real shape and a modal mass above zero; "
+                f"{mode.where}: modal mass {mode.modal_mass:g}, wanted is a real shape and a modal mass above zero; "
                 "export the modes with their modal masses"
             )
-    columns = np.array([[mode[axis] for axis in ("r1", "r2", "r3")] for mode in modes])  # mode, direction, node
-    told = channels_in([first[f"id{line}"] for line in (3, 4, 5)])
-    if told is not None and len(told) == columns.shape[2]:
-        channels, shapes = told, columns[:, 2].T
+    columns = np.array([np.real(mode.shape) for mode in modes])  # mode, direction, node
+    named = channels_in(first.lines[2:])
+    if named is not None and len(named) == columns.shape[2]:
+        channels, shapes = named, columns[:, 2].T
     else:
-        channels, shapes = _degrees(first["node_nums"], columns, drive)
-    shapes = shapes / np.sqrt([mode["modal_m"] * to_kg for mode in modes])
+        channels, shapes = _degrees(first.nodes, columns, drive)
+    shapes = shapes / np.sqrt([mode.modal_mass * to_kg for mode in modes])
     row = next(index for index, channel in enumerate(channels) if channel.role == "drive")
-    shapes = shapes * np.where(shapes[row] < 0.0, -1.0, 1.0)
-    return _linear_modes(modes, channels, shapes, first)
+    return _linear_modes(modes, channels, shapes * np.where(shapes[row] < 0.0, -1.0, 1.0))
 
 
-def _degrees(nodes: Any, columns: Any, drive: str) -> tuple[tuple[Channel, ...], Any]:
+def _degrees(nodes: Sequence[int], columns: Float, drive: str) -> tuple[tuple[Channel, ...], Float]:
     """Return channels and shapes of all degrees of freedom that move in any mode."""
     moving = [(k, j) for j in range(columns.shape[2]) for k in range(3) if np.any(columns[:, k, j])]
-    names = [f"{int(nodes[j])}+{'XYZ'[k]}" for k, j in moving]
+    names = [f"{nodes[j]}+{'XYZ'[k]}" for k, j in moving]
     if drive not in names:
         raise ImportFailed(f"`drive`: is '{drive}', which says where the force acts; allowed are {', '.join(names)}")
     channels = tuple(Channel(name, "drive" if name == drive else "response", "m") for name in names)
     return channels, np.array([columns[:, k, j] for k, j in moving])
 
 
-def _linear_modes(modes: Sequence[Dataset], channels: tuple[Channel, ...], shapes: Any, first: Dataset) -> LinearModes:
+def _linear_modes(modes: Sequence[ModeShape], channels: tuple[Channel, ...], shapes: Float) -> LinearModes:
     unknown, nothing = np.full(len(modes), np.nan), np.zeros(len(channels), dtype=np.complex128)
-    frequency_hz = np.array([mode["freq"] for mode in modes])
+    frequency_hz = np.array([mode.frequency_hz for mode in modes])
+    title = modes[0].lines[1]
     return LinearModes(
         channels=channels,
         frequency_hz=frequency_hz,
         frequency_std_hz=unknown,
-        damping_ratio=np.array([mode["modal_damp_vis"] for mode in modes]),
+        damping_ratio=np.array([mode.damping_ratio for mode in modes]),
         damping_ratio_std=unknown,
         shapes=shapes,
         shapes_std=np.full_like(shapes, np.nan),
@@ -71,6 +71,6 @@ def _linear_modes(modes: Sequence[Dataset], channels: tuple[Channel, ...], shape
         upper=nothing,
         lowest_hz=float(frequency_hz[0]),
         highest_hz=float(frequency_hz[-1]),
-        specimen="" if first["id2"] == "NONE" else first["id2"],
+        specimen="" if title == "NONE" else title,
         notes=("from a universal file: six digits, without residual terms and standard errors",),
     )

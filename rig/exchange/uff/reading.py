@@ -1,31 +1,48 @@
 """Read the datasets of a universal file, check that they are complete, and extract their time data."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification import IdentificationError
+from identification.errors import IdentificationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
+from rig.exchange.file_data import ChannelFacts, FileData
+from rig.exchange.uff.datasets import (
+    TIME_RESPONSE,
+    Axis,
+    Function,
+    ModeShape,
+    UnitSystem,
+    UniversalFile,
+    degree_name,
+)
 from rig.exchange.uff.units import file_units
 from rig.system.text_files import read_bytes
+from vibrolock.arrays import Float
 
-Dataset = Mapping[str, Any]
+if TYPE_CHECKING:
+    import pyuff
+
 LARGEST_BYTES = 2_000_000_000
+"""Largest file that is read, bytes; chosen."""
 _KNOWN = (55, 58, 151, 164)
-_DIRECTION = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
+"""Datasets that are read: shapes, functions, header, units."""
+_NORMAL_MODE = 2
+"""Analysis type of a normal mode."""
+_MAX_DIFFERENCE = 0.01
+"""Relative difference of the lengths of two records up to which both are cut; chosen: a recorder stops some samples late."""
 
 
-def read_uff(path: Path) -> list[Dataset]:
+def read_uff(path: Path) -> UniversalFile:
     """Return what `datasets_in` reads, by a child process; raise `ImportFailed` as it does."""
-    found: list[Dataset] = read_in_child("uff", path, NAMES["uff"])
-    return found
+    return read_in_child("uff", path, NAMES["uff"], UniversalFile)
 
 
-def datasets_in(path: Path) -> list[Dataset]:
-    """Return datasets 55, 58, 151 and 164 of a universal file, in their order.
+def datasets_in(path: Path) -> UniversalFile:
+    """Return datasets 55, 58 and 164 of a universal file.
 
     Raises `ImportFailed` if the file is missing, not a universal file or cut short, or if a dataset cannot be read.
     """
@@ -41,95 +58,144 @@ def datasets_in(path: Path) -> list[Dataset]:
         types = [int(number) for number in file.get_set_types()]
     except Exception as error:  # pyuff raises no more specific error
         raise ImportFailed(f"{path}: is a damaged universal file ({error})") from None
-    return [_dataset(file, number, kind, path) for number, kind in enumerate(types) if kind in _KNOWN]
+    found = list(_datasets(file, types, path))
+    return UniversalFile(
+        functions=tuple(one for one in found if isinstance(one, Function)),
+        modes=tuple(one for one in found if isinstance(one, ModeShape)),
+        has_shapes=55 in types,
+        units=tuple(one for one in found if isinstance(one, UnitSystem)),
+        count=len(found),
+    )
 
 
-def _dataset(file: Any, number: int, kind: int, path: Path) -> Dataset:
-    where = f"{path}, dataset {number + 1} (type {kind})"
-    try:
-        dataset: dict[str, Any] = file.read_sets(number)
-    except Exception as error:
-        raise ImportFailed(f"{where}: is damaged or in a variant that is not understood ({error})") from None
-    if kind == 58:
-        values, wanted = len(dataset["data"]), dataset["num_pts"]
-        if values < wanted:
-            raise ImportFailed(f"{where}: holds {values} of {wanted} values")
-        dataset["data"], dataset["x"] = dataset["data"][:wanted], dataset["x"][:wanted]
-        if not np.all(np.isfinite(dataset["data"])):
-            raise ImportFailed(f"{where}: value {int(np.argmin(np.isfinite(dataset['data']))) + 1} is not finite")
-    return {**dataset, "where": where}
+def _datasets(
+    file: "pyuff.UFF", types: Sequence[int], path: Path
+) -> Iterator[Function | ModeShape | UnitSystem | None]:
+    """Yield the known datasets; None for the header and for shapes that are no normal modes."""
+    for number, kind in enumerate(types):
+        if kind not in _KNOWN:
+            continue
+        where = f"{path}, dataset {number + 1} (type {kind})"
+        try:
+            yield _dataset(kind, file.read_sets(number), where)
+        except ImportFailed:
+            raise
+        except Exception as error:
+            raise ImportFailed(f"{where}: is damaged or in a variant that is not understood ({error})") from None
 
 
-def degree_of(dataset: Dataset, prefix: str) -> str:
-    """Return node and direction as text, such as ``3+Z``."""
-    direction = int(dataset[f"{prefix}_dir"])
-    sign = _DIRECTION.get(abs(direction), f"?{direction}")
-    return f"{dataset[f'{prefix}_node']}{sign.replace('+', '-') if direction < 0 else sign}"
+def _dataset(kind: int, table: Mapping[str, object], where: str) -> Function | ModeShape | UnitSystem | None:
+    if kind == 164:
+        return UnitSystem(_whole(table, "units_code"), _real(table, "length"), _real(table, "force"))
+    lines = tuple(str(table.get(f"id{number}", "")) for number in range(1, 6))
+    if kind == 55 and table["analysis_type"] == _NORMAL_MODE:
+        return ModeShape(
+            where=where,
+            lines=lines,
+            frequency_hz=_real(table, "freq"),
+            modal_mass=_real(table, "modal_m"),
+            damping_ratio=_real(table, "modal_damp_vis"),
+            nodes=tuple(int(node) for node in np.asarray(table["node_nums"])),
+            shape=np.array([table[axis] for axis in ("r1", "r2", "r3")]),
+        )
+    if kind != 58:
+        return None
+    data, wanted = np.asarray(table["data"]), _whole(table, "num_pts")
+    if data.size < wanted:
+        raise ImportFailed(f"{where}: holds {data.size} of {wanted} values")
+    data = data[:wanted]
+    if not np.all(np.isfinite(data)):
+        raise ImportFailed(f"{where}: value {int(np.argmin(np.isfinite(data))) + 1} is not finite")
+    return Function(
+        where=where,
+        type=_whole(table, "func_type"),
+        number=_whole(table, "func_id"),
+        load_case=_whole(table, "load_case_id"),
+        lines=lines,
+        response=(_whole(table, "rsp_node"), _whole(table, "rsp_dir")),
+        reference=(_whole(table, "ref_node"), _whole(table, "ref_dir")),
+        even=_whole(table, "abscissa_spacing") == 1,
+        step=_real(table, "abscissa_inc"),
+        ordinate=_axis(table, "ordinate"),
+        denominator=_axis(table, "orddenom"),
+        x=np.asarray(table["x"], np.float64)[:wanted],
+        data=data,
+    )
 
 
-_SPARE = 0.01  # a recorder stops a few samples early or late
+def _axis(table: Mapping[str, object], prefix: str) -> Axis:
+    return Axis(
+        int(str(table.get(f"{prefix}_spec_data_type", 0))),
+        str(table.get(f"{prefix}_axis_lab", "")),
+        str(table.get(f"{prefix}_axis_units_lab", "")),
+    )
 
 
-def time_data_in(datasets: Sequence[Dataset], assumed: str = "") -> dict[str, Any]:
+def _whole(table: Mapping[str, object], key: str) -> int:
+    return int(_real(table, key))
+
+
+def _real(table: Mapping[str, object], key: str) -> float:
+    return float(str(table[key]))
+
+
+def time_data_in(file: UniversalFile, assumed: str = "") -> FileData:
     """Return the time functions (type 1) by name, with one column per record, in SI if they have units.
 
-    The dictionary also has ``sets`` (list of all functions), ``sample_rate_hz`` and ``units`` (by name). Raises `ImportFailed`
-    if there are none, or if their rates disagree.
+    The values also have ``sets``, the list of all functions. Raises `ImportFailed` if there are none, or if their rates
+    disagree.
     """
-    functions = [dataset for dataset in datasets if dataset["type"] == 58 and dataset["func_type"] == 1]
+    functions = file.of_type(TIME_RESPONSE)
     if not functions:
-        raise ImportFailed(f"no time data (dataset 58 of function type 1) among {len(datasets)} datasets")
-    units = file_units(datasets, assumed)
+        raise ImportFailed(f"no time data (dataset 58 of function type 1) among {file.count} datasets")
+    units = file_units(file, assumed)
     rates: list[float] = []
-    stored: list[Any] = []
-    out: dict[str, list[Any]] = {}
+    records: dict[str, list[Float]] = {}
+    sets: list[Float] = []
     known: dict[str, str] = {}
     for function in functions:
         rates.append(_rate(function))
         if abs(rates[-1] / rates[0] - 1.0) > 1e-9:
-            raise ImportFailed(
-                f"{function['where']}: sample rate {rates[-1]:g} Hz, that of the first is {rates[0]:g} Hz"
-            )
-        name = function["id1"] if function["id4"].startswith("vibrolock") else degree_of(function, "rsp")
+            raise ImportFailed(f"{function.where}: sample rate {rates[-1]:g} Hz, that of the first is {rates[0]:g} Hz")
+        name = function.lines[0] if function.own else degree_name(function.response)
         try:
-            unit, factor = units.of(function, "ordinate", function["where"])
+            unit, factor = units.of(function.ordinate, "ordinate", function.where)
         except (ImportFailed, IdentificationError):
-            if assumed or int(function["ordinate_spec_data_type"]):
+            if assumed or function.ordinate.data_type:
                 raise
             unit, factor = "", 1.0  # an unknown quantity without unit: the mapping says what it is
-        stored.append(np.asarray(function["data"], dtype=np.float64) * factor)
-        out.setdefault(name, []).append(stored[-1])
-        if abs(len(stored[-1]) - len(out[name][0])) > _SPARE * len(out[name][0]):
+        sets.append(np.asarray(np.real(function.data), np.float64) * factor)
+        records.setdefault(name, []).append(sets[-1])
+        before = len(records[name][0])
+        if abs(len(sets[-1]) - before) > _MAX_DIFFERENCE * before:
             raise ImportFailed(
-                f"{function['where']}: {name} has {len(stored[-1])} samples, before {len(out[name][0])}; wanted are records "
-                "of one length"
+                f"{function.where}: {name} has {len(sets[-1])} samples, before {before}; wanted are records of one length"
             )
         known[name] = unit
-    return {
-        **{name: _columns(records) for name, records in out.items()},
-        "sets": stored,
-        "units": known,
-        "sample_rate_hz": rates[0],
-    }
+    return FileData(
+        values={**{name: _columns(several) for name, several in records.items()}, "sets": [*sets]},
+        channels={name: ChannelFacts(unit=unit, in_si=True) for name, unit in known.items()},
+        sample_rate_hz=rates[0],
+    )
 
 
-def _columns(records: Sequence[Any]) -> Any:
+def _columns(records: Sequence[Float]) -> Float:
     """Put records side by side, cut to the length of the shortest."""
     shortest = min(map(len, records))
     return np.column_stack([record[:shortest] for record in records])
 
 
-def _rate(function: Dataset) -> float:
+def _rate(function: Function) -> float:
     """Return the sample rate of line 5 if it agrees with the header to the header's six digits, else that of the header.
 
     Of the rates with these six digits of the step, the one with the fewest digits is taken: 2048 Hz, not 2048.001 Hz.
     """
-    step = float(function["abscissa_inc"])
-    if function["abscissa_spacing"] != 1 or step <= 0.0:
-        raise ImportFailed(f"{function['where']}: is not evenly sampled; wanted is a step above zero")
+    step = function.step
+    if not function.even or step <= 0.0:
+        raise ImportFailed(f"{function.where}: is not evenly sampled; wanted is a step above zero")
     rate = 1.0 / step
-    told = re.match(r"sample rate (\S+) Hz", function["id5"])
-    if told and abs(float(told[1]) / rate - 1.0) < 1e-5:
-        return float(told[1])
+    stated = re.match(r"sample rate (\S+) Hz", function.lines[4])
+    if stated and abs(float(stated[1]) / rate - 1.0) < 1e-5:
+        return float(stated[1])
     rounded = (float(f"{rate:.{digits}g}") for digits in range(1, 7))
     return next((one for one in rounded if f"{1.0 / one:.5e}" == f"{step:.5e}"), rate)

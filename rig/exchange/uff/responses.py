@@ -2,25 +2,30 @@
 
 import re
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from identification import Channel, FrequencyResponse, FrequencyResponseMatrix
+from identification.channels import Motion, Role
+from identification.frequency_responses import Controlled
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.uff.reading import Dataset, degree_of
+from rig.exchange.uff.datasets import FREQUENCY_RESPONSE, GENERAL, Function, UniversalFile, degree_name
 from rig.exchange.uff.units import FileUnits, file_units
+from vibrolock.arrays import Complex
 
 
-def _names(dataset: Dataset) -> tuple[str, str]:
+def _names(function: Function) -> tuple[str, str]:
     """Return the names of response and reference as written by this package, otherwise node and direction."""
-    parts = dataset["id1"].split(" / ")
-    if dataset["id4"].startswith("vibrolock") and len(parts) == 2:
+    parts = function.lines[0].split(" / ")
+    if function.own and len(parts) == 2:
         return parts[0], parts[1]
-    return degree_of(dataset, "rsp"), degree_of(dataset, "ref")
+    return degree_name(function.response), degree_name(function.reference)
 
 
-def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> list[Any]:
+def responses_in(
+    file: UniversalFile, assumed: str = ""
+) -> list[FrequencyResponseMatrix] | list[tuple[FrequencyResponse, ...]]:
     """Return the functions of type 4 as one or several objects: `FrequencyResponseMatrix`, or levels of a stepped sine.
 
     Where a response is there more than once, each load case is a matrix of its own, in the order of the file: a level of a
@@ -28,39 +33,39 @@ def responses_in(datasets: Sequence[Dataset], assumed: str = "") -> list[Any]:
     and axis of a reference is the drive point. Raises `ImportFailed` for missing or duplicate paths, unequal frequencies, or
     unclear units.
     """
-    functions = [dataset for dataset in datasets if dataset["type"] == 58 and dataset["func_type"] == 4]
-    units = file_units(datasets, assumed)
-    if functions and all(function["id4"] == "vibrolock frequency-responses" for function in functions):
-        return [_stepped_sines(datasets, functions)]
+    functions = file.of_type(FREQUENCY_RESPONSE)
+    units = file_units(file, assumed)
+    if functions and all(function.lines[3] == "vibrolock frequency-responses" for function in functions):
+        return [_stepped_sines(file, functions)]
     if not functions:
-        raise ImportFailed(f"no frequency response (dataset 58 of function type 4) among {len(datasets)} datasets")
+        raise ImportFailed(f"no frequency response (dataset 58 of function type 4) among {file.count} datasets")
     names = [_names(function) for function in functions]
     if len(set(names)) == len(names):
         return [_matrix(functions, units)]
-    cases = dict.fromkeys(function["load_case_id"] for function in functions)
-    return [_matrix([one for one in functions if one["load_case_id"] == case], units) for case in cases]
+    cases = dict.fromkeys(function.load_case for function in functions)
+    return [_matrix([one for one in functions if one.load_case == case], units) for case in cases]
 
 
-def _matrix(functions: Sequence[Dataset], units: FileUnits) -> FrequencyResponseMatrix:
+def _matrix(functions: Sequence[Function], units: FileUnits) -> FrequencyResponseMatrix:
     """Return frequency responses of all outputs to all inputs; each is there once."""
-    paths: dict[tuple[str, str], Any] = {}
+    paths: dict[tuple[str, str], Complex] = {}
     outputs: dict[str, Channel] = {}
     inputs: dict[str, Channel] = {}
     rms: dict[str, float] = {}
-    frequency_hz = np.asarray(functions[0]["x"], dtype=np.float64)
+    frequency_hz = functions[0].x
     for function in functions:
-        where, x = function["where"], function["x"]
+        where, x = function.where, function.x
         if len(x) != frequency_hz.size or not np.allclose(x, frequency_hz, rtol=1e-6):
             raise ImportFailed(f"{where}: its frequencies are not those of the first; import such files one by one")
         output, source = _names(function)
         if (output, source) in paths:
             raise ImportFailed(
-                f"{where}: a second response of {output} to {source} in load case {function['load_case_id']}; wanted is one"
+                f"{where}: a second response of {output} to {source} in load case {function.load_case}; wanted is one"
             )
         value, channels = _path(function, units, output, source)
         paths[output, source] = value
-        if told := re.search(r", input RMS (\S+) ", function["id5"] + " "):
-            rms[source] = float(told[1])
+        if level := re.search(r", input RMS (\S+) ", function.lines[4] + " "):
+            rms[source] = float(level[1])
         for known, channel in zip((outputs, inputs), channels, strict=True):
             if known.setdefault(channel.name, channel).unit != channel.unit:
                 raise ImportFailed(
@@ -79,55 +84,53 @@ def _matrix(functions: Sequence[Dataset], units: FileUnits) -> FrequencyResponse
         value=np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1),
         estimator=_estimator(functions[0]),
         input_rms=tuple(rms[name] for name in inputs) if set(rms) == set(inputs) else (),
-        specimen="" if functions[0]["id2"] == "NONE" else functions[0]["id2"],
+        specimen=_text(functions[0].lines[1]),
     )
 
 
-def _estimator(function: Dataset) -> str:
-    found = re.search(r", estimator ([^,]+)", function["id5"])
+def _estimator(function: Function) -> str:
+    found = re.search(r", estimator ([^,]+)", function.lines[4])
     return found.group(1) if found else "imported"
 
 
-def _path(function: Dataset, units: FileUnits, output: str, source: str) -> tuple[Any, tuple[Channel, Channel]]:
+def _text(line: str) -> str:
+    return "" if line == "NONE" else line
+
+
+def _path(function: Function, units: FileUnits, output: str, source: str) -> tuple[Complex, tuple[Channel, Channel]]:
     """Return one response in SI, and its two channels."""
-    where = function["where"]
-    (out_unit, out_factor), (in_unit, in_factor) = (
-        units.of(function, axis, where) for axis in ("ordinate", "orddenom")
-    )
-    value = np.asarray(function["data"], dtype=np.complex128) * (out_factor / in_factor)
-    told = re.match(r"(\w+) / (\w+), estimator", function["id5"])
-    if told:
-        return value, (Channel(output, told[1], out_unit), Channel(source, told[2], in_unit))  # type: ignore[arg-type]
-    same = (function["rsp_node"], abs(function["rsp_dir"])) == (function["ref_node"], abs(function["ref_dir"]))
+    out_unit, out_factor = units.of(function.ordinate, "ordinate", function.where)
+    in_unit, in_factor = units.of(function.denominator, "orddenom", function.where)
+    value = np.asarray(function.data, dtype=np.complex128) * (out_factor / in_factor)
+    if roles := re.match(r"(\w+) / (\w+), estimator", function.lines[4]):
+        return value, (Channel(output, cast(Role, roles[1]), out_unit), Channel(source, cast(Role, roles[2]), in_unit))
+    (node, direction), (at, along) = function.response, function.reference
+    same = (node, abs(direction)) == (at, abs(along))
     motion = out_unit in ("m", "m/s", "m/s2")
-    role = "drive" if same and motion else "response" if motion else "monitor"
-    return value, (
-        Channel(output, role, out_unit),  # type: ignore[arg-type]
-        Channel(source, "force" if in_unit == "N" else "monitor", in_unit),
-    )
+    role: Role = "drive" if same and motion else "response" if motion else "monitor"
+    return value, (Channel(output, role, out_unit), Channel(source, "force" if in_unit == "N" else "monitor", in_unit))
 
 
-def _stepped_sines(datasets: Sequence[Dataset], functions: Sequence[Dataset]) -> tuple[FrequencyResponse, ...]:
+def _stepped_sines(file: UniversalFile, functions: Sequence[Function]) -> tuple[FrequencyResponse, ...]:
     """Return the levels of a stepped sine as this package writes them: response over force, and the force."""
-    forces = {d["func_id"]: d for d in datasets if d["type"] == 58 and d["func_type"] == 0}
+    forces = {one.number: one for one in file.of_type(GENERAL)}
     out = []
     for function in functions:
-        told = re.fullmatch(r"controlled (\w+), level (\S+)", function["id5"])
-        force = forces.get(function["func_id"])
-        if told is None or force is None or len(force["data"]) != len(function["data"]):
-            raise ImportFailed(f"{function['where']}: level or force of this stepped sine is missing")
-        kind, controlled = function["ordinate_axis_lab"], cast(Any, told[1])
-        label, specimen = ("" if function[key] == "NONE" else function[key] for key in ("id1", "id2"))
-        drive = np.asarray(force["data"], dtype=np.complex128)
-        response = FrequencyResponse(
-            function["x"],
-            drive,
-            function["data"] * drive,
-            kind,
-            controlled,
-            float(told[2]),
-            label,
-            specimen,
+        level = re.fullmatch(r"controlled (\w+), level (\S+)", function.lines[4])
+        force = forces.get(function.number)
+        if level is None or force is None or force.data.size != function.data.size:
+            raise ImportFailed(f"{function.where}: level or force of this stepped sine is missing")
+        drive = np.asarray(force.data, dtype=np.complex128)
+        out.append(
+            FrequencyResponse(
+                frequency_hz=function.x,
+                force=drive,
+                response=np.asarray(function.data, np.complex128) * drive,
+                kind=cast(Motion, function.ordinate.label),
+                controlled=cast(Controlled, level[1]),
+                level=float(level[2]),
+                label=_text(function.lines[0]),
+                specimen=_text(function.lines[1]),
+            )
         )
-        out.append(response)
     return tuple(out)

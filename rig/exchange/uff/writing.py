@@ -9,16 +9,17 @@ import warnings
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from identification import Channel
 from rig.errors import RecordingError
 from rig.exchange.uff.codes import WIDTH, axis, channel_lines, degrees_of_freedom, evenly
-from rig.text.contents import Contents
+from rig.exchange.uff.datasets import FREQUENCY_RESPONSE, GENERAL, TIME_RESPONSE
+from rig.text.contents import Array, Contents
 
-_TIME_RESPONSE, _GENERAL, _RESPONSE_FUNCTION = 1, 0, 4
+Dataset = dict[str, object]
+"""Fields of a dataset, as pyuff writes them."""
 _PROGRAM = "vibrolock"
 _MATRIX = "frequency-response-matrix"
 
@@ -40,14 +41,14 @@ def write_uff(items: Sequence[Contents], path: Path, encoding: str = "") -> None
 
     writer = Writer(str(path))
     for dataset in [*_head(items), *_functions(items, encoding)]:
-        if not np.all(np.isfinite(dataset.get("data", 0.0))):
+        if not np.all(np.isfinite(np.asarray(dataset.get("data", 0.0)))):
             raise RecordingError(f"'{dataset['id1']}' holds a number that is not finite, which universal files cannot")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves a binary file to the garbage collector
             writer.write_sets(dataset, "add")
 
 
-def _functions(items: Sequence[Contents], encoding: str) -> Iterator[dict[str, Any]]:
+def _functions(items: Sequence[Contents], encoding: str) -> Iterator[Dataset]:
     """Yield the datasets of all items in an encoding; levels of frequency responses with numbers as load cases."""
     several = sum(item.kind == _MATRIX for item in items) > 1
     level = 0
@@ -59,7 +60,7 @@ def _functions(items: Sequence[Contents], encoding: str) -> Iterator[dict[str, A
             yield {**dataset, **case, **told}
 
 
-def _head(items: Sequence[Contents]) -> list[dict[str, Any]]:
+def _head(items: Sequence[Contents]) -> list[Dataset]:
     now = datetime.now()
     day, hour = now.strftime("%d-%b-%y"), now.strftime("%H:%M:%S")
     dates = {f"{what}_{name}": value for name in _DATES for what, value in (("date", day), ("time", hour))}
@@ -77,22 +78,22 @@ def _ascii(text: str) -> str:
     return text.encode("ascii", "replace").decode().replace("\n", " ")[:WIDTH].strip() or "NONE"
 
 
-def _function(kind: int, number: int, title: str, item: Contents, x: Any, data: Any) -> dict[str, Any]:
+def _function(kind: int, number: int, title: str, item: Contents, x: Array, data: Array) -> Dataset:
     """Return a function without its degrees of freedom. Its abscissa is marked as even if the header can represent it."""
     even = evenly(x)
     abscissa = x if len(x) > 1 else np.array([x[0], x[0] + 1.0])  # the writer needs a step
-    out = {"type": 58, "func_type": kind, "func_id": number, "ver_num": 1, "load_case_id": 0, "binary": 0}
+    out: Dataset = {"type": 58, "func_type": kind, "func_id": number, "ver_num": 1, "load_case_id": 0, "binary": 0}
     texts = {"id1": _ascii(title), "id2": _ascii(item.title), "id4": _ascii(f"{_PROGRAM} {item.kind}"), "id5": "NONE"}
     texts["id3"] = datetime.now().strftime("%d-%b-%y %H:%M:%S")
     double = {"x": abscissa if even else x, "data": np.array(data), "abscissa_spacing": int(even)}
     return {**out, **texts, **double, **axis("orddenom", "", ""), **axis("z_axis", "", "")}
 
 
-def _at(prefix: str, name: str, degree: tuple[int, int]) -> dict[str, Any]:
+def _at(prefix: str, name: str, degree: tuple[int, int]) -> Dataset:
     return {f"{prefix}_ent_name": _ascii(name)[:10], f"{prefix}_node": degree[0], f"{prefix}_dir": degree[1]}
 
 
-def _nowhere(*prefixes: str) -> dict[str, Any]:
+def _nowhere(*prefixes: str) -> Dataset:
     return {key: value for prefix in prefixes for key, value in _at(prefix, "NONE", (0, 0)).items()}
 
 
@@ -100,17 +101,21 @@ def _channels(item: Contents, name: str = "channels") -> list[Channel]:
     return [Channel(**channel) for channel in item.attributes[name]]
 
 
-def _time_data(item: Contents) -> Iterator[dict[str, Any]]:
+def _time_data(item: Contents) -> Iterator[Dataset]:
     """Yield one binary function of type 1 per channel. Line 5 has the full sample rate; the header has only six digits."""
     channels, rate = _channels(item), item.attributes["sample_rate_hz"]
     degrees = degrees_of_freedom(channels)
     x = item.arrays["time_s"]
     for number, channel in enumerate(channels):
         function = _function(
-            _TIME_RESPONSE, item.attributes["point"], channel.name, item, x, item.arrays["samples"][number]
+            TIME_RESPONSE,
+            item.attributes["point"],
+            channel.name,
+            item,
+            x,
+            item.arrays["samples"][number].astype(np.float64),
         )
         function |= {"binary": 1, "abscissa_spacing": 1, "id5": _ascii(f"sample rate {rate!r} Hz, {channel.role}")}
-        function["data"] = function["data"].astype(np.float64)
         yield (
             function
             | _at("rsp", channel.name, degrees[channel.name])
@@ -122,7 +127,7 @@ def _time_data(item: Contents) -> Iterator[dict[str, Any]]:
         )
 
 
-def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
+def _response_matrix(item: Contents) -> Iterator[Dataset]:
     """Yield one function of type 4 per output and input. Covariances are written only to MAT and CSV."""
     outputs, inputs = _channels(item, "outputs"), _channels(item, "inputs")
     degrees = degrees_of_freedom([*outputs, *inputs])
@@ -130,7 +135,7 @@ def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
     for column, source in enumerate(inputs):
         for row, output in enumerate(outputs):
             title = f"{output.name} / {source.name}"
-            function = _function(_RESPONSE_FUNCTION, row + 1, title, item, x, item.arrays["value"][:, row, column])
+            function = _function(FREQUENCY_RESPONSE, row + 1, title, item, x, item.arrays["value"][:, row, column])
             rms = item.attributes["input_rms"][column] if item.attributes["input_rms"] else None
             level = "" if rms is None else f", input RMS {rms!r} {source.unit}"
             estimator = item.attributes["estimator"] or "unknown"
@@ -148,7 +153,7 @@ def _response_matrix(item: Contents) -> Iterator[dict[str, Any]]:
             )
 
 
-def _table(item: Contents) -> Iterator[dict[str, Any]]:
+def _table(item: Contents) -> Iterator[Dataset]:
     """Yield one function of type 0 per column, over the row number from 1. Rows that are NaN are left out."""
     number = 0
     for name in item.rows:
@@ -158,11 +163,11 @@ def _table(item: Contents) -> Iterator[dict[str, Any]]:
             if not known.any():
                 continue
             rows = np.flatnonzero(known) + 1.0
-            function = _function(_GENERAL, number, title, item, rows, values[known])
+            function = _function(GENERAL, number, title, item, rows, values[known])
             yield function | _nowhere("rsp", "ref") | axis("abscissa", "Point", "") | axis("ordinate", name, unit)
 
 
-def _complex_columns(item: Contents, name: str) -> Iterator[tuple[str, str, Any]]:
+def _complex_columns(item: Contents, name: str) -> Iterator[tuple[str, str, Array]]:
     columns = item.columns(name)
     if not np.iscomplexobj(item.arrays[name]):
         yield from ((title, unit, values.astype(np.float64)) for title, unit, values in columns)
@@ -171,7 +176,7 @@ def _complex_columns(item: Contents, name: str) -> Iterator[tuple[str, str, Any]
         yield title.removesuffix(".re"), unit, real + 1j * imaginary
 
 
-def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
+def _frequency_responses(item: Contents) -> Iterator[Dataset]:
     """Yield for each level: response over force (type 4) and force (type 0), over the measured frequencies."""
     ends = np.cumsum(item.arrays["points_per_level"])
     for number, end in enumerate(ends):
@@ -181,9 +186,9 @@ def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
         x, force = item.arrays["frequency_hz"][rows], item.arrays["force"][rows]
         told = _ascii(f"controlled {level['controlled']}, level {float(item.arrays['level'][number])!r}")
         ratio = _function(
-            _RESPONSE_FUNCTION, number + 1, level["label"], item, x, item.arrays["response"][rows] / force
+            FREQUENCY_RESPONSE, number + 1, level["label"], item, x, item.arrays["response"][rows] / force
         )
-        forces = _function(_GENERAL, number + 1, level["label"], item, x, force)
+        forces = _function(GENERAL, number + 1, level["label"], item, x, force)
         abscissa, drive = axis("abscissa", "Frequency", "Hz"), _at("rsp", "drive", (1, 3))
         ratio |= abscissa | axis("ordinate", level["kind"], unit) | axis("orddenom", "force", "N") | drive
         forces |= abscissa | axis("ordinate", "force", "N") | _at("rsp", "force", (1, 3)) | _nowhere("ref")
@@ -191,7 +196,7 @@ def _frequency_responses(item: Contents) -> Iterator[dict[str, Any]]:
         yield forces | {"id2": _ascii(level["specimen"]), "id5": told}
 
 
-def _modes(item: Contents) -> Iterator[dict[str, Any]]:
+def _modes(item: Contents) -> Iterator[Dataset]:
     """Yield one dataset 55 per normal mode: modal mass 1 kg, shape in +Z; lines 3 to 5 name the channels of the nodes."""
     channels = _channels(item)
     degrees = degrees_of_freedom(channels)
@@ -214,7 +219,7 @@ def _modes(item: Contents) -> Iterator[dict[str, Any]]:
         }
 
 
-def _refused(item: Contents) -> Iterator[dict[str, Any]]:
+def _refused(item: Contents) -> Iterator[Dataset]:
     raise RecordingError(f"a {item.kind} has no form in universal files; choose mat or csv")
 
 

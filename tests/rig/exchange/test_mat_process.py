@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from rig.exchange import child_reading
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.child_values import read_values, write_values
+from rig.exchange.file_data import FileData
 from rig.exchange.mat import read_mat
 from rig.system.child import ChildFailed
 
@@ -37,7 +38,7 @@ def path(tmp_path):
 
 
 def test_what_the_child_reads_is_what_scipy_reads(path):
-    same(read_mat(path), scipy.io.loadmat(str(path), simplify_cells=True))
+    same(read_mat(path).values, scipy.io.loadmat(str(path), simplify_cells=True))
 
 
 def same(found, wanted):
@@ -59,7 +60,7 @@ def same(found, wanted):
 
 def test_what_is_no_number_or_text_becomes_the_name_of_its_type(tmp_path):
     scipy.io.savemat(tmp_path / "sparse.mat", {"x": scipy.sparse.csc_matrix(np.eye(3)), "y": 1.0})
-    found = read_mat(tmp_path / "sparse.mat")
+    found = read_mat(tmp_path / "sparse.mat").values
     assert found["x"].startswith("<csc_")
     assert found["y"] == 1.0
 
@@ -110,7 +111,7 @@ def test_changed_bytes_give_one_line_or_values(path, seed):
     path.write_bytes(data)
     line = f"{path}: "
     try:
-        assert isinstance(read_mat(path), dict)
+        assert isinstance(read_mat(path), FileData)
     except ImportFailed as error:
         line = str(error)
     assert line.startswith(f"{path}: ")

@@ -11,7 +11,7 @@ from identification import NonlinearMode
 from identification.common import decode, encode
 from rig.exchange.export import write_contents
 from rig.exchange.kinds import KINDS, put_together, taken_apart
-from rig.exchange.mat import read_mat, structures_of_ours
+from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.reading import import_file
 from rig.exchange.time_data import TimeData
 from rig.exchange.uff.reading import read_uff, time_data_in
@@ -98,10 +98,10 @@ def test_time_data_of_universal_files_is_exact_and_so_is_its_rate(tmp_path, rate
     path = tmp_path / "time.uff"
     write_contents([taken_apart(TimeData(CHANNELS, samples, rate_hz, point=4))], path, "uff")
     data = time_data_in(read_uff(path))
-    assert data["sample_rate_hz"] == rate_hz
+    assert data.sample_rate_hz == rate_hz
     for channel, expected in zip(CHANNELS, samples, strict=True):
-        np.testing.assert_array_equal(data[channel.name][:, 0], expected)
-        assert data["units"][channel.name] == channel.unit
+        np.testing.assert_array_equal(data.values[channel.name][:, 0], expected)
+        assert data.unit(channel.name) == channel.unit
 
 
 @pytest.mark.parametrize("format_", ["mat", "csv"])
@@ -116,7 +116,7 @@ def test_several_objects_are_a_structure_array_of_which_one_is_chosen(matrix, tm
     path = tmp_path / "levels.mat"
     other = matrix.select(["v"])
     write_contents([taken_apart(matrix), taken_apart(other)], path, "mat")
-    assert len(structures_of_ours(read_mat(path))) == 2
+    assert len(stored_objects(read_mat(path))) == 2
     assert_same(import_file(path, item=1), matrix)
     assert_same(import_file(path, item=2), other)
 

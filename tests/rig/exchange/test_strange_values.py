@@ -67,7 +67,7 @@ def test_instants_that_do_not_increase_evenly_are_refused(time):
 def test_a_strange_value_in_a_series_is_refused_by_its_key(key, value):
     one = {"data": [1.0, 2.0], "name": "F", "unit_str": "N", "fs": 100.0, key: value}
     if isinstance(value, str) and key in ("name", "unit_str"):
-        assert data_of_series([one])["sample_rate_hz"] == 100.0
+        assert data_of_series([one]).sample_rate_hz == 100.0
         return
     with pytest.raises(RigError) as refused:
         data_of_series([one])

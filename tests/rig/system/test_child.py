@@ -82,7 +82,7 @@ def test_a_script_without_a_main_guard_reads_an_unverified_file_and_a_mat_file(t
         "write_arrays('m.h5', 'nonlinear-mode', {'x': [1.0]}, {})\n"
         "h5py.File('m.h5', 'r+').close()\n"
         "scipy.io.savemat('m.mat', {'x': [[1.0, 2.0]]})\n"
-        "print(read_arrays('m.h5')[1]['x'], read_mat(Path('m.mat'))['x'])\n"
+        "print(read_arrays('m.h5')[1]['x'], read_mat(Path('m.mat')).values['x'])\n"
     )
     done = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout == "[1.] [1. 2.]\n"
