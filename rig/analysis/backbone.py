@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.levels import By, level_range, samples_for
-from rig.analysis.study import Study, length_unit, roomy
-from rig.analysis.subject import Subject, refusing
+from rig.analysis.balance import Balance
+from rig.analysis.levels import By, level_range
+from rig.analysis.study import Study, length_unit, set_min_span
+from rig.analysis.subject import Subject
 from rig.drawing.areas import areas, is_narrow
 from rig.drawing.style import COLOURS, MAIN, SECOND
 from rig.errors import ConfigurationError
@@ -18,16 +19,17 @@ from simulators.analysis import (
     NotConvergedError,
     PeriodicResponses,
     hysteresis_loops,
-    phase_resonance_backbone,
 )
 from simulators.parts import FrictionSite
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
-_WORTH_A_NUMBER = 0.001
+_MIN_NEGLECTED_PERCENT = 0.001
+"""Smallest neglected part of the force that is given as a number, %; chosen."""
 _ROUNDING_J = 1e-15
+"""Energy below which a loop is closed by rounding, J; chosen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,7 +51,7 @@ class Backbone(Study):
         """Title of the analysis."""
         return f"backbone by harmonic balance, {self.responses.frequency_hz.size} levels"
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Return points and loops."""
         joints = [f"{joint.at} ({joint.kind})" for joint in self.subject.rig.friction]
         loops = [
@@ -105,14 +107,11 @@ def backbone(
     By default ``highest`` is the level at which the bench's limits or the valid range of the rig end the backbone, and
     ``lowest`` a hundredth of it. Raises `ConfigurationError` for values that are not allowed, and if no vibration is found.
     """
-    levels = level_range(subject, by, lowest, highest, points, harmonics)
-    ask: dict[str, Any] = {"forces_n" if by == "force" else "voltages_v": levels}
+    balance = Balance(subject, harmonics)
+    levels = level_range(balance, by, lowest, highest, points)
     notes: list[str] = []
     try:
-        with refusing():
-            found = phase_resonance_backbone(
-                subject.rig, **ask, near_hz=subject.near_hz, harmonics=harmonics, samples=samples_for(harmonics)
-            )
+        found = balance.backbone(forces_n=levels) if by == "force" else balance.backbone(voltages_v=levels)
     except NotConvergedError as failure:
         if failure.found is None:
             raise ConfigurationError(f"no vibration at resonance found at the lowest level: {failure}") from failure
@@ -122,18 +121,18 @@ def backbone(
     shown = sorted({0, n // 2, n - 1}) if subject.rig.friction else []
     return Backbone(
         subject=subject,
-        notes=(*notes, *subject.excesses(found, "levels"), neglected(found)),
+        notes=(*notes, *subject.limit_violations(found, "levels"), neglected_force(found)),
         complete=not notes,
         responses=found,
         loops={point: hysteresis_loops(subject.rig, found, point) for point in shown},
     )
 
 
-def neglected(found: PeriodicResponses) -> str:
+def neglected_force(found: PeriodicResponses) -> str:
     """Return a remark on the part of the force above the balanced harmonics."""
     highest = found.force_harmonics_n.shape[1] - 1
     percent = 100.0 * float(np.max(found.neglected_share))
-    text = f"up to {percent:.2g} %" if percent >= _WORTH_A_NUMBER else f"less than {_WORTH_A_NUMBER:g} %"
+    text = f"up to {percent:.2g} %" if percent >= _MIN_NEGLECTED_PERCENT else f"less than {_MIN_NEGLECTED_PERCENT:g} %"
     return (
         f"force above harmonic {highest} is left out: {text} of the fundamental; balance more harmonics to include it"
     )
@@ -157,7 +156,7 @@ def draw_backbone(
     total = 100 * found.damping_ratio_total_power
     damping.plot(x, total, "s--", color=SECOND, label="from the power of all harmonics")
     damping.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
-    roomy(damping, np.concatenate([100 * found.damping_ratio, total]), 0.2)
+    set_min_span(damping, np.concatenate([100 * found.damping_ratio, total]), 0.2)
     damping.legend(loc="best")
     amplitude.plot(found.force_n, x, "o-", color=MAIN)
     amplitude.set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement, {unit}")
@@ -177,7 +176,7 @@ def _draw_harmonics(axis: "Axes", found: PeriodicResponses) -> None:
 
 
 def _draw_loops(
-    part: Any,
+    part: "SubFigure",
     found: PeriodicResponses,
     loops: dict[int, tuple[HysteresisLoop, ...]],
     joints: Sequence[FrictionSite],

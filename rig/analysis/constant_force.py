@@ -2,34 +2,34 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.backbone import neglected
-from rig.analysis.levels import highest_resonance, most_points, samples_for
+from rig.analysis.backbone import neglected_force
+from rig.analysis.balance import Balance
+from rig.analysis.levels import checked_points, highest_resonance
 from rig.analysis.study import Study, length_unit
-from rig.analysis.subject import Subject, positive, refusing
+from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
 from rig.drawing.steady_curve import UNSTABLE
 from rig.drawing.style import REJECTED, SECOND, shade
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
-from simulators.analysis import (
-    NotConvergedError,
-    PeriodicResponses,
-    constant_force_response,
-    phase_resonance_backbone,
-)
+from simulators.analysis import NotConvergedError, PeriodicResponses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_DEFAULT_SHARES = (0.1, 0.3, 1.0)
+_DEFAULT_LEVELS = (0.1, 0.3, 1.0)
+"""Default forces over that which the backbone reaches within the bench's limits; chosen."""
 _LAGS_DEG = (-175.0, -5.0)
+"""First and last phase lag of a curve, deg; chosen: 5 deg from the lags that are never reached."""
 _RESONANCE_DEG = -90.0
+"""Lag of the acceleration at phase resonance, deg."""
 _BACKBONE_POINTS = 15
+"""Points of the backbone; chosen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,7 +46,7 @@ class ConstantForce(Study):
         """Title of the analysis."""
         return f"responses at constant force, {', '.join(f'{force:.4g}' for force in self.curves)} N"
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Return the curves with their folds, and the backbone."""
         curves = [
             {"force_n": force, "folds_hz": folds_of(curve), "points": curve} for force, curve in self.curves.items()
@@ -85,16 +85,15 @@ def constant_force(
 
     By default the forces are a tenth, three tenths, and all of the force that the backbone reaches within the bench's limits.
     """
-    lags = np.unique(np.append(np.linspace(*_LAGS_DEG, most_points(points, 3)), _RESONANCE_DEG))
+    lags = np.unique(np.append(np.linspace(*_LAGS_DEG, checked_points(points, 3)), _RESONANCE_DEG))
+    balance = Balance(subject, harmonics)
     if not forces_n:
-        path, last = highest_resonance(subject, harmonics)
-        forces_n = [float(f"{share * path.force_n[last]:.3g}") for share in _DEFAULT_SHARES]
-    how: dict[str, Any] = {"near_hz": subject.near_hz, "harmonics": harmonics, "samples": samples_for(harmonics)}
+        path, last = highest_resonance(balance)
+        forces_n = [float(f"{level * path.force_n[last]:.3g}") for level in _DEFAULT_LEVELS]
     curves, notes, failed = {}, [], []
     for force in sorted({positive("force_n", force) for force in forces_n}):
         try:
-            with refusing():
-                curves[force] = constant_force_response(subject.rig, force, lags, **how)
+            curves[force] = balance.constant_force(force, lags)
         except NotConvergedError as failure:
             failed.append(f"{force:g} N: {failure}")
             if failure.found is not None:
@@ -102,15 +101,12 @@ def constant_force(
     if not curves:
         raise ConfigurationError("; ".join(failed))
     for force, curve in curves.items():
-        notes += [f"{force:g} N: {line}" for line in subject.excesses(curve)]
+        notes += [f"{force:g} N: {line}" for line in subject.limit_violations(curve)]
     largest = max(curves)
-    with refusing():
-        resonances = phase_resonance_backbone(
-            subject.rig, forces_n=np.linspace(largest / _BACKBONE_POINTS, largest, _BACKBONE_POINTS), **how
-        )
+    resonances = balance.backbone(forces_n=np.linspace(largest / _BACKBONE_POINTS, largest, _BACKBONE_POINTS))
     return ConstantForce(
         subject=subject,
-        notes=(*failed, *notes, f"{largest:g} N: {neglected(curves[largest])}"),
+        notes=(*failed, *notes, f"{largest:g} N: {neglected_force(curves[largest])}"),
         complete=not failed,
         curves=curves,
         resonances=resonances,

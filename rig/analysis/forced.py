@@ -1,31 +1,65 @@
 """Steady response to a constant voltage, up and down: the force drops at resonance, as in a slow uncontrolled sweep."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rig.analysis.backbone import neglected
-from rig.analysis.levels import highest_resonance, most_points, samples_for
+from rig.analysis.backbone import neglected_force
+from rig.analysis.balance import Balance
+from rig.analysis.levels import checked_points, highest_resonance
 from rig.analysis.study import Study, length_unit
-from rig.analysis.subject import Subject, positive, refusing
+from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, REJECTED, SECOND
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
-from simulators.analysis import NotConvergedError, PeriodicResponses, forced_response, phase_resonance_backbone
+from simulators.analysis import NotConvergedError, PeriodicResponses
 from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_DEFAULT_SHARE = 0.5
+_DEFAULT_LEVEL = 0.5
+"""Default voltage over that at which the bench may be driven in resonance; chosen."""
 _SPAN = (0.7, 1.3)
+"""Default range over the frequency of the mode under test; chosen."""
+Column = NDArray[np.generic]
+"""A quantity at all points, along the first axis."""
+LineStyle = str | tuple[int, tuple[int, int]]
+"""Style of a line, as Matplotlib takes it."""
+_DASHED: LineStyle = (0, (4, 2))
+"""Dashes of the falling direction."""
 _DENSE_WIDTHS = 12.0
 """Half width of the dense part of the frequency grid, which holds half of the points, in half-widths of the resonance."""
 _SAME = 1e-3
+"""Difference of two amplitudes over the largest, up to which the directions agree; chosen."""
+
+
+@dataclass(frozen=True)
+class ForceExtremes:
+    """Force at the lowest frequency, its extremes with their frequencies, and their ratios to it."""
+
+    at_first_n: float
+    lowest_n: float
+    lowest_hz: float
+    lowest_share: float
+    highest_n: float
+    highest_hz: float
+    highest_share: float
+
+    @classmethod
+    def of(cls, branch: PeriodicResponses) -> "ForceExtremes":
+        """Return the extremes along a branch."""
+        force, frequency_hz = branch.force_n.tolist(), branch.frequency_hz.tolist()
+        (lowest, lowest_hz), (highest, highest_hz) = (
+            pick(zip(force, frequency_hz, strict=True), key=lambda point: point[0]) for pick in (min, max)
+        )
+        first = force[0]
+        return cls(first, lowest, lowest_hz, lowest / first, highest, highest_hz, highest / first)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,13 +86,13 @@ class Forced(Study):
         apart = np.abs(self.up.amplitude_m - self.down.amplitude_m) > _SAME * np.max(self.up.amplitude_m)
         return np.asarray(self.up.frequency_hz[apart])
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Return both directions, drop-out and overshoot."""
         return {
             "voltage_v": self.voltage_v,
             "up": self.up,
             "down": self.down,
-            "force": {"up": _extremes(self.up), "down": _extremes(self.down)},
+            "force": {"up": ForceExtremes.of(self.up), "down": ForceExtremes.of(self.down)},
             "directions_differ_hz": self.differ_hz,
         }
 
@@ -66,17 +100,17 @@ class Forced(Study):
         """Print drop-out and overshoot of the force, and the frequencies at which the directions differ."""
         rows = []
         for name, one in (("up", self.up), ("down", self.down)):
-            extremes = _extremes(one)
+            extremes = ForceExtremes.of(one)
             k = int(np.argmax(one.amplitude_m))
             rows.append(
                 (
                     name,
-                    number(extremes["at_first_n"], ".4f"),
-                    number(extremes["lowest_n"], ".4f"),
-                    number(extremes["lowest_hz"], ".4f"),
-                    number(extremes["lowest_share"], ".2f", 100.0),
-                    number(extremes["highest_share"], ".3f"),
-                    number(extremes["highest_hz"], ".4f"),
+                    number(extremes.at_first_n, ".4f"),
+                    number(extremes.lowest_n, ".4f"),
+                    number(extremes.lowest_hz, ".4f"),
+                    number(extremes.lowest_share, ".2f", 100.0),
+                    number(extremes.highest_share, ".3f"),
+                    number(extremes.highest_hz, ".4f"),
                     number(one.amplitude_m[k], ".5f", 1e3),
                 )
             )
@@ -109,23 +143,23 @@ def forced(
     Half of the points lie around resonance. By default the voltage is half of that at which the bench may be driven in
     resonance, and the frequencies are from 0.7 to 1.3 times that of the mode under test.
     """
+    balance = Balance(subject, harmonics)
     if voltage_v is None:
-        path, last = highest_resonance(subject, harmonics)
-        voltage_v = float(f"{_DEFAULT_SHARE * path.voltage_v[last]:.2g}")
+        path, last = highest_resonance(balance)
+        voltage_v = float(f"{_DEFAULT_LEVEL * path.voltage_v[last]:.2g}")
     voltage = positive("voltage_v", voltage_v)
     low = positive("from_hz", _SPAN[0] * subject.frequency_hz if from_hz is None else from_hz)
     high = positive("to_hz", _SPAN[1] * subject.frequency_hz if to_hz is None else to_hz)
     if low >= high:
         raise ConfigurationError(f"from_hz = {low:g}: allowed is less than to_hz = {high:g}")
-    how: dict[str, Any] = {"near_hz": subject.near_hz, "harmonics": harmonics, "samples": samples_for(harmonics)}
-    grid = _grid(low, high, most_points(points, 4), _resonance(subject, voltage, how))
-    up, up_ends = _followed(subject, voltage, grid, how)
-    down, down_ends = _followed(subject, voltage, grid[::-1], how)
-    up, down, notes = _completed(up, turned(down), up_ends, down_ends)
-    excesses = dict.fromkeys(line for way in (up, down) for line in subject.excesses(way))
+    grid = _grid(low, high, checked_points(points, 4), _resonance(balance, voltage))
+    up, up_ends = _followed(balance, voltage, grid)
+    down, down_ends = _followed(balance, voltage, grid[::-1])
+    up, down, notes = _completed(up, select_points(down, slice(None, None, -1)), up_ends, down_ends)
+    violations = dict.fromkeys(line for branch in (up, down) for line in subject.limit_violations(branch))
     return Forced(
         subject=subject,
-        notes=(*notes, *excesses, neglected(up)),
+        notes=(*notes, *violations, neglected_force(up)),
         complete=not (up_ends and down_ends),
         voltage_v=voltage,
         up=up,
@@ -133,11 +167,10 @@ def forced(
     )
 
 
-def _followed(subject: Subject, voltage_v: float, grid: Float, how: dict[str, Any]) -> tuple[PeriodicResponses, str]:
+def _followed(balance: Balance, voltage_v: float, grid: Float) -> tuple[PeriodicResponses, str]:
     """Follow the vibrations in the order of the grid until none is found; also return why none is found."""
     try:
-        with refusing():
-            return forced_response(subject.rig, voltage_v, grid, **how), ""
+        return balance.forced(voltage_v, grid), ""
     except NotConvergedError as failure:
         if failure.found is None:
             raise ConfigurationError(f"{voltage_v:g} V: {failure}") from failure
@@ -154,17 +187,21 @@ def _completed(
         both = (("rising", up.frequency_hz[-1], up_ends), ("falling", down.frequency_hz[0], down_ends))
         return up, down, [f"{name} frequency ends at {ends_hz:.4f} Hz: {why}" for name, ends_hz, why in both]
     if up_ends:
-        return joined(up, part(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
+        return joined(up, select_points(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
     if down_ends:
-        return up, joined(part(up, slice(0, n_up - n_down)), down), [jump.format("falling", down.frequency_hz[0])]
+        return (
+            up,
+            joined(select_points(up, slice(0, n_up - n_down)), down),
+            [jump.format("falling", down.frequency_hz[0])],
+        )
     return up, down, []
 
 
-def _resonance(subject: Subject, voltage_v: float, how: dict[str, Any]) -> tuple[float, float, float]:
+def _resonance(balance: Balance, voltage_v: float) -> tuple[float, float, float]:
     """Return the linear frequency, the frequency at phase resonance at this voltage, and the half-width there, Hz."""
+    subject = balance.subject
     try:
-        with refusing():
-            path = phase_resonance_backbone(subject.rig, voltages_v=voltage_v * np.array([0.05, 0.3, 1.0]), **how)
+        path = balance.backbone(voltages_v=voltage_v * np.array([0.05, 0.3, 1.0]))
         resonance_hz, damping = float(path.frequency_hz[-1]), float(path.damping_ratio[-1])
     except NotConvergedError:
         resonance_hz, damping = subject.frequency_hz, float(subject.rig.linear_modes.damping_ratio[subject.mode])
@@ -181,33 +218,18 @@ def _grid(low: float, high: float, points: int, resonance: tuple[float, float, f
     return np.unique(np.concatenate([np.linspace(low, high, points - dense.size), dense]))
 
 
-def _extremes(way: PeriodicResponses) -> dict[str, float]:
-    """Return the force at the lowest frequency, and the extremes of the force with their frequencies and ratios to it."""
-    force, lowest, highest = way.force_n, int(np.argmin(way.force_n)), int(np.argmax(way.force_n))
-    return {
-        "at_first_n": float(force[0]),
-        "lowest_n": float(force[lowest]),
-        "lowest_hz": float(way.frequency_hz[lowest]),
-        "lowest_share": float(force[lowest] / force[0]),
-        "highest_n": float(force[highest]),
-        "highest_hz": float(way.frequency_hz[highest]),
-        "highest_share": float(force[highest] / force[0]),
-    }
-
-
 def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses | None) -> None:
     """Draw three panels over the frequency; the falling direction is drawn only if it differs."""
     force, response, lag = grid(page, 3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.4))[:, 0]
     scale, unit = length_unit(float(np.max(up.amplitude_m)))
-    ways: list[tuple[PeriodicResponses, Any, str, str]] = [
-        (up, "-", MAIN, "frequency rising" if down is not None else "either direction")
-    ]
+    label = "frequency rising" if down is not None else "either direction"
+    branches: list[tuple[PeriodicResponses, LineStyle, str, str]] = [(up, "-", MAIN, label)]
     if down is not None:
-        ways.append((down, (0, (4, 2)), SECOND, "frequency falling"))
-    for way, style, colour, label in ways:
-        force.plot(way.frequency_hz, way.force_n, ls=style, color=colour, label=label)
-        response.plot(way.frequency_hz, scale * way.amplitude_m, ls=style, color=colour)
-        lag.plot(way.frequency_hz, way.phase_lag_deg, ls=style, color=colour)
+        branches.append((down, _DASHED, SECOND, "frequency falling"))
+    for branch, style, colour, label in branches:
+        force.plot(branch.frequency_hz, branch.force_n, ls=style, color=colour, label=label)
+        response.plot(branch.frequency_hz, scale * branch.amplitude_m, ls=style, color=colour)
+        lag.plot(branch.frequency_hz, branch.phase_lag_deg, ls=style, color=colour)
     force.set_ylabel("force, N")
     response.set_ylabel(f"displacement, {unit}")
     for axis in (force, response):
@@ -217,28 +239,23 @@ def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses |
     legend_below(page, force)
 
 
-def turned(way: PeriodicResponses) -> PeriodicResponses:
-    """Return the same points in the opposite order."""
-    return part(way, slice(None, None, -1))
-
-
-def part(way: PeriodicResponses, rows: slice) -> PeriodicResponses:
-    """Return some of the points."""
-    return _of_columns(lambda column: column[rows], way)
+def select_points(branch: PeriodicResponses, rows: slice) -> PeriodicResponses:
+    """Return some of the points of a branch."""
+    return _map_columns(lambda column: column[0][rows], branch)
 
 
 def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicResponses:
-    """Return the points of one followed by those of the other."""
-    return _of_columns(lambda one, other: np.concatenate([one, other]), first, then)
+    """Return the points of one branch followed by those of another."""
+    return _map_columns(np.concatenate, first, then)
 
 
-def _of_columns(make: Callable[..., Any], *ways: PeriodicResponses) -> PeriodicResponses:
-    """Build responses, computing each column from the same columns of the given responses."""
-    columns: dict[str, Any] = {}
+def _map_columns(make: Callable[[list[Column]], Column], *branches: PeriodicResponses) -> PeriodicResponses:
+    """Build responses, computing each column from the same columns of the given branches."""
+    columns: dict[str, Column | dict[str, Column]] = {}
     for field in fields(PeriodicResponses):
-        those = [getattr(way, field.name) for way in ways]
-        if isinstance(those[0], dict):
-            columns[field.name] = {name: make(*(column[name] for column in those)) for name in those[0]}
-        elif those[0] is not None:
-            columns[field.name] = make(*those)
-    return PeriodicResponses(**columns)
+        values = [getattr(branch, field.name) for branch in branches]
+        if isinstance(values[0], dict):
+            columns[field.name] = {name: make([column[name] for column in values]) for name in values[0]}
+        elif values[0] is not None:
+            columns[field.name] = make(values)
+    return replace(branches[0], **columns)

@@ -1,13 +1,14 @@
 """Linear frequency responses of a bench: voltage to force and accelerations, force to accelerations."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.levels import most_points
+from rig.analysis.balance import configuration_errors
+from rig.analysis.levels import checked_points
 from rig.analysis.study import Study
-from rig.analysis.subject import Subject, positive, refusing
+from rig.analysis.subject import Subject, positive
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MAIN
 from rig.errors import ConfigurationError
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_BELOW_LOWEST_MODE = 0.5
-_ABOVE_HIGHEST_MODE = 1.2
+_BELOW_LOWEST_MODE, _ABOVE_HIGHEST_MODE = 0.5, 1.2
+"""Ends of the default range over the lowest and the highest mode; chosen."""
 _AROUND_A_MODE = np.tan(np.linspace(-1.5, 1.5, 41))
 """Positions around a resonance in units of its half-width, dense where the phase turns."""
 
@@ -44,7 +45,7 @@ class Responses(Study):
         f = self.found.frequency_hz
         return f"linear frequency responses, {f[0]:.4g} to {f[-1]:.4g} Hz, {f.size} points"
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Return the curves over the frequency."""
         return {
             "frequency_hz": self.found.frequency_hz,
@@ -102,12 +103,12 @@ def responses(
     high = positive("to_hz", max(highest, 2.0 * low) if to_hz is None else to_hz)
     if low >= high:
         raise ConfigurationError(f"from_hz = {low:g}: allowed is less than to_hz = {high:g}")
-    row = [np.geomspace(low, high, most_points(points, 2))]
+    row = [np.geomspace(low, high, checked_points(points, 2))]
     for several in (modes, rig.coupled_modes):
         for frequency_hz, damping_ratio in zip(several.frequency_hz, several.damping_ratio, strict=True):
             row.append(frequency_hz * (1.0 + damping_ratio * _AROUND_A_MODE))
     grid = np.unique(np.concatenate(row))
-    with refusing():
+    with configuration_errors():
         found = frequency_response(rig, grid[(grid >= low) & (grid <= high)])
     where = {sensor.name: sensor.at for sensor in rig.sensors if sensor.at is not None}
     accelerances = found.accelerance_per_kg

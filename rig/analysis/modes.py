@@ -1,7 +1,7 @@
 """Linear modes of the structure, with their shapes at the channels, and of the coupled rig driven by a voltage."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,19 +38,22 @@ class Modes(Study):
         """Title of the analysis."""
         return f"linear modes, {self.structure.frequency_hz.size} of the structure"
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Return the modes of structure and coupled rig."""
-        structure, coupled = (
-            [
-                {"frequency_hz": frequency_hz, "damping_ratio": damping_ratio}
-                for frequency_hz, damping_ratio in zip(modes.frequency_hz, modes.damping_ratio, strict=True)
-            ]
-            for modes in (self.structure, self.coupled)
-        )
-        for k, mode in enumerate(structure):
-            mode["drive_shape"] = self.structure.drive_shape[k]
-            mode["channel_shapes"] = {name: shape[k] for name, shape in self.channel_shapes.items()}
-            mode["point_shapes"] = {name: shape[k] for name, shape in self.point_shapes.items()}
+        structure = [
+            {
+                "frequency_hz": frequency_hz,
+                "damping_ratio": self.structure.damping_ratio[k],
+                "drive_shape": self.structure.drive_shape[k],
+                "channel_shapes": {name: shape[k] for name, shape in self.channel_shapes.items()},
+                "point_shapes": {name: shape[k] for name, shape in self.point_shapes.items()},
+            }
+            for k, frequency_hz in enumerate(self.structure.frequency_hz)
+        ]
+        coupled = [
+            {"frequency_hz": frequency_hz, "damping_ratio": self.coupled.damping_ratio[k]}
+            for k, frequency_hz in enumerate(self.coupled.frequency_hz)
+        ]
         return {"structure": structure, "coupled": coupled}
 
     def print_tables(self) -> None:
@@ -99,14 +102,17 @@ def modes(subject: Subject) -> Modes:
     )
 
 
-_MOST = 8
+_MAX_MODES = 8
+"""Modes that are drawn; chosen: as many as a page holds."""
 _STATIONS = 401
+"""Positions along the beam at which a shape is drawn; chosen."""
 _MARKERS = "osD^vPX*<>ph"
+"""Markers of what is attached."""
 
 
 def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
     """Draw one panel per mode, for the lowest eight modes at most."""
-    count = min(_MOST, modes.frequency_hz.size)
+    count = min(_MAX_MODES, modes.frequency_hz.size)
     rows = (count + 1) // 2
     axes = grid(page, rows, min(2, count), sharex=True)
     panels = axes.ravel()

@@ -4,15 +4,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.subject import Subject
 from rig.errors import RecordingError
+from rig.text.json_values import JsonValue
 from simulators.analysis import PeriodicResponses
 from simulators.kernels import Flag
+from vibrolock.arrays import Float
 from vibrolock.printable import printable
 from vibrolock.results import Result
 
@@ -21,33 +22,37 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plain(value: Any) -> Any:
-    """Convert ``value``: arrays to lists, dataclasses to dictionaries, complex numbers to ``[re, im]``."""
+def to_json(value: object) -> JsonValue:
+    """Convert ``value``: arrays to lists, dataclasses to objects, complex numbers to ``[re, im]``."""
     if isinstance(value, PeriodicResponses):
-        return points_of(value)
+        return _points(value)
     if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+        return {field.name: to_json(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): to_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [to_json(item) for item in value]
     if isinstance(value, np.ndarray):
         parts = np.stack([value.real, value.imag], axis=-1) if np.iscomplexobj(value) else value
-        return parts.tolist()
-    return value.item() if isinstance(value, np.generic) else value
+        listed: JsonValue = parts.tolist()
+        return listed
+    if isinstance(value, np.generic):
+        item: JsonValue = value.item()
+        return item
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
 
 
-def points_of(responses: PeriodicResponses) -> list[dict[str, Any]]:
-    """Return one dictionary per point with all its quantities; flags are given by name."""
-    columns: dict[str, Any] = {
-        field.name: getattr(responses, field.name)
+def _points(responses: PeriodicResponses) -> list[JsonValue]:
+    """Return one object per point with all its quantities; flags are given by name."""
+    columns = {
+        field.name: column
         for field in fields(responses)
-        if field.name != "flags" and getattr(responses, field.name) is not None
+        if field.name != "flags" and (column := getattr(responses, field.name)) is not None
     }
     return [
         {
             **{
-                name: plain({key: item[k] for key, item in column.items()} if isinstance(column, dict) else column[k])
+                name: to_json({key: item[k] for key, item in column.items()} if isinstance(column, dict) else column[k])
                 for name, column in columns.items()
             },
             "flags": [str(flag.name).lower() for flag in Flag if responses.flags[k] & int(flag)],
@@ -57,6 +62,7 @@ def points_of(responses: PeriodicResponses) -> list[dict[str, Any]]:
 
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
+"""Endings of figures that are written."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -81,7 +87,7 @@ class Study(Result, ABC):
         """Title of the analysis in a few words."""
 
     @abstractmethod
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Return all numbers by name: arrays, dataclasses, dictionaries and lists of them."""
 
     @abstractmethod
@@ -92,11 +98,11 @@ class Study(Result, ABC):
     def draw_on(self, page: "Figure") -> None:
         """Draw on an empty page."""
 
-    def summary(self) -> dict[str, Any]:
-        """Return everything in one JSON-able dictionary; a complex number is a list of real and imaginary part."""
+    def summary(self) -> dict[str, JsonValue]:
+        """Return everything as one JSON object; a complex number is a list of real and imaginary part."""
         bench = self.subject.bench
         modes, mode = self.subject.rig.linear_modes, self.subject.mode
-        head = {
+        head: dict[str, object] = {
             "kind": "analysis",
             "analysis": type(self).__name__,
             "bench": bench.name,
@@ -111,9 +117,9 @@ class Study(Result, ABC):
             "complete": self.complete,
             "notes": [*self.subject.notes, *self.notes],
         }
-        return dict(plain(head | self.numbers()))
+        return {name: to_json(value) for name, value in (head | self.numbers()).items()}
 
-    def say(self) -> None:
+    def print_summary(self) -> None:
         """Print title, tables and notes."""
         bench = self.subject.bench
         print(printable(f"{bench.specimen.name} (bench {bench.name}): {self.title}"))
@@ -145,9 +151,9 @@ def length_unit(largest_m: float) -> tuple[float, str]:
     return (1e6, "µm") if largest_m < 5e-4 else (1e3, "mm")
 
 
-def roomy(axis: "Axes", values: NDArray[np.float64], least_share: float) -> None:
-    """Let the y axis span at least a given share of its middle value, so that small changes look small."""
+def set_min_span(axis: "Axes", values: Float, smallest: float) -> None:
+    """Let the y axis span at least ``smallest`` times its middle value, so that small changes look small."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     middle, half = 0.5 * (low + high), 0.55 * (high - low)
-    half = max(half, 0.5 * least_share * abs(middle))
+    half = max(half, 0.5 * smallest * abs(middle))
     axis.set_ylim(middle - half, middle + half)

@@ -1,7 +1,5 @@
 """Subject of an analysis: the virtual rig behind a bench, the mode under test, and the limits of the bench."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,8 +16,9 @@ from simulators.kernels import Flag
 from vibrolock.arrays import Float
 
 _TOLERANCE = 1.0 + 1e-6
+"""Factor by which a value may exceed a limit; chosen: rounding errors of harmonic balance."""
 
-FLAG_WORDS = {
+_FLAG_WORDS = {
     Flag.LAW_RANGE: "a magnet or the force factor is beyond the range in which its law holds",
     Flag.SENSOR_CLIPPED: "a sensor would clip",
     Flag.DAC_CLIPPED: "the voltage is beyond the output converter",
@@ -27,7 +26,7 @@ FLAG_WORDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Demand:
+class LimitedQuantity:
     """A quantity that the bench limits, with its values over the points of an analysis."""
 
     name: str
@@ -65,7 +64,7 @@ class Subject:
         wear = ("the specimen wears within a run; this is the one that a run begins with",)
         return (*(scatter if self.rig.scatters else ()), *(wear if self.rig.wear.wears else ()), *self.remarks)
 
-    def demands(self, responses: PeriodicResponses) -> list[Demand]:
+    def limited_quantities(self, responses: PeriodicResponses) -> list[LimitedQuantity]:
         """Return the limited quantities at the points, with their limits."""
         limits, omega = self.bench.limits, 2.0 * np.pi * responses.frequency_hz
         moving = [
@@ -76,33 +75,33 @@ class Subject:
         peaks = np.max([peak(harmonics) for harmonics in moving], axis=0)
         travel = np.max([np.abs(harmonics[:, 1]) / omega**2 for harmonics in moving], axis=0)
         return [
-            Demand("voltage", responses.voltage_v, limits.voltage_v, "V"),
-            Demand("voltage", responses.voltage_v, self.rig.exciter.input_limit_v, "V", "the amplifier's"),
-            Demand("force", peak(responses.force_harmonics_n), limits.force_n, "N"),
-            Demand("acceleration", peaks, limits.acceleration_m_s2, "m/s^2"),
-            Demand("displacement", travel, limits.displacement_m, "m"),
+            LimitedQuantity("voltage", responses.voltage_v, limits.voltage_v, "V"),
+            LimitedQuantity("voltage", responses.voltage_v, self.rig.exciter.input_limit_v, "V", "the amplifier's"),
+            LimitedQuantity("force", peak(responses.force_harmonics_n), limits.force_n, "N"),
+            LimitedQuantity("acceleration", peaks, limits.acceleration_m_s2, "m/s^2"),
+            LimitedQuantity("displacement", travel, limits.displacement_m, "m"),
         ]
 
     def within(self, responses: PeriodicResponses) -> NDArray[np.bool_]:
         """Return which points [n] lie within the limits and raise no flag."""
-        inside = [demand.values <= _TOLERANCE * demand.limit for demand in self.demands(responses)]
+        inside = [quantity.values <= _TOLERANCE * quantity.limit for quantity in self.limited_quantities(responses)]
         low, high = self.bench.limits.frequency_hz
         frequency = (responses.frequency_hz >= low) & (responses.frequency_hz <= high)
         return np.asarray(np.all(inside, axis=0) & frequency & (responses.flags == 0))
 
-    def excesses(self, responses: PeriodicResponses, of: str = "points") -> tuple[str, ...]:
+    def limit_violations(self, responses: PeriodicResponses, of: str = "points") -> tuple[str, ...]:
         """Describe where points leave the valid range of the rig or the limits of the bench, one line each."""
         total = responses.frequency_hz.size
         lines = [
             f"{text} in {count} of {total} {of}"
-            for flag, text in FLAG_WORDS.items()
+            for flag, text in _FLAG_WORDS.items()
             if (count := int(np.count_nonzero(responses.flags & int(flag))))
         ]
-        for demand in self.demands(responses):
-            if count := int(np.count_nonzero(demand.values > _TOLERANCE * demand.limit)):
+        for quantity in self.limited_quantities(responses):
+            if count := int(np.count_nonzero(quantity.values > _TOLERANCE * quantity.limit)):
                 lines.append(
-                    f"{demand.name} reaches {np.max(demand.values):.4g} {demand.unit} and is in {count} of {total} {of} "
-                    f"above {demand.whose} limit of {demand.limit:g} {demand.unit}"
+                    f"{quantity.name} reaches {np.max(quantity.values):.4g} {quantity.unit} and is in {count} of {total} {of} "
+                    f"above {quantity.whose} limit of {quantity.limit:g} {quantity.unit}"
                 )
         return tuple(lines)
 
@@ -129,15 +128,6 @@ def positive(name: str, value: float) -> float:
     if not 0.0 < value < np.inf:
         raise ConfigurationError(f"{name} = {value:g}: allowed is a number above 0")
     return value
-
-
-@contextmanager
-def refusing() -> Iterator[None]:
-    """Convert a `ValueError` of the simulators to a `ConfigurationError`."""
-    try:
-        yield
-    except ValueError as error:
-        raise ConfigurationError(str(error)) from error
 
 
 def peak(harmonics: NDArray[np.complex128], samples: int = 256) -> Float:

@@ -145,6 +145,6 @@ def _show(
     if json:
         print_json(study.summary())
     else:
-        study.say()
+        study.print_summary()
     if not study.complete:
         raise typer.Exit(1)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.backbone import backbone
+from rig.analysis.balance import Balance
 from rig.analysis.constant_force import constant_force, folds_of
 from rig.analysis.forced import forced
 from rig.analysis.levels import level_range
@@ -267,7 +268,7 @@ def test_a_bench_that_may_not_be_driven_at_resonance_at_all_says_what_forbids_it
 def test_a_resonance_outside_of_the_bench_s_frequencies_is_the_reason_whatever_higher_levels_would_leave():
     bench = bench_with({"limits": {"frequency_hz": (8.0, 12.0)}})
     with pytest.raises(ConfigurationError) as caught:
-        level_range(subject_of(bench), "force", None, None, points=5, harmonics=7)
+        level_range(Balance(subject_of(bench), 7), "force", None, None, points=5)
     found = re.fullmatch(
         r"already at 0\.095 V the bench may not be driven at resonance "
         r"\(the resonance at (.*) Hz is outside of limits\.frequency_hz = 8 to 12 Hz\)",
