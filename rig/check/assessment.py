@@ -18,7 +18,7 @@ from rig.campaigns.plans import plan_from
 from rig.check.calibration import calibration_findings
 from rig.check.findings import Finding, failed
 from rig.check.judging import driven_findings, latency_findings
-from rig.check.recorded import about, is_check
+from rig.check.recorded import is_check
 from rig.check.reference import reference_findings
 from rig.check.responses import Mode, Responses, responses_of
 from rig.check.scale import scale_of
@@ -29,7 +29,8 @@ from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 from vibrolock.results import Result
 
-SKIPPED = 0.1  # part of the silence that is left out at its beginning because of the transient of the filters
+SKIPPED = 0.1
+"""Part of the silence that is left out at its beginning, because of the transient of the filters; chosen."""
 CUT_SHORT = "the multisine was not played to its end"
 
 
@@ -178,5 +179,5 @@ def _how_it_ended(recording: Recording, bench: Bench) -> list[Finding]:
 
 
 def _lead_fraction(recording: Recording) -> float:
-    lead = float(about(recording.parts[-1].information).get("lead_samples", 0.0))
+    lead = float(recording.parts[-1].information.get("about", {}).get("lead_samples", 0.0))
     return lead - float(np.floor(lead))

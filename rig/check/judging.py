@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 
 from rig.bench import Bench
 from rig.check.findings import Finding, graded
-from rig.check.responses import BAND, FITS, Mode, Responses, fit_mode
+from rig.check.responses import BAND, MAX_MISFIT, Mode, Responses, fit_mode
 from vibrolock.arrays import Float
 
-ALIKE = 0.03  # log ratio below which two channels cannot be distinguished
-BETTER = 0.5  # part of the misfit as wired that another assignment must not exceed
-WRONG = 0.05  # RMS log ratio above which the wiring is in doubt
+MIN_LOG_RATIO = 0.03
+"""Log ratio below which two channels cannot be distinguished; chosen."""
+MAX_REMAINING = 0.5
+"""Largest misfit of another assignment over that of the channels as wired; chosen."""
+DOUBTFUL_LOG_RATIO = 0.05
+"""RMS log ratio above which the wiring is in doubt; chosen."""
 
 
 def by_magnitude(found: Float, expected: Float) -> Float:
@@ -35,12 +38,13 @@ def best_assignment(cost: Float) -> tuple[int, ...] | None:
     """Return the assignment of channels that fits far better than the declared wiring; None if there is none."""
     rows, columns = scipy.optimize.linear_sum_assignment(cost)
     as_wired, best = float(np.mean(np.diag(cost))), float(np.mean(cost[rows, columns]))
-    if as_wired < WRONG**2 or best > BETTER**2 * as_wired or np.array_equal(rows, columns):
+    if as_wired < DOUBTFUL_LOG_RATIO**2 or best > MAX_REMAINING**2 * as_wired or np.array_equal(rows, columns):
         return None
     return tuple(int(column) for column in columns)
 
 
-LATE_SAMPLES = 0.25
+MAX_DELAY_SAMPLES = 0.25
+"""Largest delay beyond the driver's latency, samples; chosen."""
 
 
 def latency_findings(bench: Bench, responses: Responses, delay_fraction: float) -> list[Finding]:
@@ -52,32 +56,38 @@ def latency_findings(bench: Bench, responses: Responses, delay_fraction: float) 
     if not rows:
         text = "no channel is declared with loopback = true"
         return [Finding("latency", "", "not tested", text=text)]
-    return [_slope(bench, responses, row, delay_fraction) for row in rows]
+    return [_delay(bench, responses, row, delay_fraction) for row in rows]
 
 
-def _slope(bench: Bench, responses: Responses, row: int, delay_fraction: float) -> Finding:
+def _delay(bench: Bench, responses: Responses, row: int, delay_fraction: float) -> Finding:
     value, omega = responses.per_volt[row], 2.0 * math.pi * responses.frequency_hz / bench.sample_rate_hz
     phase = np.unwrap(np.angle(value))
     late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - delay_fraction
-    bad = abs(late) > LATE_SAMPLES
+    bad = abs(late) > MAX_DELAY_SAMPLES
     text = "more than the driver says: its queue or filter delay, or this channel's skew_samples" if bad else ""
     name = bench.channels[row].name
-    return Finding("latency", name, "fail" if bad else "ok", late, "samples", f"+-{LATE_SAMPLES:g}", text)
+    return Finding("latency", name, "fail" if bad else "ok", late, "samples", f"+-{MAX_DELAY_SAMPLES:g}", text)
 
 
-LIVES, CLEAR = 0.5, 0.98  # coherence
-POWER = 0.5  # part of the absolute power that must flow one way for a verdict
+MIN_COHERENCE, GOOD_COHERENCE = 0.5, 0.98
+"""Coherence below which a channel is dead, and from which it is good; chosen."""
+MIN_POWER = 0.5
+"""Least net power over the absolute power, for a verdict on its direction; chosen."""
 SIZE_OK, SIZE_TOLERATED = (0.9, 1.1), (0.67, 1.5)
+"""Sizes of a response over the expected one, without and with a warning; chosen."""
 FREQUENCY_OK, FREQUENCY_TOLERATED = (0.98, 1.02), (0.9, 1.1)
-TURN_DEG = 3.0
-DISTORTED = 0.05
+"""Frequencies of the mode over that of the bench, without and with a warning; chosen."""
+MAX_ROTATION_DEG = 3.0
+"""Largest phase of a residue off its real value, deg; chosen."""
+MAX_DISTORTION = 0.05
+"""Distortion above which there is a warning; chosen."""
 
 
 def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:
     """Return the findings from the responses and the bench's facts, and the mode under test."""
-    lives = _coherence(bench, responses)
-    dead = {finding.channel for finding in lives if finding.verdict == "fail"}
-    out = [*lives, *_distortion(bench, responses, dead)]
+    coherences = _coherence(bench, responses)
+    dead = {finding.channel for finding in coherences if finding.verdict == "fail"}
+    out = [*coherences, *_distortion(bench, responses, dead)]
     force, drive = bench.index_of("force"), bench.index_of("drive")
     names = responses.names
     if names[force] in dead or names[drive] in dead:
@@ -86,7 +96,7 @@ def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], 
     alive = [i for i in _accelerations(bench) if names[i] not in dead]
     mode = fit_mode(responses.frequency_hz, responses.per(force)[alive], bench.specimen.linear_frequency_hz)
     out.append(_power(bench, responses))
-    if mode is None or mode.misfit > FITS or not _near(bench, mode):
+    if mode is None or mode.misfit > MAX_MISFIT or not _near(bench, mode):
         text = (
             "the accelerations per force show no single mode near specimen.linear_frequency_hz: force and drive swapped, "
             "another specimen, or wrong facts"
@@ -109,11 +119,11 @@ def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
     for channel, value in zip(bench.channels, responses.coherence, strict=True):
         if channel.role == "monitor" and not channel.loopback:
             continue
-        verdict = graded(float(value), (CLEAR, 1.0), (LIVES, 1.0))
+        verdict = graded(float(value), (GOOD_COHERENCE, 1.0), (MIN_COHERENCE, 1.0))
         text = {"ok": "", "warn": "much noise beside the excitation: a loose cable, or a level too low"}.get(
             verdict, "does not follow the excitation: sensor, cable or supply is dead"
         )
-        out.append(Finding("life", channel.name, verdict, float(value), "coherence", f"from {CLEAR:g}", text))
+        out.append(Finding("life", channel.name, verdict, float(value), "coherence", f"from {GOOD_COHERENCE:g}", text))
     return out
 
 
@@ -123,13 +133,13 @@ def _distortion(bench: Bench, responses: Responses, dead: set[str]) -> list[Find
     name, value = responses.names[index], float(responses.distortion[index])
     if name in dead:
         return []
-    bad = value > DISTORTED
+    bad = value > MAX_DISTORTION
     text = (
         "lines are heard that were not played: amplifier clipping, a rattle, or a very nonlinear specimen"
         if bad
         else ""
     )
-    return [Finding("distortion", name, "warn" if bad else "ok", value, "", f"up to {DISTORTED:g}", text)]
+    return [Finding("distortion", name, "warn" if bad else "ok", value, "", f"up to {MAX_DISTORTION:g}", text)]
 
 
 def _power(bench: Bench, responses: Responses) -> Finding:
@@ -140,10 +150,10 @@ def _power(bench: Bench, responses: Responses) -> Finding:
     velocity = responses.per_volt[drive] / (2j * math.pi * responses.frequency_hz)
     power = np.real(responses.per_volt[force].conj() * velocity)[around]
     share = float(power.sum() / max(np.abs(power).sum(), 1e-300))
-    name, allowed = responses.names[drive], f"from {POWER:g}"
-    if share >= POWER:
+    name, allowed = responses.names[drive], f"from {MIN_POWER:g}"
+    if share >= MIN_POWER:
         return Finding("power", name, "ok", share, "into specimen", allowed)
-    if share > -POWER:
+    if share > -MIN_POWER:
         text = "goes in at some frequencies and out at others: the drive channel is not at the drive point"
         return Finding("power", name, "warn", share, "into specimen", allowed, text)
     text = "power comes out of the specimen: force or drive is reversed, or the two are swapped"
@@ -225,7 +235,7 @@ def _look_alike(names: Sequence[str], expected: np.ndarray) -> list[Finding]:
         Finding("place", names[j], "not tested", text=text.format(other=names[i]))
         for i in range(len(names))
         for j in range(i + 1, len(names))
-        if abs(math.log(expected[i] / expected[j])) < ALIKE
+        if abs(math.log(expected[i] / expected[j])) < MIN_LOG_RATIO
     ]
 
 
@@ -246,8 +256,8 @@ def _delays(bench: Bench, alive: Sequence[int], mode: Mode) -> list[Finding]:
         residue = complex(mode.residue[place])
         turn = math.degrees(math.atan(residue.imag / residue.real)) if residue.real else 90.0
         samples = -turn / 360.0 / mode.frequency_hz * bench.sample_rate_hz
-        late = abs(turn) > TURN_DEG
+        late = abs(turn) > MAX_ROTATION_DEG
         text = f"{samples:+.2f} samples behind the force more than skew_samples says" if late else ""
         name = bench.channels[i].name
-        out.append(Finding("skew", name, "warn" if late else "ok", turn, "deg", f"+-{TURN_DEG:g}", text))
+        out.append(Finding("skew", name, "warn" if late else "ok", turn, "deg", f"+-{MAX_ROTATION_DEG:g}", text))
     return out

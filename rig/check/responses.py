@@ -11,18 +11,19 @@ from a linear fit. They remain complex, because delays between channels rotate t
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import PeriodicSpectra
 from rig.bench import Bench
 from vibrolock.arrays import Complex, Float
 
-BAND = (0.7, 1.4)  # of the linear frequency: band of the fit
-FITS = 0.15  # largest misfit of a fit that describes the responses
-ROUNDS = 12
+BAND = (0.7, 1.4)
+"""Band of the fit over the linear frequency; chosen."""
+MAX_MISFIT = 0.15
+"""Largest misfit of a fit that describes the responses; chosen, see `fit_mode`."""
+ITERATIONS = 12
+"""Iterations of the fit of the pole; chosen: it converges in fewer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ def responses_of(bench: Bench, measured: PeriodicSpectra) -> Responses:
 def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode | None:
     """Identify the mode nearest to a frequency from accelerations per force [n, n_lines]; None if the band contains none.
 
-    There is no mode if the residuals of other modes alone describe the responses as well as a fit has to (``FITS``): then
+    There is no mode if the residuals of other modes alone describe the responses as well as a fit has to (``MAX_MISFIT``): then
     almost nothing remains in the equations for the pole, and their solution is noise or rounding error. With a mode inside the
     band, the residuals alone leave a misfit of 0.9 and more (0.2 at a damping ratio of 0.3); with a mode outside, up to 0.1.
     """
@@ -95,7 +96,7 @@ def fit_mode(frequency_hz: Float, accelerance: Complex, near_hz: float) -> Mode 
     if not (np.isfinite(values).all() and np.all(sizes > 0.0)):
         return None
     residuals = np.column_stack([np.ones_like(s), s**2])
-    if _fitted(residuals, values)[1] <= FITS:
+    if _fitted(residuals, values)[1] <= MAX_MISFIT:
         return None
     pole = _pole(s, values / sizes[:, None])
     if pole is None:
@@ -112,12 +113,12 @@ def _fitted(terms: Complex, values: Complex) -> tuple[Complex, float]:
     return np.asarray(found), float(left.max())
 
 
-def _pole(s: NDArray[Any], values: NDArray[Any]) -> tuple[float, float] | None:
+def _pole(s: Complex, values: Complex) -> tuple[float, float] | None:
     """Return the stiffness and damping terms of the common denominator, with frequencies relative to the expected one."""
-    rows, powers = [], s[:, None] ** np.arange(5)[None, :]
+    powers: Complex = s[:, None] ** np.arange(5)[None, :]
     weight = np.ones(s.size)
     stiffness, damping = 1.0, 0.01
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         rows = [_reduced(powers * weight[:, None], value * weight, s) for value in values]
         matrix = np.concatenate([row[0] for row in rows])
         right = np.concatenate([row[1] for row in rows])
@@ -131,7 +132,7 @@ def _pole(s: NDArray[Any], values: NDArray[Any]) -> tuple[float, float] | None:
     return (float(stiffness), float(damping)) if inside else None
 
 
-def _reduced(numerator: NDArray[Any], value: NDArray[Any], s: NDArray[Any]) -> tuple[Complex, Complex]:
+def _reduced(numerator: Complex, value: Complex, s: Complex) -> tuple[Complex, Complex]:
     """Set up ``value (s^2 + a s + b) = numerator coefficients`` and project out the unknowns of the numerator."""
     basis, _ = np.linalg.qr(numerator)
     columns = np.column_stack([value, value * s, -value * s**2])

@@ -29,7 +29,7 @@ def check_(
     from rig.bench import load_bench
     from rig.campaigns.multisine.points import MULTISINE_COLUMNS
     from rig.check.figure import write_check
-    from rig.check.report import say, summary
+    from rig.check.report import print_summary, summary
     from rig.check.run import check
     from rig.errors import ConfigurationError
     from rig.text.console import print_json
@@ -48,9 +48,9 @@ def check_(
         write_check(found, figure)
     facts = summary(found)
     if json:
-        print_json(facts)
+        print_json(facts.model_dump())
     else:
-        say(facts)
+        print_summary(facts)
         print(f"recorded in {path}" + (f", figure in {figure}" if figure else ""))
     if found.failed:
         raise typer.Exit(1)

@@ -55,7 +55,7 @@ def tune_(
     from rig.tuning.figure import check_figure, draw_tuning
     from rig.tuning.report import lines, summary
     from rig.tuning.tuning import TuningRequest, tune
-    from vibrolock.printable import printable_strings
+    from vibrolock.printable import printable
 
     load_bench(bench)
     request = TuningRequest(
@@ -84,8 +84,8 @@ def tune_(
     if json:
         print_json(facts)
         return
-    for line in lines(printable_strings(facts)):
-        print(line)
+    for line in lines(found):
+        print(printable(line))
     if foreseen is not None:
         print(f"rehearsal      {verdict_in_one_line(foreseen)}; `rig show {rehearsed}` has the page")
     print(f"plan written to {output}, multisine recorded in {recorded}" + (f", figure in {figure}" if figure else ""))

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rig.text.console import PrintedTable
 from vibrolock.printable import printable
@@ -12,11 +12,12 @@ from vibrolock.printable import printable
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
 _DIGIT = re.compile(r"\d")
 _SHORT = 14
+"""Rows of a table that stays on one page of paper; chosen."""
 _FACT = re.compile(r"(\S.{0,13}?| {10,}) {2,}(\S.*)")
 _SIGNS = (("m/s^2", "m/s²"), ("+-", "±"), (">= ", "≥ "))
 
 
-def typeset(value: Any) -> str:
+def typeset(value: object) -> str:
     """Return a value as the text of a page: printable, with the signs that a terminal may not have."""
     text = printable(str(value))
     for plain, sign in _SIGNS:

@@ -1,11 +1,10 @@
 """Who tested what on which bench with which sensors: the facts of a recording, of any kind."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from rig.arming.run_facts import About
 from rig.recording.reader import Recording
-from rig.recording.stored import About as StoredAbout
+from rig.recording.stored import About as StoredAbout, ChannelTable
 from rig.report.document import Block, Facts, Section, Table, Text
 from rig.report.keys import key_rows, limit_rows
 from rig.text.console import number
@@ -78,12 +77,12 @@ def bench_section(recording: Recording) -> Section:
     return Section("Bench and sensors", blocks)
 
 
-def _calibrated(channel: Mapping[str, Any]) -> str:
+def _calibrated(channel: ChannelTable) -> str:
     certificate = f" ({channel['certificate']})" if channel.get("certificate") else ""
     return (str(channel.get("calibrated") or "") + certificate).strip() or "-"
 
 
-def _sensitivity(channel: Mapping[str, Any]) -> str:
+def _sensitivity(channel: ChannelTable) -> str:
     """Return the sensitivity as on the data sheet, or else in mV per unit."""
     if sheet := channel.get("sensitivity"):
         gain = f" x {channel['amplifier_gain']}" if channel.get("amplifier_gain") else ""
@@ -92,7 +91,7 @@ def _sensitivity(channel: Mapping[str, Any]) -> str:
     return f"{number(channel['sensitivity_v_per_unit'], '.6g', 1e3)} mV/{f'({unit})' if '/' in unit else unit}"
 
 
-def _overdue(channel: Mapping[str, Any], day: str) -> bool:
+def _overdue(channel: ChannelTable, day: str) -> bool:
     return bool(channel.get("calibration_due")) and str(channel["calibration_due"]) < day
 
 
@@ -137,9 +136,9 @@ def _abouts(recording: Recording) -> Sequence[StoredAbout]:
     return [part.information.get("about") or {} for part in recording.parts]
 
 
-def _each(abouts: Sequence[Mapping[str, Any]], name: str) -> str:
-    return ", ".join(dict.fromkeys(str(about[name]) for about in abouts if about.get(name)))
+def _each(abouts: Sequence[StoredAbout], name: str) -> str:
+    return ", ".join(dict.fromkeys(str(value) for about in abouts if (value := about.get(name))))
 
 
-def _device(about: Mapping[str, Any]) -> str:
+def _device(about: StoredAbout) -> str:
     return ", ".join(f"{key} {value}" for key, value in (about.get("device") or {}).items())

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.campaigns.evaluation.point import Point, point_name
+from rig.check.assessment import assess
 from rig.check.recorded import is_check
 from rig.recording.reader import Recording
 from rig.report.document import Block, Chapter, Section, Table, Text, blocks_of
@@ -20,7 +21,7 @@ from rig.report.files import files_of, table_of_files
 from rig.report.pictures import Pictures
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns
-from rig.show.summary import summarise, summarise_recording
+from rig.show.summary import summarise_recording
 from rig.show.tables import loop_line, print_findings, print_rehearsal
 from rig.text.console import collected, number
 
@@ -29,7 +30,7 @@ def recording_chapter(path: Path, pictures: Pictures) -> Chapter:
     """Return all that a report says of a recording; raise `RecordingError` if it cannot be read."""
     with Recording(path) as recording:
         if is_check(recording):
-            return _check(recording, summarise(path), pictures)
+            return _check(recording, pictures)
         summary = summarise_recording(recording)
         points = points_from(recording.kind, summary["points"])
         accepted = sum(point.accepted for point in points)
@@ -155,25 +156,24 @@ def _loop(path: Path, summary: Mapping[str, Any], pictures: Pictures) -> list[Bl
     return blocks
 
 
-def _check(recording: Recording, summary: Mapping[str, Any], pictures: Pictures) -> Chapter:
+def _check(recording: Recording, pictures: Pictures) -> Chapter:
     """Return the chapter on a check: its verdict, and every test."""
-    tests = summary["findings"]
-    marked = frozenset(i for i, one in enumerate(tests) if one["verdict"] == "fail")
+    found = assess(recording)
+    tests = found.findings
+    marked = frozenset(i for i, one in enumerate(tests) if one.verdict == "fail")
     findings = Table(
         "Every test of the check",
         ("what", "channel", "verdict", "value", "unit", "allowed"),
-        [(f["name"], f["channel"], f["verdict"], number(f["value"], ".4g"), f["unit"], f["allowed"]) for f in tests],
+        [(f.name, f.channel, f.verdict, number(f.value, ".4g"), f.unit, f.allowed) for f in tests],
         marked,
     )
     advice: list[Block] = [
-        Text(f"{one['verdict']}: {one['name']} {one['channel']}".strip() + f": {one['text']}", "note")
-        for one in tests
-        if one["text"] and one["verdict"] != "ok"
+        Text(f"{one.verdict}: {one.label}: {one.text}", "note") for one in tests if one.text and one.verdict != "ok"
     ]
     return Chapter(
-        f"check of {summary['specimen'] or 'an unnamed specimen'}",
+        f"check of {found.bench.specimen.name or 'an unnamed specimen'}",
         str(recording.path),
-        [Text(f"Verdict: {summary['verdict']}.", "bad" if summary["failed"] else "good")],
+        [Text(f"Verdict: {found.verdict}.", "bad" if found.failed else "good")],
         [
             subject_section(recording),
             Section("Findings", [findings, *advice]),

@@ -28,9 +28,9 @@ from rig.show.summary import summarise_recording
 from rig.show.tables import print_findings, print_points
 from rig.text.console import number, print_table
 from rig.tuning import Tuning
-from rig.tuning.report import lines, summary
+from rig.tuning.report import lines
 from simulators.analysis import PeriodicResponses
-from vibrolock.printable import printable_strings
+from vibrolock.printable import printable, printable_strings
 
 
 def say_recording(recording: Recording) -> None:
@@ -188,12 +188,12 @@ def _say_transient(found: Transient) -> None:
 
 
 def _say_tuning(found: Tuning) -> None:
-    for line in lines(summary(found)):
-        print(line)
+    for line in lines(found):
+        print(printable(line))
 
 
 def _say_check(found: Assessment) -> None:
-    checks.say(checks.summary(found))
+    checks.print_summary(checks.summary(found))
 
 
 SAY: Mapping[str, Callable[[Any], None]] = {

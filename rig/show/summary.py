@@ -56,7 +56,7 @@ def summarise(path: Path) -> dict[str, Any]:
         if is_check(recording):
             from rig.check.assessment import assess  # evaluates the recording anew, which few files need
 
-            return {**summary(assess(recording)), "integrity": recording.integrity}
+            return {**summary(assess(recording)).model_dump(), "integrity": recording.integrity}
         return summarise_recording(recording)
 
 

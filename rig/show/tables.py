@@ -6,7 +6,7 @@ from typing import Any
 
 from rig.arming.run_facts import About, user_name
 from rig.campaigns.evaluation.point import point_name
-from rig.check.report import say
+from rig.check import report as check_report
 from rig.daq import CONTINUED
 from rig.recording.integrity import VERIFIED
 from rig.results.kinds import KINDS
@@ -105,7 +105,7 @@ def print_summary(summary: dict[str, Any]) -> None:
     if summary["integrity"] != VERIFIED:
         print(summary["integrity"])
     if summary["kind"] == "check":
-        say(summary)
+        check_report.print_summary(check_report.CheckSummary.model_validate(summary))
         return
     print(f"{summary['kind']} of {summary['specimen'] or 'an unnamed specimen'}")
     if summary["kind"] in KINDS:

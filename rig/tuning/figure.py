@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -61,19 +61,20 @@ def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
     measured, plant = tuning.test.responses, tuning.plant
     fine = np.linspace(*plant.band_hz, 4000)
     s = 2j * np.pi * fine
-    dots: dict[str, Any] = {"ls": "none", "marker": ".", "mew": 0.0, "alpha": 0.4}
     seen = phase.inset_axes((0.0, 1.12, 1.0, 0.25), sharex=phase)
     models = (plant.force_per_v(s), plant.acceleration_per_v(s))
     for row, (colour, model) in enumerate(zip((MAIN, SECOND), models, strict=True)):
         value, channel = measured.value[:, row, 0], measured.outputs[row]
         label = f"{channel.name}, {unit_text(f'{channel.unit}/V')}"
-        size.semilogy(measured.frequency_hz, np.abs(value), color=colour, **dots)
+        size.semilogy(measured.frequency_hz, np.abs(value), color=colour, ls="none", marker=".", mew=0.0, alpha=0.4)
         size.semilogy(fine, np.abs(model), color=colour, label=label)
-        phase.plot(measured.frequency_hz, np.degrees(np.angle(value)), color=colour, **dots)
+        phase.plot(
+            measured.frequency_hz, np.degrees(np.angle(value)), color=colour, ls="none", marker=".", mew=0.0, alpha=0.4
+        )
         phase.plot(fine, _unbroken(np.degrees(np.angle(model))), color=colour)
         noise = measured.noise_std[:, row, 0]
         seen.plot(measured.frequency_hz, 1.0 / (1.0 + (noise / np.abs(value)) ** 2), color=colour, lw=0.9)
-    size.plot([], [], color=REJECTED, label="measured", **dots)
+    size.plot([], [], color=REJECTED, label="measured", ls="none", marker=".", mew=0.0, alpha=0.4)
     size.axvline(plant.frequency_rad_s / 2.0 / np.pi, color=REJECTED, lw=0.9, ls="--", label="structure")
     size.axvline(plant.coupled_pole_rad_s.imag / 2.0 / np.pi, color=REJECTED, lw=0.9, ls=":", label="with exciter")
     size.set(ylabel="response per volt", xlabel="frequency, Hz")
@@ -153,7 +154,7 @@ def _draw_level(axis: "Axes", designs: tuple[Design, ...]) -> None:
     axis.legend(loc="lower right", title="damping: settles in")
 
 
-def _with_lines(designs: list[Design]) -> list[tuple[Design, Any]]:
+def _with_lines(designs: list[Design]) -> list[tuple[Design, str | tuple[int, tuple[float, float]]]]:
     return list(zip(designs, ("-", "--", (0, (1, 1.5))), strict=False))
 
 

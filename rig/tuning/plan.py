@@ -5,10 +5,10 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
 
 from controller.tuning import PlantModel
 from rig.bench import Bench
+from rig.text.json_values import JsonValue
 from rig.tuning.design import Chosen, gains_of
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
@@ -172,6 +172,6 @@ def _comment(text: str) -> list[str]:
     return wrap(text, 118, initial_indent="# ", subsequent_indent="# ")
 
 
-def _line(key: str, value: Any) -> str:
+def _line(key: str, value: JsonValue) -> str:
     """Return a TOML line: a key with a text, a number or a list of numbers."""
     return f"{key} = {json.dumps(value)}"

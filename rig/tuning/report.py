@@ -1,18 +1,21 @@
-"""Report of a tuning, as one dictionary and as lines for the terminal."""
+"""Report of a tuning, as JSON and as lines for the terminal."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import asdict
 
 from controller.tuning import Design, Margins
+from rig.text.json_values import JsonValue
 from rig.tuning.design import gains_of
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.plant import mass_ratios
 from rig.tuning.tuning import Tuning
 
-SHIFT_SHOWN = 0.05
+SHOWN_SHIFT = 0.05
+"""Shift of the frequency for which the slope of a cubic spring is given; chosen."""
 
 
-def summary(tuning: Tuning) -> dict[str, Any]:
+def summary(tuning: Tuning) -> dict[str, JsonValue]:
     """Return test, plant, gains, margins, levels and notes as a dictionary for JSON."""
     plant, chosen, test = tuning.plant, tuning.chosen, tuning.test
     low, high = mass_ratios(tuning.bench, test.responses, plant)
@@ -70,13 +73,13 @@ def summary(tuning: Tuning) -> dict[str, Any]:
     }
 
 
-def _design(design: Design) -> dict[str, Any]:
+def _design(design: Design) -> dict[str, JsonValue]:
     settling = design.settling
     return {
         "damping_ratio": design.loop.plant.damping_ratio,
         "stable": design.stable,
-        "frequency_loop": _margins(design.frequency_margins),
-        "response_loop": None if design.amplitude_margins is None else _margins(design.amplitude_margins),
+        "frequency_loop": asdict(design.frequency_margins),
+        "response_loop": None if design.amplitude_margins is None else asdict(design.amplitude_margins),
         "settling_periods": {
             "frequency_shift": settling.frequency_shift,
             "level_amplitude": settling.level_amplitude,
@@ -86,7 +89,7 @@ def _design(design: Design) -> dict[str, Any]:
     }
 
 
-def _harmonics(choice: HarmonicsChoice | None) -> dict[str, Any] | None:
+def _harmonics(choice: HarmonicsChoice | None) -> dict[str, JsonValue] | None:
     if choice is None:
         return None
     return {
@@ -108,62 +111,66 @@ def _margins(found: Margins) -> dict[str, float]:
     }
 
 
-def lines(found: dict[str, Any]) -> list[str]:
-    """Return lines of text for a `summary`."""
-    test, plant, levels = found["test"], found["plant"], found["levels_m"]
-    low, high = plant["mass_ratio"]
-    shape = plant["bench_drive_mode_shape"]
+def lines(tuning: Tuning) -> list[str]:
+    """Return lines of text on a tuning."""
+    test, plant, chosen, specimen = tuning.test, tuning.plant, tuning.chosen, tuning.bench.specimen
+    low, high = mass_ratios(tuning.bench, test.responses, plant)
+    shape, pole = specimen.drive_mode_shape, plant.coupled_pole_rad_s
+    std_hz = None if plant.frequency_std_rad_s is None else plant.frequency_std_rad_s / (2.0 * math.pi)
     out = [
-        f"{found['specimen']} (bench {found['bench']}), tuned",
-        f"multisine      {test['level_rms_v']:.4g} V RMS, coherence {test['coherence_force']:.5f} (force) and "
-        f"{test['coherence_drive']:.5f} (drive), distortion {100.0 * test['distortion']:.2g} %",
-        f"structure      {plant['frequency_hz']:.3f}{_bound(plant['frequency_std_hz'])} Hz (bench "
-        f"{plant['bench_frequency_hz']:g}), damping {100.0 * plant['damping_ratio']:.3f}"
-        f"{_bound(plant['damping_ratio_std'], 100.0)} %, phi_d {plant['drive_mode_shape']:.4f}"
-        f"{_bound(plant['drive_mode_shape_std'])} kg^-1/2 (bench {'none' if shape is None else format(shape, 'g')})",
-        f"with exciter   {plant['coupled_pole_hz']:.3f} Hz, damping {100.0 * plant['coupled_damping_ratio']:.2f} %, mass ratio "
+        f"{specimen.name} (bench {tuning.bench.name}), tuned",
+        f"multisine      {test.level_rms_v:.4g} V RMS, coherence {test.coherence[0]:.5f} (force) and "
+        f"{test.coherence[1]:.5f} (drive), distortion {100.0 * test.distortion:.2g} %",
+        f"structure      {plant.frequency_rad_s / (2.0 * math.pi):.3f}{_bound(std_hz)} Hz (bench "
+        f"{specimen.linear_frequency_hz:g}), damping {100.0 * plant.damping_ratio:.3f}"
+        f"{_bound(plant.damping_ratio_std, 100.0)} %, phi_d {plant.drive_shape:.4f}"
+        f"{_bound(plant.drive_shape_std)} kg^-1/2 (bench {'none' if shape is None else format(shape, 'g')})",
+        f"with exciter   {pole.imag / (2.0 * math.pi):.3f} Hz, damping {-100.0 * pole.real / abs(pole):.2f} %, mass ratio "
         + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"could not be identified ({low:.3f} to {high:.3f})")
-        + f", {plant['force_per_v_n']:.3g} N/V at resonance; model within {100.0 * plant['fit_error']:.2g} %",
-        f"law            {found['law']}: {found['why']}",
-        *(f"  {name} = {_number(value)}" for name, value in found["gains"].items()),
+        + f", {1.0 / plant.volts_per_newton():.3g} N/V at resonance; model within {100.0 * plant.fit_error:.2g} %",
+        f"law            {chosen.law}: {chosen.why}",
+        *(f"  {name} = {_number(value)}" for name, value in gains_of(chosen).items()),
     ]
-    closed = found["closed_form"]
+    closed = chosen.closed_form
     out.append(
-        f"closed form    K1 = {closed['k1']:.4g} 1/s, K2 = {closed['k2']:.4g} 1/s^2"
-        + (f"; does not apply: {'; '.join(closed['failed'])}" if closed["failed"] else "; its assumptions hold")
+        f"closed form    K1 = {closed.law.proportional_per_s:.4g} 1/s, K2 = {closed.law.integral_per_s2:.4g} 1/s^2"
+        + (f"; does not apply: {'; '.join(closed.failed)}" if closed.failed else "; its assumptions hold")
     )
-    softening, hardening = found["slopes"]
+    softening, hardening = chosen.slopes
     out.append(
         f"slopes         d ln(frequency)/d ln(amplitude) from {-softening:.3g} to {hardening:+.3g} leave the loops stable; a "
-        f"cubic spring that has shifted the frequency by {100.0 * SHIFT_SHOWN:g} % has {2.0 * SHIFT_SHOWN:g}"
+        f"cubic spring that has shifted the frequency by {100.0 * SHOWN_SHIFT:g} % has {2.0 * SHOWN_SHIFT:g}"
     )
-    out += [line for design in found["designs"] for line in _design_lines(design)]
+    out += [line for design in (chosen.design, *chosen.others) for line in _design_lines(design)]
+    levels_m, needed_v = tuning.levels.levels_m, tuning.levels.needed_v
     out.append(
-        f"levels         {levels[0]:.3g} to {levels[-1]:.3g} m in {len(levels)} steps, {found['needed_v'][0]:.3g} to "
-        f"{found['needed_v'][-1]:.3g} V on the linear plant; {found['levels_why']}"
+        f"levels         {levels_m[0]:.3g} to {levels_m[-1]:.3g} m in {len(levels_m)} steps, {needed_v[0]:.3g} to "
+        f"{needed_v[-1]:.3g} V on the linear plant; {tuning.levels.why}"
     )
-    if found["harmonics"] is not None:
-        out += _harmonics_lines(found["harmonics"])
-    return [*out, *(f"note: {note}" for note in found["notes"])]
+    if tuning.harmonics is not None:
+        out += _harmonics_lines(tuning.harmonics)
+    return [*out, *(f"note: {note}" for note in tuning.notes)]
 
 
-def _harmonics_lines(found: dict[str, Any]) -> list[str]:
-    peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in found["sensitivity_peaks"].items())
-    out = [f"harmonics      2 to {found['highest']}, integral = {found['integral']:g}, max |S| {peaks or 'unknown'}"]
-    return [*out, *(f"  {reason}" for reason in found["reasons"])]
+def _harmonics_lines(choice: HarmonicsChoice) -> list[str]:
+    peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in choice.sensitivity_peaks.items())
+    settings = choice.settings
+    out = [f"harmonics      2 to {settings.highest}, integral = {settings.integral:g}, max |S| {peaks or 'unknown'}"]
+    return [*out, *(f"  {reason}" for reason in choice.reasons)]
 
 
-def _design_lines(design: dict[str, Any]) -> list[str]:
-    settling = max(design["settling_periods"].values())
-    out = [f"with {100.0 * design['damping_ratio']:.3g} % damping: settles within {settling:.0f} periods (predicted)"]
-    for name in ("frequency_loop", "response_loop"):
-        found = design[name]
-        if found is not None:
+def _design_lines(design: Design) -> list[str]:
+    periods = design.settling.longest
+    out = [
+        f"with {100.0 * design.loop.plant.damping_ratio:.3g} % damping: settles within {periods:.0f} periods (predicted)"
+    ]
+    for name, margins in (("frequency loop", design.frequency_margins), ("response loop", design.amplitude_margins)):
+        if margins is not None:
             out.append(
-                f"  {name.replace('_', ' '):14} max |S| {found['sensitivity_peak']:.2f}, gain margin "
-                f"{found['gain_margin']:.2f}, phase margin {found['phase_margin_deg']:.0f} deg"
+                f"  {name:14} max |S| {margins.sensitivity_peak:.2f}, gain margin {margins.gain_margin:.2f}, phase margin "
+                f"{margins.phase_margin_deg:.0f} deg"
             )
-    return [*out, *(f"  {reason}" for reason in design["reasons"])]
+    return [*out, *(f"  {reason}" for reason in design.reasons)]
 
 
 def _bound(std: float | None, scale: float = 1.0) -> str:
@@ -171,5 +178,5 @@ def _bound(std: float | None, scale: float = 1.0) -> str:
     return "" if std is None else f" +- {1.96 * scale * std:.2g}"
 
 
-def _number(value: float | list[float]) -> str:
-    return ", ".join(f"{v:.5g}" for v in value) if isinstance(value, list) else f"{value:.5g}"
+def _number(value: float | Sequence[float]) -> str:
+    return ", ".join(f"{v:.5g}" for v in value) if isinstance(value, Sequence) else f"{value:.5g}"

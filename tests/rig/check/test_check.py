@@ -7,7 +7,7 @@ import pytest
 
 from rig.arming.run_options import RunOptions
 from rig.check.findings import Finding
-from rig.check.report import say, summary
+from rig.check.report import print_summary, summary
 from rig.check.run import check
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
@@ -155,7 +155,7 @@ def test_only_the_recording_of_a_check_is_a_reference(tmp_path):
 
 
 def test_the_table_names_what_to_do(tmp_path, monkeypatch, capsys):
-    say(summary(checked(tmp_path, monkeypatch, flipped("acc_magnet"))))
+    print_summary(summary(checked(tmp_path, monkeypatch, flipped("acc_magnet"))))
     out = capsys.readouterr().out
     assert "fail: polarity acc_magnet: reversed: turn the sign of its sensitivity" in out
     assert "failed: " in out.splitlines()[-1]
