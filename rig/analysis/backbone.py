@@ -26,10 +26,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-_MIN_NEGLECTED_PERCENT = 0.001
-"""Smallest neglected part of the force that is given as a number, %; chosen."""
-_ROUNDING_J = 1e-15
-"""Energy below which a loop is closed by rounding, J; chosen."""
+_MIN_NEGLECTED_PERCENT = 0.001  # smallest neglected part of the force that is given as a number, %; chosen
+_ROUNDING_J = 1e-15  # energy below which a loop is closed by rounding, J; chosen
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

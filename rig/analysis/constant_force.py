@@ -26,10 +26,8 @@ _DEFAULT_LEVELS = (0.1, 0.3, 1.0)
 """Default forces over that which the backbone reaches within the bench's limits; chosen."""
 _LAGS_DEG = (-175.0, -5.0)
 """First and last phase lag of a curve, deg; chosen: 5 deg from the lags that are never reached."""
-_RESONANCE_DEG = -90.0
-"""Lag of the acceleration at phase resonance, deg."""
-_BACKBONE_POINTS = 15
-"""Points of the backbone; chosen."""
+_RESONANCE_DEG = -90.0  # lag of the acceleration at phase resonance, deg
+_BACKBONE_POINTS = 15  # points of the backbone; chosen
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,7 +1,7 @@
 """Steady response to a constant voltage, up and down: the force drops at resonance, as in a slow uncontrolled sweep."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-_DEFAULT_LEVEL = 0.5
-"""Default voltage over that at which the bench may be driven in resonance; chosen."""
-_SPAN = (0.7, 1.3)
-"""Default range over the frequency of the mode under test; chosen."""
+_DEFAULT_LEVEL = 0.5  # default voltage over that at which the bench may be driven in resonance; chosen
+_SPAN = (0.7, 1.3)  # default range over the frequency of the mode under test; chosen
 Column = NDArray[np.generic]
 """A quantity at all points, along the first axis."""
 LineStyle = str | tuple[int, tuple[int, int]]
@@ -35,8 +33,7 @@ _DASHED: LineStyle = (0, (4, 2))
 """Dashes of the falling direction."""
 _DENSE_WIDTHS = 12.0
 """Half width of the dense part of the frequency grid, which holds half of the points, in half-widths of the resonance."""
-_SAME = 1e-3
-"""Difference of two amplitudes over the largest, up to which the directions agree; chosen."""
+_SAME = 1e-3  # difference of two amplitudes over the largest, up to which the directions agree; chosen
 
 
 @dataclass(frozen=True)
@@ -251,11 +248,11 @@ def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicRespons
 
 def _map_columns(make: Callable[[list[Column]], Column], *branches: PeriodicResponses) -> PeriodicResponses:
     """Build responses, computing each column from the same columns of the given branches."""
-    columns: dict[str, Column | dict[str, Column]] = {}
-    for field in fields(PeriodicResponses):
-        values = [getattr(branch, field.name) for branch in branches]
-        if isinstance(values[0], dict):
-            columns[field.name] = {name: make([column[name] for column in values]) for name in values[0]}
-        elif values[0] is not None:
-            columns[field.name] = make(values)
-    return replace(branches[0], **columns)
+    columns = {field.name: getattr(branches[0], field.name) for field in fields(PeriodicResponses)}
+    for name, first in columns.items():
+        values = [getattr(branch, name) for branch in branches]
+        if isinstance(first, dict):
+            columns[name] = {key: make([value[key] for value in values]) for key in first}
+        elif first is not None:
+            columns[name] = make(values)
+    return PeriodicResponses(**columns)

@@ -14,10 +14,8 @@ By = Literal["force", "voltage"]
 
 _LOWEST_RATIO = 0.01
 """Default of the lowest level of a range, relative to the highest."""
-_SEARCH_POINTS = 25
-"""Voltages at which the bench's limits are sought; chosen."""
-_MAX_POINTS = 20_000
-"""Largest number of points; chosen."""
+_SEARCH_POINTS = 25  # voltages at which the bench's limits are sought; chosen
+_MAX_POINTS = 20_000  # largest number of points; chosen
 
 
 def level_range(balance: Balance, by: By, lowest: float | None, highest: float | None, points: int) -> Float:

@@ -102,12 +102,9 @@ def modes(subject: Subject) -> Modes:
     )
 
 
-_MAX_MODES = 8
-"""Modes that are drawn; chosen: as many as a page holds."""
-_STATIONS = 401
-"""Positions along the beam at which a shape is drawn; chosen."""
-_MARKERS = "osD^vPX*<>ph"
-"""Markers of what is attached."""
+_MAX_MODES = 8  # modes that are drawn; chosen: as many as a page holds
+_STATIONS = 401  # positions along the beam at which a shape is drawn; chosen
+_MARKERS = "osD^vPX*<>ph"  # markers of what is attached
 
 
 def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:

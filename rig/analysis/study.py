@@ -61,8 +61,7 @@ def _points(responses: PeriodicResponses) -> list[JsonValue]:
     ]
 
 
-FIGURE_ENDINGS = (".png", ".pdf", ".svg")
-"""Endings of figures that are written."""
+FIGURE_ENDINGS = (".png", ".pdf", ".svg")  # endings of figures that are written
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

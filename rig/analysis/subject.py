@@ -15,8 +15,7 @@ from simulators.analysis import PeriodicResponses
 from simulators.kernels import Flag
 from vibrolock.arrays import Float
 
-_TOLERANCE = 1.0 + 1e-6
-"""Factor by which a value may exceed a limit; chosen: rounding errors of harmonic balance."""
+_TOLERANCE = 1.0 + 1e-6  # factor by which a value may exceed a limit; chosen: rounding errors of harmonic balance
 
 _FLAG_WORDS = {
     Flag.LAW_RANGE: "a magnet or the force factor is beyond the range in which its law holds",

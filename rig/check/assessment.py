@@ -29,8 +29,7 @@ from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
 from vibrolock.results import Result
 
-SKIPPED = 0.1
-"""Part of the silence that is left out at its beginning, because of the transient of the filters; chosen."""
+SKIPPED = 0.1  # part of the silence that is left out at its beginning, because of the transient of the filters; chosen
 CUT_SHORT = "the multisine was not played to its end"
 
 

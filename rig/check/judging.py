@@ -12,12 +12,9 @@ from rig.check.findings import Finding, graded
 from rig.check.responses import BAND, MAX_MISFIT, Mode, Responses, fit_mode
 from vibrolock.arrays import Float
 
-MIN_LOG_RATIO = 0.03
-"""Log ratio below which two channels cannot be distinguished; chosen."""
-MAX_REMAINING = 0.5
-"""Largest misfit of another assignment over that of the channels as wired; chosen."""
-DOUBTFUL_LOG_RATIO = 0.05
-"""RMS log ratio above which the wiring is in doubt; chosen."""
+MIN_LOG_RATIO = 0.03  # log ratio below which two channels cannot be distinguished; chosen
+MAX_REMAINING = 0.5  # largest misfit of another assignment over that of the channels as wired; chosen
+DOUBTFUL_LOG_RATIO = 0.05  # RMS log ratio above which the wiring is in doubt; chosen
 
 
 def by_magnitude(found: Float, expected: Float) -> Float:
@@ -43,8 +40,7 @@ def best_assignment(cost: Float) -> tuple[int, ...] | None:
     return tuple(int(column) for column in columns)
 
 
-MAX_DELAY_SAMPLES = 0.25
-"""Largest delay beyond the driver's latency, samples; chosen."""
+MAX_DELAY_SAMPLES = 0.25  # largest delay beyond the driver's latency, samples; chosen
 
 
 def latency_findings(bench: Bench, responses: Responses, delay_fraction: float) -> list[Finding]:
@@ -69,18 +65,14 @@ def _delay(bench: Bench, responses: Responses, row: int, delay_fraction: float) 
     return Finding("latency", name, "fail" if bad else "ok", late, "samples", f"+-{MAX_DELAY_SAMPLES:g}", text)
 
 
-MIN_COHERENCE, GOOD_COHERENCE = 0.5, 0.98
-"""Coherence below which a channel is dead, and from which it is good; chosen."""
-MIN_POWER = 0.5
-"""Least net power over the absolute power, for a verdict on its direction; chosen."""
+MIN_COHERENCE, GOOD_COHERENCE = 0.5, 0.98  # coherence below which a channel is dead, and from which it is good; chosen
+MIN_POWER = 0.5  # least net power over the absolute power, for a verdict on its direction; chosen
 SIZE_OK, SIZE_TOLERATED = (0.9, 1.1), (0.67, 1.5)
 """Sizes of a response over the expected one, without and with a warning; chosen."""
 FREQUENCY_OK, FREQUENCY_TOLERATED = (0.98, 1.02), (0.9, 1.1)
 """Frequencies of the mode over that of the bench, without and with a warning; chosen."""
-MAX_ROTATION_DEG = 3.0
-"""Largest phase of a residue off its real value, deg; chosen."""
-MAX_DISTORTION = 0.05
-"""Distortion above which there is a warning; chosen."""
+MAX_ROTATION_DEG = 3.0  # largest phase of a residue off its real value, deg; chosen
+MAX_DISTORTION = 0.05  # distortion above which there is a warning; chosen
 
 
 def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], Mode | None]:

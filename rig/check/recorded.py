@@ -2,8 +2,7 @@
 
 from rig.recording.reader import Recording
 
-PURPOSE = "check"
-"""Purpose of the recording of a check, in the facts of its parts."""
+PURPOSE = "check"  # purpose of the recording of a check, in the facts of its parts
 
 
 def is_check(recording: Recording) -> bool:

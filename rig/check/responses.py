@@ -18,12 +18,9 @@ from identification import PeriodicSpectra
 from rig.bench import Bench
 from vibrolock.arrays import Complex, Float
 
-BAND = (0.7, 1.4)
-"""Band of the fit over the linear frequency; chosen."""
-MAX_MISFIT = 0.15
-"""Largest misfit of a fit that describes the responses; chosen, see `fit_mode`."""
-ITERATIONS = 12
-"""Iterations of the fit of the pole; chosen: it converges in fewer."""
+BAND = (0.7, 1.4)  # band of the fit over the linear frequency; chosen
+MAX_MISFIT = 0.15  # largest misfit of a fit that describes the responses; chosen, see `fit_mode`
+ITERATIONS = 12  # iterations of the fit of the pole; chosen: it converges in fewer
 
 
 @dataclass(frozen=True, eq=False)

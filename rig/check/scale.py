@@ -8,9 +8,8 @@ from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 from rig.check.responses import Mode, Responses
 
-BANDWIDTHS = (
-    8.0  # half width of the band around the mode in which volts per acceleration are fitted, in half bandwidths
-)
+BANDWIDTHS = 8.0
+"""Half width of the band around the mode in which volts per acceleration are fitted, in half bandwidths."""
 FEWEST = 5  # lines of such a fit
 LARGEST_ERROR = 0.3  # relative misfit from which the fit does not say how many volts the motion needs
 

@@ -24,12 +24,10 @@ NAMES = {
 
 PROPOSAL = "say by `mapping` what is where in it; `rig new mapping` proposes one for time data"
 """Advice where a file needs a mapping."""
-NOT_OURS = f"was not written by this package; {PROPOSAL}"
-"""Reason against reading a file without a mapping."""
+NOT_OURS = f"was not written by this package; {PROPOSAL}"  # reason against reading a file without a mapping
 _TIMEOUT_S, _SLOWEST_BYTES_S = 60.0, 5e6
 """Time that reading may take, s, and further bytes per second of time; chosen: far slower than any reader."""
-T = TypeVar("T")
-"""What a reader returns."""
+T = TypeVar("T")  # what a reader returns
 
 
 class ImportFailed(RigError):  # noqa: N818 (says what happened)

@@ -11,19 +11,16 @@ from numpy.typing import NDArray
 from pydantic import JsonValue
 
 from rig.errors import RigError
-from rig.exchange.file_data import ChannelFacts, FileData, StoredObject
-from rig.exchange.proposal.mapping_text import MappingText
-from rig.exchange.uff.datasets import Axis, Function, ModeShape, UnitSystem, UniversalFile
+from rig.exchange.file_data import ChannelFacts, FileData, MappingText, StoredObject
+from rig.exchange.universal_file import Axis, Function, ModeShape, UnitSystem, UniversalFile
 from rig.recording.examination import LARGEST_RATIO, SMALL_BYTES
 from rig.system.child import MEMORY_BYTES
 
 MOST_BYTES = 2_000_000_000
 """Most memory that the contents of a file of any size may take, bytes; chosen: half of what the child may use."""
-_ITEM_BYTES = 100
-"""Memory of a text, a number or a structure beside its content, bytes; measured, roughly, in CPython."""
+_ITEM_BYTES = 100  # memory of a text, a number or a structure beside its content, bytes; measured, roughly, in CPython
 _TREE, _NUMBERS = "tree.json", "numbers.bin"
-_PLAIN = "biufcUS"
-"""Kinds of dtypes that are written as bytes."""
+_PLAIN = "biufcUS"  # kinds of dtypes that are written as bytes
 _RECORDS = {
     one.__name__: one
     for one in (Axis, ChannelFacts, FileData, Function, MappingText, ModeShape, StoredObject, UnitSystem, UniversalFile)

@@ -25,8 +25,7 @@ from vibrolock.arrays import Float
 if TYPE_CHECKING:
     from identification.mapping import CsvLayout
 
-LARGEST_BYTES = 1_000_000_000
-"""Largest file that is read, bytes; chosen."""
+LARGEST_BYTES = 1_000_000_000  # largest file that is read, bytes; chosen
 _DIGIT_FIRST = re.compile(r"\s*[+-]?[.,]?\d")
 _KIND, _OTHERS = "# vibrolock: ", "# others: "
 

@@ -104,3 +104,13 @@ def in_full(group: Mapping[str, Value], before: str = "") -> Iterator[tuple[str,
             yield from in_full(value, f"{before}{name}/")
         elif before:
             yield f"{before}{name}", value
+
+
+@dataclass(frozen=True)
+class MappingText:
+    """Text of a proposed mapping."""
+
+    text: str
+    """TOML with comments."""
+    missing: tuple[str, ...]
+    """Keys that are left to be filled in."""

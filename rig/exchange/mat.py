@@ -15,8 +15,7 @@ from rig.exchange.file_data import FileData, StoredObject, Value, from_variables
 from rig.text.contents import Array, Contents
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
-_MAX_NAME = 31
-"""Most characters of a field name that every reader of version 5 accepts."""
+_MAX_NAME = 31  # most characters of a field name that every reader of version 5 accepts
 
 
 def write_mat(items: Sequence[Contents], path: Path) -> None:

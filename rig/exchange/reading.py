@@ -41,10 +41,8 @@ if TYPE_CHECKING:
         | i.NonlinearModeMapping
     )
 
-_DEFAULT_KIND = "frequency-responses"
-"""Kind of a mapping that names none."""
-T = TypeVar("T")
-"""One of several objects in a file."""
+_DEFAULT_KIND = "frequency-responses"  # kind of a mapping that names none
+T = TypeVar("T")  # one of several objects in a file
 
 
 @dataclass(frozen=True)
@@ -254,10 +252,10 @@ def _read_without(path: Path, form: str, options: _Options) -> "Measurement":
 
 
 def _from_uff(path: Path, options: _Options) -> "Measurement":
-    from rig.exchange.uff.datasets import FREQUENCY_RESPONSE, TIME_RESPONSE
     from rig.exchange.uff.modes import modes_in
     from rig.exchange.uff.reading import read_uff
     from rig.exchange.uff.responses import responses_in
+    from rig.exchange.universal_file import FREQUENCY_RESPONSE, TIME_RESPONSE
 
     file = read_uff(path)
     modes, responses = file.has_shapes, bool(file.of_type(FREQUENCY_RESPONSE))
@@ -266,8 +264,8 @@ def _from_uff(path: Path, options: _Options) -> "Measurement":
     if modes and options.item in (0, 1):
         return modes_in(file, options.units, options.drive)
     if responses:
-        before = [None] if modes else []  # the modes are item 1
-        chosen = _chosen([*before, *responses_in(file, options.units)], path, options.item)
+        found: list[Measurement | None] = [None] if modes else []  # the modes are item 1
+        chosen = _chosen([*found, *responses_in(file, options.units)], path, options.item)
         if chosen is not None:
             return chosen
     if modes:

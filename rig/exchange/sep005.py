@@ -14,12 +14,9 @@ from rig.system.text_files import read_text
 from vibrolock.arrays import Float
 from vibrolock.printable import shown
 
-_LARGEST_JSON_BYTES = 500_000_000
-"""Largest file that is read, bytes; chosen."""
-_MAX_RATE_HZ = 1e100
-"""Largest sample rate, Hz; chosen: any number with which one can still calculate."""
-_SAME_RATE = 1e-6
-"""Relative difference of sample rates that count as one; chosen."""
+_LARGEST_JSON_BYTES = 500_000_000  # largest file that is read, bytes; chosen
+_MAX_RATE_HZ = 1e100  # largest sample rate, Hz; chosen: any number with which one can still calculate
+_SAME_RATE = 1e-6  # relative difference of sample rates that count as one; chosen
 _EVEN = 1e-3
 """Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
 

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 MAX_LIMITS, MAX_INFLUENCES = 4, 5
 """Limits and influences that are drawn, the closest and strongest; chosen: as many as a panel holds."""
-ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"
-"""Colours of points that are accepted, refused and not begun."""
+ACCEPTED, FAILED, MISSING = MAIN, SECOND, "0.8"  # colours of points that are accepted, refused and not begun
 
 
 def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:

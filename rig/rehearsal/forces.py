@@ -12,12 +12,10 @@ import numpy as np
 from vibrolock.arrays import Float
 from vibrolock.content_cache import c_function
 
-SAMPLES = 720
-"""Samples of a period in a describing function; chosen: exact for harmonics up to some hundreds."""
+SAMPLES = 720  # samples of a period in a describing function; chosen: exact for harmonics up to some hundreds
 cfunction = c_function("float64(float64, CPointer(float64))")
 """Compiles a force law as `simulators.sites.elements.User` wants it."""
-BOUND = 0.5
-"""Displacement at which a softening spring begins to stop softening, over the highest one; chosen."""
+BOUND = 0.5  # displacement at which a softening spring begins to stop softening, over the highest one; chosen
 Element = dict[str, object]
 """Table of an element of a virtual rig, as in its file."""
 

@@ -9,10 +9,8 @@ from rig.arming.rehearsed import Rehearsed
 from rig.rehearsal.rehearsal import Rehearsal
 from rig.rehearsal.verdict import QUANTITIES, verdict_of
 
-GRID = tuple(np.linspace(0.0, 1.0, 21).tolist())
-"""Probabilities of the quantiles that are forecast."""
-MIN_DRAWS = 10
-"""Least number of draws with a value for which quantiles are forecast; chosen."""
+GRID = tuple(np.linspace(0.0, 1.0, 21).tolist())  # probabilities of the quantiles that are forecast
+MIN_DRAWS = 10  # least number of draws with a value for which quantiles are forecast; chosen
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,8 @@ from rig.rehearsal.linear.model import Prior, Responses
 from rig.rehearsal.linear.posterior import Posterior
 from vibrolock.arrays import Float
 
-BAND = (0.5, 2.2)
-"""Band in which the linear rig is fitted, over the linear frequency; chosen."""
-LINES = 400
-"""Largest number of lines of a fit; chosen: more take time and narrow nothing."""
+BAND = (0.5, 2.2)  # band in which the linear rig is fitted, over the linear frequency; chosen
+LINES = 400  # largest number of lines of a fit; chosen: more take time and narrow nothing
 AVERAGED_LINES = 15
 """Lines over which variances are averaged; chosen: those of a few realisations scatter by themselves."""
 Source = Recording | ModalAnalysis | LinearModes | Exciter | NonlinearMode

@@ -12,10 +12,8 @@ INSIDE = "inside"
 """Point of a twin whose deflection is that of the structure itself, without its motion on the suspension."""
 MIN_STD, MIN_DAMPING_STD = 1e-4, 0.01
 """Smallest relative errors of a measured frequency and damping ratio that are believed; chosen: what settled points repeat."""
-MAX_MISFIT = 3.0
-"""Root-mean-square misfit of a fit that suffices, in standard errors or over the best fit's; chosen."""
-_COEFFICIENTS = 3
-"""Coefficients of a user element's law."""
+MAX_MISFIT = 3.0  # root-mean-square misfit of a fit that suffices, in standard errors or over the best fit's; chosen
+_COEFFICIENTS = 3  # coefficients of a user element's law
 
 
 def elements_of(mode: NonlinearMode, rig: LinearRig, generator: np.random.Generator) -> list[Element]:

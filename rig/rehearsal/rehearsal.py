@@ -24,10 +24,8 @@ from rig.rehearsal.twins import Twin, draw_twin, exact_twin
 from simulators.ensemble import ensemble
 from vibrolock.results import Result
 
-MAX_DRAWS = 100_000
-"""Largest number of draws; chosen: their file stays below some 100 MB."""
-_HEAD = '{"rehearsal": "'
-"""Beginning of every journal of draws."""
+MAX_DRAWS = 100_000  # largest number of draws; chosen: their file stays below some 100 MB
+_HEAD = '{"rehearsal": "'  # beginning of every journal of draws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +42,7 @@ class Draw:
     """What harmonic balance of the twin finds."""
 
 
-_DRAWS = TypeAdapter(list[Draw])
-"""Reader of a journal's draws; keys of other versions are ignored."""
+_DRAWS = TypeAdapter(list[Draw])  # reader of a journal's draws; keys of other versions are ignored
 
 
 Table = dict[str, JsonValue]

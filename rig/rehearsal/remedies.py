@@ -26,12 +26,9 @@ GAINS = (
 """Gains of a loop that a remedy scales."""
 MAX_EACH = 24
 """Draws that failed, and draws that ended well, on which a remedy is tried; chosen: a compromise with the time it takes."""
-MAX_STEPS = 4
-"""Remedies that are combined at most; chosen."""
-MIN_RISE = 0.02
-"""Rise of the score for which a remedy is taken, over the draws; chosen."""
-TRIP_WEIGHT = 2.0
-"""Weight of a trip over that of a missing point; chosen."""
+MAX_STEPS = 4  # remedies that are combined at most; chosen
+MIN_RISE = 0.02  # rise of the score for which a remedy is taken, over the draws; chosen
+TRIP_WEIGHT = 2.0  # weight of a trip over that of a missing point; chosen
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,8 @@ from rig.rehearsal.verdict import Verdict, verdict_of
 
 MAX_LIMITS, MAX_REASONS, MAX_INFLUENCES = 5, 3, 6
 """Limits, reasons of one refusal, and influences that are printed; chosen: the page fits on a screen."""
-RELIABLE_MISSING = 0.05
-"""Proportion of twins that could not be computed above which the verdict is unreliable; chosen."""
-GOOD_ENDS_WELL = 0.9
-"""Proportion of twins on which a plan ends well above which no advice is given; chosen."""
+RELIABLE_MISSING = 0.05  # proportion of twins that could not be computed above which the verdict is unreliable; chosen
+GOOD_ENDS_WELL = 0.9  # proportion of twins on which a plan ends well above which no advice is given; chosen
 LEVEL_UNITS = {"levels_v": "V", "levels_n": "N", "levels_rms_n": "N RMS", "levels_m": "m"}
 """Unit of a plan's levels, by the key that gives them."""
 

@@ -20,10 +20,8 @@ from rig.rehearsal.measured_mode import INSIDE, elements_of
 
 MAX_TRIES = 50
 """Samples that are tried for one twin; chosen: even where one in ten can be computed, 1 in 200 twins fails."""
-SUBSTEPS_HZ = 20_000.0
-"""Least internal rate of a twin, Hz; chosen: ten steps in a period of the fastest mode of a twin."""
-DEFAULT_LEVEL = 0.3
-"""Highest level over the displacement limit, of a plan whose levels give no displacement; chosen."""
+SUBSTEPS_HZ = 20_000.0  # least internal rate of a twin, Hz; chosen: ten steps in a period of the fastest mode of a twin
+DEFAULT_LEVEL = 0.3  # highest level over the displacement limit, of a plan whose levels give no displacement; chosen
 
 
 @dataclass(frozen=True, eq=False)

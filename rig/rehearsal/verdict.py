@@ -12,10 +12,8 @@ from rig.rehearsal.rehearsal import Draw, Rehearsal
 from rig.rehearsal.statistics import Proportion, Quantiles, Statistic
 from vibrolock.arrays import Float
 
-SIGNIFICANCE = 0.01
-"""Probability, over all tests together, that an influence is found by chance; chosen."""
-MIN_DRAWS = 8
-"""Least number of draws with a finite value for which an influence is tested; chosen."""
+SIGNIFICANCE = 0.01  # probability, over all tests together, that an influence is found by chance; chosen
+MIN_DRAWS = 8  # least number of draws with a finite value for which an influence is tested; chosen
 QUANTITIES = ("frequency_hz", "force_n", "amplitude_m", "voltage_v", "damping_ratio")
 """Quantities of a point that a rehearsal evaluates."""
 ADVICE = {

@@ -11,8 +11,7 @@ from vibrolock.printable import printable
 
 _NUMERIC = re.compile(r"(|-|none|(>= )?[-+]?\d[\d.e+-]*( ?%)?( \([-+\d. %]+\))?)")
 _DIGIT = re.compile(r"\d")
-_SHORT = 14
-"""Rows of a table that stays on one page of paper; chosen."""
+_SHORT = 14  # rows of a table that stays on one page of paper; chosen
 _FACT = re.compile(r"(\S.{0,13}?| {10,}) {2,}(\S.*)")
 _SIGNS = (("m/s^2", "m/s²"), ("+-", "±"), (">= ", "≥ "))
 

@@ -12,8 +12,7 @@ _UNITS = (
     ("_s", " s"),
     ("_fraction", " of the range"),
 )
-_MAX_VALUES = 200
-"""Values of a list that are printed; chosen."""
+_MAX_VALUES = 200  # values of a list that are printed; chosen
 
 
 def key_rows(table: Mapping[str, object], prefix: str = "") -> list[tuple[str, str]]:

@@ -39,10 +39,8 @@ PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
 RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
 CANCELS = (1.0, 0.25, 1.6, 1.5 * cmath.exp(-0.34j))  # times the proportional gain that cancels the coupled pole
 SOFTENS, HARDENS = 0.06, 0.25  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
-SOFTENED, HARDENED = (
-    -0.05,
-    0.1,
-)  # of the frequency: shifts at which a softening or hardening structure stays stable as well
+SOFTENED, HARDENED = -0.05, 0.1
+"""Of the frequency: shifts at which a softening or hardening structure stays stable as well."""
 WORSE = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
 PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| allowed for chosen gains, at the measured damping and at other dampings
 OUTSIDE = 0.5  # largest gain of the response loop at other modes

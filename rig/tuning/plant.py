@@ -22,9 +22,8 @@ class TuningError(RigError):
 
 FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
 NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences show what the model lacks
-MODEL_ERROR = (
-    0.02  # of a response: error of the model that weighs in the fit beside the noise, so that small responses count
-)
+MODEL_ERROR = 0.02
+"""Of a response: error of the model that weighs in the fit beside the noise, so that small responses count."""
 UNBOUNDED = 1e3  # times alpha: its standard error where the lines do not tell it
 EXCITER_PRIOR = 0.3  # an exciter's spring in the band, relative to its moving mass, where one mode does not show it
 

@@ -11,8 +11,7 @@ from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.plant import mass_ratios
 from rig.tuning.tuning import Tuning
 
-SHOWN_SHIFT = 0.05
-"""Shift of the frequency for which the slope of a cubic spring is given; chosen."""
+SHOWN_SHIFT = 0.05  # shift of the frequency for which the slope of a cubic spring is given; chosen
 
 
 def summary(tuning: Tuning) -> dict[str, JsonValue]:

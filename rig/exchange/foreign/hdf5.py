@@ -18,14 +18,10 @@ if TYPE_CHECKING:
 
 Type = np.dtype[np.void]
 """Type of the values of a dataset."""
-MAX_DEPTH = 32
-"""Levels of groups that are read; chosen: deeper ones are links in a circle."""
-_MAX_ITEMS = 100_000
-"""Groups and datasets that are read; chosen."""
-_TEXT_BYTES = 100
-"""Memory of a text, bytes, about."""
-_PLAIN = "biufc"
-"""Kinds of dtypes that are numbers."""
+MAX_DEPTH = 32  # levels of groups that are read; chosen: deeper ones are links in a circle
+_MAX_ITEMS = 100_000  # groups and datasets that are read; chosen
+_TEXT_BYTES = 100  # memory of a text, bytes, about
+_PLAIN = "biufc"  # kinds of dtypes that are numbers
 
 
 class Budget:
@@ -109,13 +105,12 @@ def _plain(value: NDArray[np.void], dtype: Type) -> Value:
 
     if dtype.names:
         return {name: _plain(value[name], dtype[name]) for name in dtype.names}
-    if h5py.check_string_dtype(dtype) is not None:
+    string = h5py.check_string_dtype(dtype) is not None
+    if string or dtype.kind == "S":
         texts: list[Value] = [
-            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in np.ravel(value)
+            one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one) for one in np.ravel(value).tolist()
         ]
-        return texts[0] if np.ndim(value) == 0 else texts
-    if dtype.kind == "S":
-        return [one.decode("utf-8", "replace") for one in np.ravel(value).tolist()]
+        return texts[0] if string and np.ndim(value) == 0 else texts
     return np.asarray(value) if dtype.kind in _PLAIN else f"<{dtype}>"
 
 

@@ -13,8 +13,7 @@ from rig.exchange.file_data import ChannelFacts, FileData, Value
 if TYPE_CHECKING:
     from asammdf.blocks import v2_v3_blocks, v4_blocks
 
-_FORMULA = 3
-"""Type of a conversion by a formula (ASAM MDF 4.1, block CC)."""
+_FORMULA = 3  # type of a conversion by a formula (ASAM MDF 4.1, block CC)
 _EVEN = 1e-3
 """Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
 

@@ -12,13 +12,10 @@ from identification import IdentificationError
 from identification.mapping import si_of
 from rig.exchange.file_data import FileData, Value
 
-_NO_DATA = ("sample_rate_hz", "units")
-"""Variables by which a file tells of its data."""
+_NO_DATA = ("sample_rate_hz", "units")  # variables by which a file tells of its data
 _IN_BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]+)[\])]$")
-_MAX_DEPTH = 8
-"""Levels of structures that are listed; chosen."""
-_MAX_VALUES = 2000
-"""Values that are listed; chosen."""
+_MAX_DEPTH = 8  # levels of structures that are listed; chosen
+_MAX_VALUES = 2000  # values that are listed; chosen
 
 
 @dataclass(frozen=True, eq=False)

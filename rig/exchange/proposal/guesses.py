@@ -30,8 +30,7 @@ _LIKE = 0.88
 """Least correlation of a signal with itself a period later."""
 _LEVELS = 1.3
 """Least ratio of the RMS of two columns that are different levels."""
-_EXCITED = 1e-2
-"""Amplitude of an excited line, at least, over the strongest; chosen."""
+_EXCITED = 1e-2  # amplitude of an excited line, at least, over the strongest; chosen
 _MOST_TRIED = 200
 """Most lags that are tried as a period."""
 
@@ -86,9 +85,8 @@ def dimensions(values: NDArray[np.generic], samples: int) -> tuple[str, ...]:
     names[at] = "sample"
     for axis in range(values.ndim):
         if axis != at:
-            names[axis] = _meaning(
-                np.moveaxis(values, (axis, at), (0, -1)).reshape(values.shape[axis], -1, samples), names
-            )
+            slices = np.moveaxis(values, (axis, at), (0, -1)).reshape(values.shape[axis], -1, samples)
+            names[axis] = _meaning(slices.astype(np.float64), names)
     return tuple(names)
 
 

@@ -8,17 +8,15 @@ from numpy.typing import NDArray
 
 from identification.mapping import CsvLayout
 from rig.exchange.child_reading import ImportFailed, read_in_child
+from rig.exchange.file_data import MappingText
 from rig.exchange.proposal.contents import FileContents, Leaf, contents_of
 from rig.exchange.proposal.csv_guess import guessed_layout
 from rig.exchange.proposal.guesses import band_of, dimensions, is_time, period_of, rate_in, role_of, transient_periods
-from rig.exchange.proposal.mapping_text import MappingText
 from rig.exchange.proposal.text import Proposal, ProposedChannel, text_of
 from rig.exchange.sources import format_of, read_data
 
-_MIN_SAMPLES = 16
-"""Samples of the shortest signal; chosen."""
-_MAX_CHANNELS = 16
-"""Channels that are proposed; chosen."""
+_MIN_SAMPLES = 16  # samples of the shortest signal; chosen
+_MAX_CHANNELS = 16  # channels that are proposed; chosen
 
 
 def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") -> tuple[str, tuple[str, ...]]:

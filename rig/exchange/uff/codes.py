@@ -15,10 +15,8 @@ DATA_TYPE = {"m": 8, "m/s": 11, "m/s2": 12, "m/s^2": 12, "N": 13, "s": 17, "Hz":
 Degree = tuple[int, int]
 """Node and direction."""
 
-_UP = 3
-"""Direction +Z, of all sensors: the bench does not say where they point."""
-_SCALAR = 0
-"""Direction of a quantity without one."""
+_UP = 3  # direction +Z, of all sensors: the bench does not say where they point
+_SCALAR = 0  # direction of a quantity without one
 _EVEN = 1e-9
 """Relative difference of an abscissa from an even one that counts as none; chosen: rounding errors of double precision."""
 WIDTH = 80

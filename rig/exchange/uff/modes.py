@@ -7,8 +7,8 @@ import numpy as np
 from identification import Channel, LinearModes
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.codes import channels_in
-from rig.exchange.uff.datasets import ModeShape, UniversalFile
 from rig.exchange.uff.units import file_units
+from rig.exchange.universal_file import ModeShape, UniversalFile
 from vibrolock.arrays import Float
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from identification.errors import IdentificationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.file_data import ChannelFacts, FileData
-from rig.exchange.uff.datasets import (
+from rig.exchange.uff.units import file_units
+from rig.exchange.universal_file import (
     TIME_RESPONSE,
     Axis,
     Function,
@@ -19,19 +20,15 @@ from rig.exchange.uff.datasets import (
     UniversalFile,
     degree_name,
 )
-from rig.exchange.uff.units import file_units
 from rig.system.text_files import read_bytes
 from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     import pyuff
 
-LARGEST_BYTES = 2_000_000_000
-"""Largest file that is read, bytes; chosen."""
-_KNOWN = (55, 58, 151, 164)
-"""Datasets that are read: shapes, functions, header, units."""
-_NORMAL_MODE = 2
-"""Analysis type of a normal mode."""
+LARGEST_BYTES = 2_000_000_000  # largest file that is read, bytes; chosen
+_KNOWN = (55, 58, 151, 164)  # datasets that are read: shapes, functions, header, units
+_NORMAL_MODE = 2  # analysis type of a normal mode
 _MAX_DIFFERENCE = 0.01
 """Relative difference of the lengths of two records up to which both are cut; chosen: a recorder stops some samples late."""
 

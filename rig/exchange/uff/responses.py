@@ -10,8 +10,8 @@ from identification import Channel, FrequencyResponse, FrequencyResponseMatrix
 from identification.channels import Motion, Role
 from identification.frequency_responses import Controlled
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.uff.datasets import FREQUENCY_RESPONSE, GENERAL, Function, UniversalFile, degree_name
 from rig.exchange.uff.units import FileUnits, file_units
+from rig.exchange.universal_file import FREQUENCY_RESPONSE, GENERAL, Function, UniversalFile, degree_name
 from vibrolock.arrays import Complex
 
 
@@ -25,7 +25,7 @@ def _names(function: Function) -> tuple[str, str]:
 
 def responses_in(
     file: UniversalFile, assumed: str = ""
-) -> list[FrequencyResponseMatrix] | list[tuple[FrequencyResponse, ...]]:
+) -> Sequence[FrequencyResponseMatrix | tuple[FrequencyResponse, ...]]:
     """Return the functions of type 4 as one or several objects: `FrequencyResponseMatrix`, or levels of a stepped sine.
 
     Where a response is there more than once, each load case is a matrix of its own, in the order of the file: a level of a

@@ -2,18 +2,14 @@
 
 from identification.mapping import si_of
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.uff.datasets import Axis, UnitSystem, UniversalFile
+from rig.exchange.universal_file import Axis, UnitSystem, UniversalFile
 
 _TOLERANCE = 1e-3
 """Relative difference of two factors that count as one; chosen: factors are stored with three digits and more."""
-_LENGTH = {8: "m", 11: "m/s", 12: "m/s2"}
-"""SI units of motions by their specific data type."""
-_FORCE = (9, 13)
-"""Specific data types of forces."""
-_INDEPENDENT = ("g", "1", "V")
-"""Labels that do not depend on the system of units."""
-_CODES = ("", "SI", "BG", "MG", "BA", "MM", "CM", "IN", "GM", "US")
-"""Names of systems of units by their code."""
+_LENGTH = {8: "m", 11: "m/s", 12: "m/s2"}  # SI units of motions by their specific data type
+_FORCE = (9, 13)  # specific data types of forces
+_INDEPENDENT = ("g", "1", "V")  # labels that do not depend on the system of units
+_CODES = ("", "SI", "BG", "MG", "BA", "MM", "CM", "IN", "GM", "US")  # names of systems of units by their code
 
 
 class FileUnits:

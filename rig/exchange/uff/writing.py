@@ -15,7 +15,7 @@ import numpy as np
 from identification import Channel
 from rig.errors import RecordingError
 from rig.exchange.uff.codes import WIDTH, axis, channel_lines, degrees_of_freedom, evenly
-from rig.exchange.uff.datasets import FREQUENCY_RESPONSE, GENERAL, TIME_RESPONSE
+from rig.exchange.universal_file import FREQUENCY_RESPONSE, GENERAL, TIME_RESPONSE
 from rig.text.contents import Array, Contents
 
 Dataset = dict[str, object]

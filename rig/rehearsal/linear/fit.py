@@ -16,18 +16,14 @@ from rig.rehearsal.linear.parameters import ParameterTable, parameters_of, start
 from rig.rehearsal.linear.posterior import Linearisation, Posterior
 from vibrolock.arrays import Complex, Float
 
-_MIN_UNEXPLAINED = 4.0
-"""Misfit over its expectation above which a further mode is sought; chosen."""
-_MAX_LEFT = 0.5
-"""Largest part of that misfit that may be left for the further mode to be kept; chosen."""
-_MAX_NEIGHBOURS = 3
-"""Largest number of modes beside the tested one; chosen."""
+_MIN_UNEXPLAINED = 4.0  # misfit over its expectation above which a further mode is sought; chosen
+_MAX_LEFT = 0.5  # largest part of that misfit that may be left for the further mode to be kept; chosen
+_MAX_NEIGHBOURS = 3  # largest number of modes beside the tested one; chosen
 _MODEL_FLOOR = 2e-3
 """Smallest relative standard deviation of a response that is believed; chosen: the accuracy of calibrated sensors."""
 _MAX_EVALUATIONS, _TOLERANCE = 100, 1e-7
 """Evaluations and relative tolerance of one fit; chosen: far below the standard errors."""
-_HALVED = 0.25
-"""Variance over that of the prior below which the data have at least halved a standard deviation."""
+_HALVED = 0.25  # variance over that of the prior below which the data have at least halved a standard deviation
 
 
 def posterior(

@@ -14,16 +14,12 @@ _UNKNOWN_LOG_STD = 0.7
 """Standard deviation of the logarithm of a quantity that nobody has measured; chosen: a factor of two either way."""
 _LOW, _HIGH = 0.05, 2.0
 """Frequencies of the modes far below and far above, over the ends of the band; chosen: far enough to act as residual terms."""
-_MIN_HIGH = 1.1
-"""Least frequency of the mode above the band, over the band's upper end; chosen."""
-_FLOOR_DAMPING = 0.005
-"""Median of the prior of a damping ratio; chosen: that of lightly damped metal structures."""
-_COUPLING_HZ = 0.3
-"""Corner frequency of the AC coupling of common IEPE conditioners, Hz."""
+_MIN_HIGH = 1.1  # least frequency of the mode above the band, over the band's upper end; chosen
+_FLOOR_DAMPING = 0.005  # median of the prior of a damping ratio; chosen: that of lightly damped metal structures
+_COUPLING_HZ = 0.3  # corner frequency of the AC coupling of common IEPE conditioners, Hz
 _DEFAULT_RATE_HZ = 5000.0
 """Sample rate for the prior of the delay where no responses were measured, Hz; chosen: that of the shipped benches."""
-MODE = ("frequency_hz", "damping_ratio", "drive_shape")
-"""Parameters of a mode."""
+MODE = ("frequency_hz", "damping_ratio", "drive_shape")  # parameters of a mode
 _SCALED = ("moving_mass_kg", "exciter_damping_n_s_m", "suspension_stiffness_n_m")
 """Parameters of the shaker that scale with its mass."""
 

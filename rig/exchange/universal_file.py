@@ -10,8 +10,7 @@ from vibrolock.arrays import Float
 
 _DIRECTION = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
 """Directions by their codes; a negative code is the opposite direction."""
-TIME_RESPONSE, GENERAL, FREQUENCY_RESPONSE = 1, 0, 4
-"""Types of functions (dataset 58)."""
+TIME_RESPONSE, GENERAL, FREQUENCY_RESPONSE = 1, 0, 4  # types of functions (dataset 58)
 
 
 @dataclass(frozen=True)
