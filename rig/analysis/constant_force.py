@@ -17,6 +17,7 @@ from rig.drawing.style import REJECTED, SECOND, shade
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import NotConvergedError, PeriodicResponses
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -142,7 +143,7 @@ def draw_curves(page: "Figure", curves: dict[float, PeriodicResponses], resonanc
     legend_below(page, handles=handles)
 
 
-def _branches(axis: "Axes", curve: PeriodicResponses, values: np.ndarray, colour: object) -> None:
+def _branches(axis: "Axes", curve: PeriodicResponses, values: Float, colour: object) -> None:
     """Draw stable parts solid and unstable parts dotted; the dots extend to the neighbouring stable points."""
     stable = np.ones(values.size, bool) if curve.stable is None else curve.stable
     for kind, style in ((True, "-"), (False, UNSTABLE)):

@@ -5,7 +5,6 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.backbone import neglected_force
 from rig.analysis.balance import Balance
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 _DEFAULT_LEVEL = 0.5  # default voltage over that at which the bench may be driven in resonance; chosen
 _SPAN = (0.7, 1.3)  # default range over the frequency of the mode under test; chosen
-Column = NDArray[np.generic]
-"""A quantity at all points, along the first axis."""
 LineStyle = str | tuple[int, tuple[int, int]]
 """Style of a line, as Matplotlib takes it."""
 _DASHED: LineStyle = (0, (4, 2))
@@ -246,7 +243,7 @@ def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicRespons
     return _map_columns(np.concatenate, first, then)
 
 
-def _map_columns(make: Callable[[list[Column]], Column], *branches: PeriodicResponses) -> PeriodicResponses:
+def _map_columns(make: Callable[[list[Float]], Float], *branches: PeriodicResponses) -> PeriodicResponses:
     """Build responses, computing each column from the same columns of the given branches."""
     columns = {field.name: getattr(branches[0], field.name) for field in fields(PeriodicResponses)}
     for name, first in columns.items():

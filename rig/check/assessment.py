@@ -27,6 +27,7 @@ from rig.errors import RecordingError
 from rig.measurements import bench_of_recording
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
+from vibrolock.arrays import Float
 from vibrolock.results import Result
 
 SKIPPED = 0.1  # part of the silence that is left out at its beginning, because of the transient of the filters; chosen
@@ -156,7 +157,7 @@ def _plan(recording: Recording) -> MultisinePlan:
     return plan
 
 
-def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> np.ndarray:
+def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> Float:
     """Return the readings before the first realisation, [n, n_channels]."""
     first = recording.plans[0].plan
     samples = round(float(first.get("silent_s", 0.0)) * bench.sample_rate_hz)

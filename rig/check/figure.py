@@ -5,6 +5,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.check.assessment import Assessment, assess
 from rig.check.findings import Finding
@@ -13,6 +14,7 @@ from rig.drawing.areas import is_narrow
 from rig.drawing.page import grid, page_for
 from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, title
 from rig.recording.reader import Recording
+from vibrolock.arrays import Complex, Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,21 +83,21 @@ def _limited(found: Assessment) -> list[tuple[int, str]]:
     return [(i, channel.name) for i, channel in enumerate(found.bench.channels) if channel.role != "monitor"]
 
 
-def _share(found: Assessment, values: np.ndarray, index: int) -> np.ndarray:
+def _share(found: Assessment, values: Float, index: int) -> Float:
     """Return readings of a channel over their limit, %."""
     limits = found.bench.limits
     force = found.bench.channels[index].role == "force"
     return np.asarray(100.0 * values / (limits.force_n if force else limits.acceleration_m_s2))
 
 
-def _largest(found: Assessment, values: np.ndarray, index: int) -> float:
+def _largest(found: Assessment, values: Float, index: int) -> float:
     """Return the largest reading over its limit, %; NaN if the last one is not a number."""
     if not values.size or not np.isfinite(values[-1]):
         return float("nan")
     return float(np.nanmax(np.abs(_share(found, values, index))))
 
 
-def _draw_last(axis: "Axes", found: Assessment, rows: np.ndarray) -> None:
+def _draw_last(axis: "Axes", found: Assessment, rows: NDArray[np.void]) -> None:
     before_s = (np.arange(rows.size) - rows.size + 1) / found.bench.sample_rate_hz
     for colour, (i, name) in zip(COLOURS, _limited(found), strict=False):
         axis.plot(before_s, _share(found, rows["inputs"][:, i], i), color=colour, lw=0.8, label=name)
@@ -137,7 +139,7 @@ def _dead(found: Assessment) -> set[str]:
     return {finding.channel for finding in found.findings if (finding.name, finding.verdict) == ("life", "fail")}
 
 
-def _per_force(found: Assessment) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _per_force(found: Assessment) -> tuple[Complex, dict[str, Float]]:
     """Return the responses to the force, and those of the reference on the same lines, by channel name."""
     if found.responses is None:
         return np.zeros((0, 0)), {}

@@ -196,7 +196,7 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
     return [*out, *(_size(names[i], float(r)) for i, r in zip(known, np.abs(residues / expected), strict=True))]
 
 
-def _polarities(bench: Bench, known: Sequence[int], signs: np.ndarray) -> list[Finding]:
+def _polarities(bench: Bench, known: Sequence[int], signs: Float) -> list[Finding]:
     """Judge the signs of the accelerations relative to the force. If most are wrong, the force is reversed."""
     force = bench.channels[bench.index_of("force")].name
     names = [bench.channels[i].name for i in known]
@@ -221,7 +221,7 @@ def _misplaced(names: Sequence[str], swapped: tuple[int, ...]) -> list[Finding]:
     ]
 
 
-def _look_alike(names: Sequence[str], expected: np.ndarray) -> list[Finding]:
+def _look_alike(names: Sequence[str], expected: Float) -> list[Finding]:
     text = "moves like {other} in this mode: whether the two are swapped, only a reference check tells"
     return [
         Finding("place", names[j], "not tested", text=text.format(other=names[i]))

@@ -22,6 +22,7 @@ from rig.results.kinds import KINDS
 from rig.show.point_table import points_from
 from rig.show.summary import summarise_recording
 from rig.text.column import Column
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -143,7 +144,7 @@ def _panel(axis: "Axes", one: _Compared, n: int, x: Column, y: Column, spread: C
     axis.plot(_values(refused, x), _values(refused, y), marker, ms=3, mfc="none", color=REJECTED)
 
 
-def _values(points: Sequence[Point[object]], column: Column) -> np.ndarray:
+def _values(points: Sequence[Point[object]], column: Column) -> Float:
     """Return the values of a column in its unit, float64[points]; NaN where a point has none."""
     if column is _LEVEL:
         return np.array([point.level for point in points], float)

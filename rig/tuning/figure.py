@@ -10,6 +10,7 @@ from controller.tuning import Design, Margins
 from rig.drawing.page import grid, page_for
 from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title, unit_text
 from rig.errors import RecordingError
+from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -158,7 +159,7 @@ def _with_lines(designs: list[Design]) -> list[tuple[Design, str | tuple[int, tu
     return list(zip(designs, ("-", "--", (0, (1, 1.5))), strict=False))
 
 
-def _periods(design: Design) -> np.ndarray:
+def _periods(design: Design) -> Float:
     assert design.steps is not None
     return np.asarray(design.steps.time_s * design.loop.omega_rad_s / 2.0 / np.pi)
 
@@ -183,7 +184,7 @@ def _legend_above(axis: "Axes", columns: int = 1, title: str | None = None) -> N
     )
 
 
-def _unbroken(degrees: np.ndarray) -> np.ndarray:
+def _unbroken(degrees: Float) -> Float:
     """Replace an angle by NaN where it wraps, so that no line is drawn there."""
     out = degrees.copy()
     out[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan

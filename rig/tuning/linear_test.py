@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification import FrequencyResponseMatrix, PeriodicSpectra
 from rig.bench import Bench
@@ -106,7 +107,7 @@ class _Runs:
 
     measured: PeriodicSpectra
     """Spectra of the last multisine."""
-    rows: np.ndarray
+    rows: NDArray[np.void]
     """Telemetry rows of the last multisine."""
     lead_samples: float
     """Lead of the device, samples."""

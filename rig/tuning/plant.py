@@ -13,7 +13,7 @@ from controller.tuning import PlantModel
 from identification import FrequencyResponseMatrix, PeriodicSpectra, best_linear_approximation
 from rig.bench import Bench
 from rig.errors import RigError
-from vibrolock.arrays import Float
+from vibrolock.arrays import Complex, Float
 
 
 class TuningError(RigError):
@@ -260,7 +260,7 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
 
 
 def largest_outside(
-    responses: FrequencyResponseMatrix, plant: PlantModel, gains: Sequence[complex] | np.ndarray
+    responses: FrequencyResponseMatrix, plant: PlantModel, gains: Sequence[complex] | Complex
 ) -> tuple[float, float]:
     """Largest magnitude of ``gains`` [n lines] outside the band of the plant model, and its frequency (Hz); 0 if none."""
     frequency = responses.frequency_hz
