@@ -8,6 +8,8 @@ if TYPE_CHECKING:
     from identification.channels import (
         MOTION_ORDER as MOTION_ORDER,
         MOTION_UNIT as MOTION_UNIT,
+        Motion as Motion,
+        Role as Role,
         chosen_rows as chosen_rows,
         find_role as find_role,
     )

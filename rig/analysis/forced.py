@@ -233,7 +233,7 @@ def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses |
     legend_below(page, force)
 
 
-def select_points(branch: PeriodicResponses, rows: slice) -> PeriodicResponses:
+def select_points(branch: PeriodicResponses, rows: "slice[int | None, int | None, int | None]") -> PeriodicResponses:
     """Return some of the points of a branch."""
     return _map_columns(lambda column: column[0][rows], branch)
 

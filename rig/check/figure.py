@@ -24,7 +24,7 @@ VERDICTS = {"fail": SECOND, "warn": "#7a5c00", "not tested": REJECTED}
 """Colours of the verdicts other than ok, the worst first."""
 _LETTER, _LINE = 0.5, 1.3
 """Mean width of a letter and height of a line, relative to the size of the font."""
-_LAST_S, _FEWEST_ROWS = 1.0, 50
+_LAST_S, _MIN_ROWS = 1.0, 50  # time before the end that is drawn, s, and its least number of rows; chosen
 
 
 def write_check(found: Assessment, figure: Path) -> None:
@@ -61,7 +61,7 @@ def _draw_ending(page: "Figure", found: Assessment) -> None:
         part = recording.parts[-1]
         rows = part.read(max(0, part.n_rows - round(_LAST_S * found.bench.sample_rate_hz)), part.n_rows)
         largest = [_largest(found, part.read(0, part.n_rows)["inputs"][:, i], i) for i, _ in _limited(found)]
-    series = rows.size >= _FEWEST_ROWS
+    series = rows.size >= _MIN_ROWS
     axes = grid(page, 2, 2) if series else grid(page, 1, 2)
     bars, said = axes[0, 0], axes[0, 1]
     names = [name for _, name in _limited(found)]

@@ -18,9 +18,11 @@ from rig.tick.safety.layout import EndReason
 BAND = (0.4, 2.5)  # of the linear frequency: band of the multisine
 LINES = 200.0  # number of lines up to the linear frequency
 ENOUGH = 0.999  # coherence of the worst channel that suffices
-CLEAR = 0.9999  # coherence of the best channel above which a dead one will not appear at a higher level either
-DEAD = 0.1
-SILENT_S = 3.0
+CLEAR_COHERENCE = (
+    0.9999  # coherence of the best channel above which a dead one will not appear at a higher level either
+)
+DEAD_COHERENCE = 0.1  # coherence below which a channel is dead at a level; chosen
+SILENT_S = 3.0  # silence before the multisine, s; chosen
 SEARCH = LevelSearch(safe_share=0.1, least_rise=1.2, most_levels=5)
 
 
@@ -111,7 +113,7 @@ def seen_in(bench: Bench, recorded: Recording) -> Seen:
         return Seen(enough=False, share_of_limits=math.inf)
     counted = [i for i, channel in enumerate(bench.channels) if channel.role != "monitor"]
     coherence = found.coherence[counted]
-    hopeless = (coherence < DEAD) & (coherence.max() > CLEAR)
+    hopeless = (coherence < DEAD_COHERENCE) & (coherence.max() > CLEAR_COHERENCE)
     at = [point.rows for point in points_of(recorded) if point.rows is not None][-1]
     rows = recorded.parts[-1].read(at.first_sample, at.end_sample)
     lowest_hz = max(BAND[0] * bench.specimen.linear_frequency_hz, bench.limits.frequency_hz[0])

@@ -9,8 +9,8 @@ from rig.check.findings import Finding, graded
 from rig.daq import Channel
 from vibrolock.arrays import Float
 
-MAINS_HZ = (50.0, 60.0)
-HUM_HARMONICS = 3
+MAINS_HZ = (50.0, 60.0)  # frequencies of the mains, Hz
+HUM_HARMONICS = 3  # harmonics of the mains that are examined; chosen
 NOISY = 3.0  # times the expected floor
 CALM = 0.3
 FAR_OFF = 0.1  # of the range: an offset that eats into it

@@ -10,8 +10,8 @@ from rig.drivers.virtual import VirtualDAQ
 from rig.rehearsal.trial import Trial
 from simulators.analysis import NotConvergedError, phase_resonance_backbone
 
-MOST_POINTS = 4
-HARMONICS = 9
+MAX_POINTS = 4  # points that are balanced; chosen
+HARMONICS = 9  # harmonics of the balance, at least; chosen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ def true_backbone(bench: Bench, trial: Trial, seed: int = 0, loop: HarmonicsSett
     """
     measured = [p for p in trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
     measured.sort(key=lambda point: point.amplitude_m)
-    picked = sorted({round(i) for i in np.linspace(0, len(measured) - 1, min(MOST_POINTS, len(measured)))})
+    picked = sorted({round(i) for i in np.linspace(0, len(measured) - 1, min(MAX_POINTS, len(measured)))})
     points = [measured[i] for i in picked]
     if not points:
         return NOT_BALANCED

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 COLOURS = (MAIN, SECOND, "#009e73", "#e69f00", "#7b3f98", "#56b4e9")
 MARKERS = "os^Dv<>P"
 """A recording has its own colour and its own marker, so that either suffices."""
-MOST_PANELS = 3
+MAX_PANELS = 3  # quantities that are compared; chosen
 _LEVEL = Column("level", "level", "", ".4g")
 
 
@@ -104,7 +104,7 @@ def panels(columns: Sequence[Column]) -> tuple[Column, list[Column]]:
         x, wanted = known["amplitude_m"], ("frequency_hz", "damping_ratio", "force_n")
     else:
         x, wanted = _LEVEL, tuple(key for key, column in known.items() if not column.counts_from)
-    return x, [known[key] for key in wanted if key in known][:MOST_PANELS]
+    return x, [known[key] for key in wanted if key in known][:MAX_PANELS]
 
 
 def _draw(page: "Figure", kind: str, found: Sequence[_Compared]) -> None:

@@ -8,7 +8,7 @@ from rig.errors import RecordingError
 from rig.recording.journal import journal_path
 from rig.report.document import Table
 
-_AT_ONCE = 2**20
+_CHUNK_BYTES = 2**20  # bytes that are read at once; chosen
 
 
 def files_of(path: Path) -> list[Path]:
@@ -21,7 +21,7 @@ def digest_of(path: Path) -> str:
     digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            while data := stream.read(_AT_ONCE):
+            while data := stream.read(_CHUNK_BYTES):
                 digest.update(data)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None

@@ -38,14 +38,16 @@ SHARES = (1.0 / 8.0, 1.0 / 16.0, 1.0 / 40.0)  # of the low-pass: integral gain o
 PROPORTIONALS = (0.0, 0.3, 0.7)  # proportional gain of the frequency error
 RESPONSE_SHARES = (3.0 / 8.0, 1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0)  # of the low-pass: integral gain of the response loop
 CANCELS = (1.0, 0.25, 1.6, 1.5 * cmath.exp(-0.34j))  # times the proportional gain that cancels the coupled pole
-SOFTENS, HARDENS = 0.06, 0.25  # wanted: d ln(frequency)/d ln(amplitude) up to which the loops stay stable
+WANTED_SOFTENING, WANTED_HARDENING = 0.06, 0.25
+"""d ln(frequency)/d ln(amplitude) up to which the loops have to stay stable; chosen."""
 SOFTENED, HARDENED = -0.05, 0.1
 """Of the frequency: shifts at which a softening or hardening structure stays stable as well."""
-WORSE = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
-PEAK, OTHER_PEAK = 2.0, 3.0  # largest max |S| allowed for chosen gains, at the measured damping and at other dampings
-OUTSIDE = 0.5  # largest gain of the response loop at other modes
+MAX_SLOPE_LOSS = 0.2  # of the wanted range of slopes (2: all of it) that is given away for quicker gains
+MAX_SENSITIVITY, OTHER_SENSITIVITY = 2.0, 3.0
+"""Largest max |S| of chosen gains, at the measured damping and at other dampings; chosen."""
+MAX_GAIN_OUTSIDE = 0.5  # largest gain of the response loop at other modes
 FORCE_SHARES = (1.0 / 12.0, 1.0 / 16.0, 1.0 / 24.0, 1.0 / 36.0, 1.0 / 50.0, 1.0 / 100.0)  # of the low-pass
-PHASE_PEAK = 1.6
+MAX_PHASE_SENSITIVITY = 1.6  # largest max |S| of the phase law; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,7 @@ def choose(
     tried = 0
     best = None
     for candidate in sorted(_candidates(plant, allowed), key=lambda one: -one.worth):
-        if best is not None and candidate.worth < best.worth - WORSE:
+        if best is not None and candidate.worth < best.worth - MAX_SLOPE_LOSS:
             break
         tried += 1
         if (best is None or candidate.quickness > best.quickness) and _suits(candidate.loop, plant, responses):
@@ -126,8 +128,8 @@ def choose(
         slopes=best.slopes,
         outside=_beyond(best.loop, responses),
         why=f"w_LP = w0/{omega / w:.3g} ({noise}), k = w_LP/{1 / share:.0f}, K = w_LP/{1 / best.response_share:.3g}: of those "
-        f"tried whose max |S| is at most {PEAK:g} with the damping measured, {OTHER_PEAK:g} with up to {DAMPINGS[-1]:g} times "
-        "that, the quickest of those that bear the steepest softening and hardening",
+        f"tried whose max |S| is at most {MAX_SENSITIVITY:g} with the damping measured, {OTHER_SENSITIVITY:g} with up to "
+        f"{DAMPINGS[-1]:g} times that, the quickest of those that bear the steepest softening and hardening",
     )
 
 
@@ -145,7 +147,7 @@ class _Candidate:
     @property
     def worth(self) -> float:
         """Part of the wanted range of softening and hardening that the loop bears, from 0 to 2."""
-        return min(self.slopes[0] / SOFTENS, 1.0) + min(self.slopes[1] / HARDENS, 1.0)
+        return min(self.slopes[0] / WANTED_SOFTENING, 1.0) + min(self.slopes[1] / WANTED_HARDENING, 1.0)
 
     @property
     def quickness(self) -> float:
@@ -179,9 +181,9 @@ def _damped(plant: PlantModel) -> list[PlantModel]:
 
 def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMatrix) -> bool:
     """Whether a loop keeps all bounds: of the sensitivity, of its gain at other modes, and of its quickness."""
-    if _beyond(loop, responses)[0] > OUTSIDE or max(gains_at_half(loop).values()) > LARGEST_AT_HALF:
+    if _beyond(loop, responses)[0] > MAX_GAIN_OUTSIDE or max(gains_at_half(loop).values()) > LARGEST_AT_HALF:
         return False
-    bounds = (PEAK, *(OTHER_PEAK for _ in DAMPINGS[1:]))
+    bounds = (MAX_SENSITIVITY, *(OTHER_SENSITIVITY for _ in DAMPINGS[1:]))
     if any(
         _quick_peak(replace(loop, plant=other)) > bound for other, bound in zip(_damped(plant), bounds, strict=True)
     ):
@@ -198,7 +200,7 @@ def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, t
         complex_response_law(plant, w, share=RESPONSE_SHARES[-1], smoothing_rad_s=w),
     )
     slowest, beyond = assess(loop), _beyond(loop, responses)
-    reasons = "; ".join(slowest.reasons) or f"max |S| above {PEAK:g}"
+    reasons = "; ".join(slowest.reasons) or f"max |S| above {MAX_SENSITIVITY:g}"
     return TuningError(
         f"this rig is unsuited to complex response control with a frequency-error loop: {reasons} ({tried} sets of gains "
         f"tried; the slowest, w_LP = w0/{loop.omega_rad_s / w:.3g}, has max |S| {_quick_peak(loop):.2f} and a gain of "
@@ -208,7 +210,7 @@ def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, t
 
 def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
     plants = [plant.at(damping_ratio=plant.damping_ratio * part) for part in DAMPINGS]
-    design = design_phase_law(plants, w, sensitivity_peak=PHASE_PEAK)
+    design = design_phase_law(plants, w, sensitivity_peak=MAX_PHASE_SENSITIVITY)
     if not design.suited:
         raise TuningError(f"this rig is unsuited to a phase-locked loop: {'; '.join(design.reasons)}")
     measured = replace(assess(replace(design.loop, plant=plant)), failed=design.failed, notes=design.notes)

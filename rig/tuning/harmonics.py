@@ -11,10 +11,10 @@ from rig.bench import Bench
 from rig.errors import ConfigurationError
 from vibrolock.arrays import Complex, Float
 
-REACH = 0.7  # of the oscillator's frequency, on both sides of a harmonic: where its loop is examined
-GAINS = (0.04, 0.03, 0.02, 0.01, 0.005)
-LARGEST_SENSITIVITY = 1.8
-CLEAR = 0.1  # relative standard error of a harmonic's plant up to which it is used
+EXAMINED_BAND = 0.7  # of the oscillator's frequency, on both sides of a harmonic: where its loop is examined
+GAINS = (0.04, 0.03, 0.02, 0.01, 0.005)  # integral gains that are tried, the highest first; chosen
+MAX_SENSITIVITY = 1.8  # largest max |S| of the harmonics loop; chosen
+MAX_PLANT_ERROR = 0.1  # relative standard error of a harmonic's plant up to which it is used
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ def check_highest(bench: Bench, highest: int) -> None:
         linear = bench.specimen.linear_frequency_hz
         raise ConfigurationError(
             f"`harmonics` = {highest}: the multisine would reach {needed:.4g} Hz, the bench {bench.name} allows up to "
-            f"{allowed:g} Hz, enough for {max(1, int(allowed / linear - REACH))}"
+            f"{allowed:g} Hz, enough for {max(1, int(allowed / linear - EXAMINED_BAND))}"
         )
 
 
 def band_for(bench: Bench, highest: int) -> float:
     """Return the highest frequency (Hz) of a multisine that shows the plant at all harmonics up to ``highest``."""
-    return (highest + REACH + 0.1) * bench.specimen.linear_frequency_hz
+    return (highest + EXAMINED_BAND + 0.1) * bench.specimen.linear_frequency_hz
 
 
 def choose_harmonics(
@@ -65,12 +65,12 @@ def choose_harmonics(
     for order in range(2, highest + 1):
         plant = _at(frequency, force, order * lock_hz)
         error = float(np.interp(order * lock_hz, frequency, std)) / abs(plant)
-        if error <= CLEAR:
+        if error <= MAX_PLANT_ERROR:
             known[order] = plant
         else:
             reasons.append(
                 f"harmonic {order}: force per volt at {order * lock_hz:.5g} Hz is uncertain by {100.0 * error:.2g} %, "
-                f"allowed is {100.0 * CLEAR:g} %: measured by a step when the test runs"
+                f"allowed is {100.0 * MAX_PLANT_ERROR:g} %: measured by a step when the test runs"
             )
     peaks: dict[float, dict[int, float]] = {}
     for gain in GAINS:
@@ -78,9 +78,9 @@ def choose_harmonics(
             order: _sensitivity(frequency, force / plant, order * lock_hz, lock_hz, (gain, corner), delay_s)
             for order, plant in known.items()
         }
-        if max(peaks[gain].values(), default=0.0) <= LARGEST_SENSITIVITY:
+        if max(peaks[gain].values(), default=0.0) <= MAX_SENSITIVITY:
             break
-    unstable = [order for order, peak in peaks[gain].items() if peak > LARGEST_SENSITIVITY]
+    unstable = [order for order, peak in peaks[gain].items() if peak > MAX_SENSITIVITY]
     if unstable:  # others need not suffer from them
         gain = next(g for g in GAINS if all(_good(peaks, g, order) for order in known if order not in unstable))
         reasons += [
@@ -98,7 +98,7 @@ def choose_harmonics(
 
 
 def _good(peaks: dict[float, dict[int, float]], gain: float, order: int) -> bool:
-    return peaks[gain][order] <= LARGEST_SENSITIVITY
+    return peaks[gain][order] <= MAX_SENSITIVITY
 
 
 def _at(frequency: Float, values: Complex, at_hz: float) -> complex:
@@ -118,7 +118,7 @@ def _sensitivity(
     loop is ``k w R(nu) exp(-i nu d)/(i nu (i nu + w))``; R is not symmetric, so that both signs of nu are examined.
     """
     (k, w), nu = law, (frequency - centre_hz) / lock_hz
-    near = (np.abs(nu) < REACH) & (np.abs(nu) > 1e-9)
+    near = (np.abs(nu) < EXAMINED_BAND) & (np.abs(nu) > 1e-9)
     nu = nu[near]
     loop = k * w * ratio[near] * np.exp(-2j * math.pi * nu * lock_hz * delay_s) / (1j * nu * (1j * nu + w))
     # Around the integrator's pole the contour passes on the right: from nu < 0 to nu > 0 on a half circle, where L is k/s.

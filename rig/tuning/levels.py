@@ -22,7 +22,7 @@ def low_pass(
     """Return the largest low-pass (rad/s), the lowest force (N) at which the lag can be measured with it, and the reason.
 
     At that force the standard deviation of the lag is `LAG_STD_DEG`. If at most `RAISED` times the wanted force is needed, and
-    less than ``highest_n`` (N) by `LEAST_SPAN`, the force is raised and the low-pass is kept, because a slow low-pass costs
+    less than ``highest_n`` (N) by `MIN_SPAN`, the force is raised and the low-pass is kept, because a slow low-pass costs
     time at every level.
     """
     omega = plant.lock_frequency_rad_s()
@@ -42,20 +42,20 @@ def low_pass(
             f"the lag then fluctuates by {choice.lag_std_deg:.2g} deg at {lowest_n:.3g} N",
         )
     why = f"the lag then fluctuates by {LAG_STD_DEG:g} deg at"
-    if needed_n <= min(RAISED * lowest_n, highest_n / LEAST_SPAN):
+    if needed_n <= min(RAISED * lowest_n, highest_n / MIN_SPAN):
         return quickest.low_pass_rad_s, needed_n, f"{why} {needed_n:.3g} N, the lowest level, raised for that"
     choice = fluctuation(lowest_n)
     force_n = lowest_n * max(1.0, choice.lag_std_deg / LAG_STD_DEG)
     return choice.low_pass_rad_s, force_n, f"{why} {force_n:.3g} N, the lowest level"
 
 
-PART = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
+LIMIT_FRACTION = 1.0 / 3.0  # of the limits, on the linear plant; the rest is room for the nonlinearity
 SPAN = 30.0  # highest level over lowest, where noise allows
-LEAST_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
-BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
-NONHARMONIC = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
-NARROW = 10.0  # span below which rounding may add more, and the plan accepts more
-MORE_NONHARMONIC, ACCEPTED_NONHARMONIC = 0.15, 0.25
+MIN_SPAN = 1.5  # highest level over lowest that rounding may reduce it to; the lowest points may then be refused
+MIN_FORCE_BITS = 2.0  # amplitude of the force at the lowest level, in least significant bits of the converter
+MAX_NONHARMONIC = 0.06  # of the force's RMS: what rounding may add at the lowest level; plans accept 0.1 by default
+NARROW_SPAN = 10.0  # span below which rounding may add more, and the plan accepts more
+RELAXED_NONHARMONIC, ACCEPTED_NONHARMONIC = 0.15, 0.25
 
 
 @dataclass(frozen=True)
@@ -119,24 +119,24 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     """Return the lowest useful force for a highest level.
 
     It is a part of the highest force, but at least a few bits of the input converter, and so large that rounding in both
-    converters adds no more than `NONHARMONIC` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where that
-    leaves less than a span of `NARROW`, rounding may add `MORE_NONHARMONIC`.
+    converters adds no more than `MAX_NONHARMONIC` to it; ``bits_force_n`` is what rounding of the output causes, N RMS. Where
+    that leaves less than a span of `NARROW_SPAN`, rounding may add `RELAXED_NONHARMONIC`.
     """
     force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
     read_n, sent_n = input_bits_n(bench), bits_force_n
     rounded_n = math.hypot(read_n, sent_n)
-    few_n = max(highest_n / SPAN, BITS * force.resolution_in_unit)
-    quiet_n = math.sqrt(2.0) * rounded_n / NONHARMONIC
+    few_n = max(highest_n / SPAN, MIN_FORCE_BITS * force.resolution_in_unit)
+    quiet_n = math.sqrt(2.0) * rounded_n / MAX_NONHARMONIC
     if max(few_n, quiet_n) == highest_n / SPAN:
         return LowestForce(few_n)
     if quiet_n <= few_n:
-        return LowestForce(min(few_n, highest_n / LEAST_SPAN), "two bits of the force's converter")
+        return LowestForce(min(few_n, highest_n / MIN_SPAN), "two bits of the force's converter")
     which = "output" if sent_n > read_n else "force"
     bound = f"the last bits of the {which} converter, which add {rounded_n:.2g} N RMS at other frequencies"
-    if quiet_n <= highest_n / NARROW:
+    if quiet_n <= highest_n / NARROW_SPAN:
         return LowestForce(quiet_n, bound)
-    more_n = max(few_n, math.sqrt(2.0) * rounded_n / MORE_NONHARMONIC)
-    return LowestForce(min(max(more_n, highest_n / NARROW), highest_n / LEAST_SPAN), bound, ACCEPTED_NONHARMONIC)
+    more_n = max(few_n, math.sqrt(2.0) * rounded_n / RELAXED_NONHARMONIC)
+    return LowestForce(min(max(more_n, highest_n / NARROW_SPAN), highest_n / MIN_SPAN), bound, ACCEPTED_NONHARMONIC)
 
 
 def choose_levels(
@@ -156,7 +156,7 @@ def choose_levels(
     reach, limit = reach_m(bench, plant, ratios)
     told = lowest.force_n / needed_n(plant, 1.0)
     first = told if from_m is None else from_m
-    highest = PART * reach if to_m is None else to_m
+    highest = LIMIT_FRACTION * reach if to_m is None else to_m
     if highest > reach:
         raise ConfigurationError(
             f"`to_m` = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "

@@ -23,11 +23,11 @@ from rig.tuning.plant import TuningError, coherence_of, densities, near, voltage
 
 BAND = (0.4, 2.5)  # of the linear frequency: other modes that a loop could excite lie inside
 LINES = 400.0  # number of lines up to the linear frequency while the level is searched for
-LINES_A_BANDWIDTH = 4.0
-FINEST = 32.0  # most by which the spacing of the lines is reduced after the search
-ENOUGH = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
-AUDIBLE = 0.9  # coherence that a level chosen by the user, or the highest that the limits allow, must reach at least
-CREST = 4.0  # largest expected ratio of peak to RMS of a multisine's response
+LINES_PER_BANDWIDTH = 4.0  # lines of the multisine in a half-power bandwidth; chosen
+MAX_REFINEMENT = 32.0  # most by which the spacing of the lines is reduced after the search
+GOOD_COHERENCE = 0.9998  # coherence: 1.4 % of noise in a line of one period's response
+MIN_COHERENCE = 0.9  # least coherence of a level chosen by the user, or of the highest that the limits allow
+MAX_CREST_FACTOR = 4.0  # largest expected ratio of peak to RMS of a multisine's response
 SEARCH = LevelSearch(safe_share=0.5, least_rise=1.05, most_levels=12)
 
 
@@ -82,8 +82,9 @@ def measure(
         tried = (level_rms_v,)
         _audible(bench, level_rms_v, runs.coherence, "at the level asked for")
     matrix = voltage_responses(bench, runs.measured)
-    resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_A_BANDWIDTH
-    resolution = max(resolution, _coarse(bench) / FINEST)  # the damping of a resonance between two lines is a guess
+    resolution = 2.0 * damping_of(matrix, runs.lead_samples) * bench.specimen.linear_frequency_hz / LINES_PER_BANDWIDTH
+    # the damping of a resonance between two lines is a guess
+    resolution = max(resolution, _coarse(bench) / MAX_REFINEMENT)
     found = runs.at(tried[-1], _on_samples(bench, min(resolution, _coarse(bench))), 3)
     matrix = voltage_responses(bench, found)
     around = near(bench, matrix.frequency_hz)
@@ -153,15 +154,15 @@ class _Runs:
         self.at(level_rms_v, _coarse(self.bench), 1)
         self.coherence = coherence_of(self.bench, self.measured)
         least = min(self.coherence)
-        noise = math.sqrt(max(1.0 / max(least, 1e-9) - 1.0, 0.0) / (1.0 / ENOUGH - 1.0))
+        noise = math.sqrt(max(1.0 / max(least, 1e-9) - 1.0, 0.0) / (1.0 / GOOD_COHERENCE - 1.0))
         share = share_of_limits(self.bench, self.rows, self._moved_m)
-        return Seen(least >= ENOUGH, share, max(1.3 * noise, 1.5))
+        return Seen(least >= GOOD_COHERENCE, share, max(1.3 * noise, 1.5))
 
     def _moved_m(self, name: str, _: float) -> float:
         """Return the peak displacement of a channel, from its spectrum."""
         amplitude = self.measured.amplitude[self.measured.index(name)]
         moved = amplitude / (2.0 * np.pi * self.measured.frequency_hz) ** 2
-        return CREST * float(np.sqrt(0.5 * np.sum(moved**2)))
+        return MAX_CREST_FACTOR * float(np.sqrt(0.5 * np.sum(moved**2)))
 
 
 def _ended_well(recording: Recording, level: float) -> None:
@@ -176,12 +177,13 @@ def _ended_well(recording: Recording, level: float) -> None:
 
 def _audible(bench: Bench, level: float, seen: tuple[float, float], when: str) -> None:
     """Raise `TuningError` if force or drive hardly follow the voltage."""
-    if min(seen) >= AUDIBLE:
+    if min(seen) >= MIN_COHERENCE:
         return
     names = [next(c.name for c in bench.channels if c.role == role) for role in ("force", "drive")]
     raise TuningError(
         f"coherence with the voltage {when}, {level:.4g} V RMS: {seen[0]:.4f} of channel {names[0]!r}, {seen[1]:.4f} of "
-        f"channel {names[1]!r}, needed is {AUDIBLE}: a sensor, its cable or the amplifier is dead, or the test is all noise"
+        f"channel {names[1]!r}, needed is {MIN_COHERENCE}: a sensor, its cable or the amplifier is dead, or the test is all "
+        "noise"
     )
 
 

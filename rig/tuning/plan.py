@@ -14,9 +14,9 @@ from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
 from rig.tuning.shifts import Window, ramp_periods, start_periods, start_voltage
 
-HARMONICS = 5
+HARMONICS = 5  # harmonics that are evaluated; chosen
 AVERAGED_BITS = 30  # periods that the settle rule averages where rounding disturbs the force
-SHORTEST_TIME_OUT = 1000
+MIN_TIMEOUT_PERIODS = 1000  # shortest time in which a point must settle, periods; chosen
 LOST_PERIODS = 20  # at least
 WAITING_DEG = 15.0  # error above which a ramp waits: the loops are quick
 
@@ -39,7 +39,7 @@ def plan_text(
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     volts = chosen.law == "phase"
     settling = chosen.design.settling.longest
-    time_out = max(SHORTEST_TIME_OUT, 100.0 * math.ceil(0.05 * settling) if math.isfinite(settling) else 0.0)
+    time_out = max(MIN_TIMEOUT_PERIODS, 100.0 * math.ceil(0.05 * settling) if math.isfinite(settling) else 0.0)
     head = [
         _line("kind", "backbone"),
         _line("description", f"backbone of the {bench.specimen.name}, tuned by rig tune"),

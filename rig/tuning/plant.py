@@ -24,7 +24,7 @@ FIT_BAND = (0.6, 1.6)  # of the linear frequency: band of the plant model
 NARROWER = ((0.7, 1.4), (0.8, 1.25))  # bands of further fits, whose differences show what the model lacks
 MODEL_ERROR = 0.02
 """Of a response: error of the model that weighs in the fit beside the noise, so that small responses count."""
-UNBOUNDED = 1e3  # times alpha: its standard error where the lines do not tell it
+UNKNOWN_STD = 1e3  # times alpha: its standard error where the lines do not tell it
 EXCITER_PRIOR = 0.3  # an exciter's spring in the band, relative to its moving mass, where one mode does not show it
 
 
@@ -65,12 +65,13 @@ def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
     return 0.5 * variance[0] / step, 0.5 * variance[1] / step
 
 
-ALLOWED_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
-WORTH_SAYING_DEG = 1.0
-WORTH_SAYING_HZ = 0.005
-WORTH_SAYING_SHAPE = 0.05
-TOLD = 3.0  # standard errors above which the motion of a channel counts as measured
-TOLERATED_SHAPE = 1.5  # factor by which phi_d may be wrong in the frequency-error law
+MAX_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
+MIN_NOTED_DEG = 1.0  # smallest phase that is worth a note, deg; chosen
+MIN_NOTED_HZ = 0.005
+"""Smallest relative difference of the frequency from that of the bench that is worth a note; chosen."""
+MIN_NOTED_SHAPE = 0.05  # smallest relative difference of phi_d from that of the bench that is worth a note; chosen
+MIN_SIGNIFICANCE = 3.0  # standard errors above which the motion of a channel counts as measured
+MAX_SHAPE_FACTOR = 1.5  # factor by which phi_d may be wrong in the frequency-error law
 
 
 def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float) -> PlantModel:
@@ -141,7 +142,7 @@ def _alpha_std(plant: PlantModel, others: Sequence[PlantModel]) -> float:
     s = 1j * plant.frequency_rad_s
     found = complex(plant.exciter(s)[0])
     apart = max((abs(complex(other.exciter(s)[0]) - found) for other in others), default=0.0)
-    std = UNBOUNDED * abs(found) if plant.force_v_n_std is None else plant.force_v_n_std
+    std = UNKNOWN_STD * abs(found) if plant.force_v_n_std is None else plant.force_v_n_std
     return math.hypot(std, apart)
 
 
@@ -158,7 +159,7 @@ def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> di
     for row, channel in list(enumerate(responses.outputs))[2:]:
         ratio = abs(complex(np.vdot(drive, responses.value[around, row, 0]))) / power
         error = math.sqrt(float(np.sum(np.abs(drive) ** 2 * responses.total_std[around, row, 0] ** 2))) / power
-        if ratio > TOLD * error:
+        if ratio > MIN_SIGNIFICANCE * error:
             out[channel.name] = ratio
     return out
 
@@ -176,7 +177,7 @@ def measured_turns_deg(responses: FrequencyResponseMatrix, plant: PlantModel) ->
         for name in measured_ratios(responses, plant)
     }
     real = {name: -((90.0 - turn) % 180.0 - 90.0) for name, turn in turns.items()}
-    return {name: turn for name, turn in real.items() if abs(turn) >= WORTH_SAYING_DEG}
+    return {name: turn for name, turn in real.items() if abs(turn) >= MIN_NOTED_DEG}
 
 
 def measured_ratio_stds(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
@@ -229,13 +230,13 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
     facts, out = bench.specimen, []
     measured_hz = plant.frequency_rad_s / (2.0 * math.pi)
     offset = facts.linear_frequency_hz / measured_hz - 1.0
-    if abs(offset) > ALLOWED_OFFSET:
+    if abs(offset) > MAX_OFFSET:
         raise TuningError(
             f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g} Hz: the mode that answers lies at "
-            f"{measured_hz:.4g} Hz, the bench is {100.0 * offset:+.1f} % off, allowed is {100.0 * ALLOWED_OFFSET:g} %; correct "
+            f"{measured_hz:.4g} Hz, the bench is {100.0 * offset:+.1f} % off, allowed is {100.0 * MAX_OFFSET:g} %; correct "
             "the bench, or see whether it is another mode"
         )
-    if abs(offset) > WORTH_SAYING_HZ:
+    if abs(offset) > MIN_NOTED_HZ:
         out.append(
             f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g} Hz is {100.0 * offset:+.2f} % off the measured "
             f"{measured_hz:.5g} Hz"
@@ -247,14 +248,14 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
         )
         return tuple(out)
     ratio = abs(facts.drive_mode_shape) / plant.drive_shape
-    if abs(ratio - 1.0) > WORTH_SAYING_SHAPE:
+    if abs(ratio - 1.0) > MIN_NOTED_SHAPE:
         text = (
             f"specimen.drive_mode_shape = {facts.drive_mode_shape:g} kg^-1/2 of the bench is {ratio:.2f} times the measured "
             f"{plant.drive_shape:.4g}: the plan uses the measured one, for control and for damping; with the bench's the "
             f"damping would be read {ratio**2:.2f} times as large"
         )
-        if max(ratio, 1.0 / ratio) > TOLERATED_SHAPE:
-            text += f"; a frequency-error loop tolerates a factor of {TOLERATED_SHAPE:g}"
+        if max(ratio, 1.0 / ratio) > MAX_SHAPE_FACTOR:
+            text += f"; a frequency-error loop tolerates a factor of {MAX_SHAPE_FACTOR:g}"
         out.append(text)
     return tuple(out)
 

@@ -11,12 +11,12 @@ from rig.bench import Bench
 from vibrolock.arrays import Float
 
 SHIFTS = (0.8, 1.25)  # of the linear frequency: hardening and softening that a test allows for
-STANDS_OUT = 3.0  # of a mode's peak over the lowest response between it and the tested mode
-TIMES = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
-SHORTEST, LONGEST = 20.0, 300.0  # ramps, periods
+MIN_PROMINENCE = 3.0  # of a mode's peak over the lowest response between it and the tested mode
+RAMP_TIME_CONSTANTS = 1.5  # length of a ramp, in times 1/(D w_0) in which a free vibration decays by e
+MIN_RAMP, MAX_RAMP = 20.0, 300.0  # ramps, periods
 START_SHARE = 0.5  # of the force limit, for a structure that is still at rest
-SHORTEST_START, LONGEST_START = 40.0, 600.0  # periods
-PLAUSIBLE = 0.005  # change of the frequency from level to level
+MIN_START, MAX_START = 40.0, 600.0  # periods
+PLAUSIBLE_SHIFT = 0.005  # change of the frequency from level to level
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _first_peak(frequency: Float, size: Float) -> float | None:
     if size.size < 5:
         return None
     size = np.convolve(np.pad(size, 2, mode="edge"), np.full(5, 0.2), mode="valid")  # noise is no mode
-    rising = np.flatnonzero(size > STANDS_OUT * np.minimum.accumulate(size))
+    rising = np.flatnonzero(size > MIN_PROMINENCE * np.minimum.accumulate(size))
     if not rising.size:
         return None
     later = size[rising[0] :]
@@ -85,11 +85,11 @@ def ramp_periods(plant: PlantModel, tracking_periods: float) -> float:
 
     The force that lets a vibration grow comes on top of the one that holds it: it falls with the length of a ramp over
     ``1/(D w_0)``. A frequency that changes with the level is followed late, by its change within ``tracking_periods``: a change
-    of `PLAUSIBLE` per level shall leave less than half of the half bandwidth ``D w_0``.
+    of `PLAUSIBLE_SHIFT` per level shall leave less than half of the half bandwidth ``D w_0``.
     """
-    grows = TIMES / (2.0 * math.pi * plant.damping_ratio)
-    follows = 0.5 * math.pi * PLAUSIBLE * tracking_periods / (0.5 * plant.damping_ratio)
-    return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), SHORTEST), LONGEST))
+    grows = RAMP_TIME_CONSTANTS / (2.0 * math.pi * plant.damping_ratio)
+    follows = 0.5 * math.pi * PLAUSIBLE_SHIFT * tracking_periods / (0.5 * plant.damping_ratio)
+    return float(min(max(5.0 * math.ceil(max(grows, follows) / 5.0), MIN_RAMP), MAX_RAMP))
 
 
 def start_voltage(bench: Bench, plant: PlantModel, needed_v: float) -> float:
@@ -109,4 +109,4 @@ def start_periods(plant: PlantModel, tracking_periods: float) -> float:
     """
     decays = 3.0 * plant.frequency_rad_s / (-2.0 * math.pi * plant.coupled_pole_rad_s.real)
     periods = 5.0 * math.ceil(max(decays, 4.0 * tracking_periods) / 5.0)
-    return float(min(max(periods, SHORTEST_START), LONGEST_START))
+    return float(min(max(periods, MIN_START), MAX_START))

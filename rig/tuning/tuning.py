@@ -16,8 +16,8 @@ from rig.errors import ConfigurationError
 from rig.tuning.design import Chosen, LawName, choose
 from rig.tuning.harmonics import HarmonicsChoice, band_for, check_highest, choose_harmonics
 from rig.tuning.levels import (
-    NARROW,
-    PART,
+    LIMIT_FRACTION,
+    NARROW_SPAN,
     SPAN,
     LevelChoice,
     LowestForce,
@@ -33,9 +33,9 @@ from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_
 from rig.tuning.shifts import frequency_window
 from vibrolock.results import Result
 
-PURPOSE = "tuning"
-TURNED_DEG = 5.0  # of a response, from which it is worth a note
-NONLINEAR = 0.005  # distortion relative to the linear response of the force
+PURPOSE = "tuning"  # purpose of the recording of a tuning, in the facts of its parts
+MIN_NOTED_PHASE_DEG = 5.0  # of a response, from which it is worth a note
+MAX_DISTORTION = 0.005  # distortion relative to the linear response of the force
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +154,7 @@ def tune(
     turns_deg = measured_turns_deg(test.responses, plant)
     notes += _turned(turns_deg)
     ratios = bench.response_ratios | measured
-    highest_m = PART * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
+    highest_m = LIMIT_FRACTION * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
     lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
     densities = (test.force_density, test.acceleration_density)
     largest, lowest_n, noise = low_pass(plant, densities, lowest.force_n, needed_n(plant, highest_m))
@@ -207,7 +207,7 @@ def tune(
 def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> tuple[str, ...]:
     """Return a note on levels that span little because of a converter's last bits."""
     span, bits = levels.levels_m[-1] / levels.levels_m[0], levels.needed_v[-1] / bench.output_bit_v
-    if not lowest.bound or span > NARROW:
+    if not lowest.bound or span > NARROW_SPAN:
         return ()
     text = f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {lowest.bound}"
     if "output" in lowest.bound:
@@ -221,20 +221,20 @@ def _turned(turns_deg: Mapping[str, float]) -> tuple[str, ...]:
         f"channel {name} stands {abs(turn):.3g} deg {'ahead of' if turn > 0.0 else 'behind'} a real mode shape: a joint that "
         "damps, or a sensor that is late; the plan takes this as known (plant.response_turns_deg)"
         for name, turn in turns_deg.items()
-        if abs(turn) >= TURNED_DEG
+        if abs(turn) >= MIN_NOTED_PHASE_DEG
     )
 
 
 def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:
     """Return notes on possible deviations from the linear plant."""
     out = []
-    if test.distortion > NONLINEAR:
+    if test.distortion > MAX_DISTORTION:
         out.append(
             f"the multisine at {test.level_rms_v:.3g} V RMS shows {100.0 * test.distortion:.2g} % of nonlinear distortion: "
             "frequency and damping are those of that level; tune at a lower one for those of the linear plant"
         )
     limit, highest = bench.limits.voltage_v, levels.needed_v[-1]
-    if highest > PART * limit * 1.001:
+    if highest > LIMIT_FRACTION * limit * 1.001:
         out.append(
             f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach where the damping "
             f"rises beyond {limit / highest:.2g} times that of the multisine"

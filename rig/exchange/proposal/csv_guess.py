@@ -9,8 +9,8 @@ from typing import Literal
 from identification.mapping import UNITS, CsvLayout
 from rig.exchange.csv import table_lines
 
-_LOOKED_AT = 100
-_ALIKE = 3
+_EXAMINED_LINES = 100  # lines that are examined; chosen
+_EQUAL_ROWS = 3  # rows of equally many numbers that make a table; chosen
 Separator = Literal[",", ";", "\t", " "]
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
@@ -20,7 +20,7 @@ _NUMBER = {
 
 def guessed_layout(path: Path) -> CsvLayout | None:
     """Return the layout; None if the file begins with one line of names (and one of units), or no table is found."""
-    lines = [line for _, line in islice(table_lines(path), _LOOKED_AT)]
+    lines = [line for _, line in islice(table_lines(path), _EXAMINED_LINES)]
     for separator, decimal in ((",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")):
         first = _first_row(lines, separator, decimal)
         if first is None:
@@ -60,8 +60,8 @@ def _first_row(lines: list[str], separator: str, decimal: str) -> int | None:
         cells = _cells(line, separator)
         widths.append(len(cells) if len(cells) > 1 and all(_NUMBER[decimal].match(cell) for cell in cells) else 0)
     for at in range(len(widths)):
-        some = widths[at : at + _ALIKE]
-        if some[0] and len(set(some)) == 1 and (len(some) == _ALIKE or at == 0):
+        some = widths[at : at + _EQUAL_ROWS]
+        if some[0] and len(set(some)) == 1 and (len(some) == _EQUAL_ROWS or at == 0):
             return at
     return None
 

@@ -10,7 +10,7 @@ from identification import IdentificationError
 from identification.mapping import UNITS, CsvLayout, si_of
 from rig.exchange.proposal.contents import FileContents, Leaf
 
-_MOST_LISTED = 60
+_MAX_LISTED = 60  # values that are listed; chosen
 _UNITS = tuple(unit for unit in UNITS if "^" not in unit)
 _MEAN = 0.02
 """A mean above this share of the RMS is remarked."""
@@ -107,10 +107,10 @@ def _listed(found: Sequence[FileContents]) -> Iterator[str]:
         told += [(f"{before}{path}", f"{value:.10g}") for path, value in contents.single.items()]
         told += [(f"{before}{path}", what) for path, what in contents.others.items()]
     width = min(max((len(name) for name, _ in told), default=0), 40)
-    for name, what in told[:_MOST_LISTED]:
+    for name, what in told[:_MAX_LISTED]:
         yield f"#   {_one_line(name):<{width}}  {_one_line(what)}"
-    if len(told) > _MOST_LISTED:
-        yield f"#   and {len(told) - _MOST_LISTED} more"
+    if len(told) > _MAX_LISTED:
+        yield f"#   and {len(told) - _MAX_LISTED} more"
 
 
 def _sampling(proposal: Proposal) -> Iterator[str]:

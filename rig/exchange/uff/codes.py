@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from identification import Channel
-from identification.channels import Role
+from identification.common import Role
 from vibrolock.arrays import Float
 
 DATA_TYPE = {"m": 8, "m/s": 11, "m/s2": 12, "m/s^2": 12, "N": 13, "s": 17, "Hz": 18}

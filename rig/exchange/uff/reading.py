@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.errors import IdentificationError
+from identification import IdentificationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.file_data import ChannelFacts, FileData
 from rig.exchange.uff.units import file_units

@@ -7,8 +7,7 @@ from typing import cast
 import numpy as np
 
 from identification import Channel, FrequencyResponse, FrequencyResponseMatrix
-from identification.channels import Motion, Role
-from identification.frequency_responses import Controlled
+from identification.common import Controlled, Motion, Role
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.units import FileUnits, file_units
 from rig.exchange.universal_file import FREQUENCY_RESPONSE, GENERAL, Function, UniversalFile, degree_name
