@@ -142,7 +142,7 @@ def _dead(found: Assessment) -> set[str]:
 def _per_force(found: Assessment) -> tuple[Complex, dict[str, Float]]:
     """Return the responses to the force, and those of the reference on the same lines, by channel name."""
     if found.responses is None:
-        return np.zeros((0, 0)), {}
+        return np.zeros((0, 0), np.complex128), {}
     force = found.responses.names[found.bench.index_of("force")]
     now = found.responses.per(found.bench.index_of("force"))
     old = found.reference
