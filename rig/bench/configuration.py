@@ -43,7 +43,7 @@ class Configured(Described):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
-def merged(base: Table, changes: Table) -> Table:
+def merged(base: Mapping[str, object], changes: Mapping[str, object]) -> Table:
     """Return ``base`` with ``changes``: tables are merged key by key, any other value is replaced."""
     out = dict(base)
     for key, value in changes.items():

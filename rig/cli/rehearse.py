@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.campaigns.planning.plan import Plan
     from rig.rehearsal.comparison import Comparison
+    from rig.rehearsal.effect import Effect
     from rig.rehearsal.rehearsal import Draw
-    from rig.rehearsal.remedies import Effect
     from rig.results.rehearsal.rehearse import Listener, Subject
 
 

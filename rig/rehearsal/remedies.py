@@ -47,7 +47,7 @@ class Improvement:
 
     plan: Plan
     """The plan with all remedies that were taken; the given plan if none helped."""
-    changes: Table
+    changes: Mapping[str, object]
     """All changes together."""
     effects: tuple[Effect, ...]
     """Every remedy that was tried, in the order of trying."""
@@ -152,7 +152,7 @@ def improve(
     weights = {d.number: len(failed) / max(len(_evenly_chosen(failed)), 1) for d in failed}
     weights |= {d.number: len(well) / max(len(_evenly_chosen(well)), 1) for d in well}
     plan, effects = request.plan, list[Effect]()
-    changes: Table = {}
+    changes: Mapping[str, object] = {}
     asked = len(request.plan.targets())
     now, candidates = sample, remedies_for(plan, request.bench, rehearsal.draws)
     for _ in range(MAX_STEPS):
