@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import ParamSpec, Self
+from typing import ParamSpec
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from rig.live.stopping import stopping_on_request
 from rig.live.time_left import time_left_s
 from rig.loop.loop import RunningLoop
 from rig.recording.jsontext import encode
+from rig.system.closing import Closing
 from rig.tick.layout import recorded_row
 from vibrolock.printable import error_text
 
@@ -55,7 +56,7 @@ class Live:
         return nullcontext()
 
 
-class Publisher(Live):
+class Publisher(Live, Closing):
     """Publishes a run in a folder of its own, which is removed at the end.
 
     An error while the run goes on is told by a ``remark``, once; nothing more is published then.
@@ -147,12 +148,6 @@ class Publisher(Live):
         os.close(self._lines)
         remove(self.folder)
         os.close(self._lock)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _carefully(
         self, step: Callable[Arguments, None], *arguments: Arguments.args, **named: Arguments.kwargs

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from rig.live.facts import Line, RunFacts, facts_from
 from rig.live.layout import BINS, FRAME, HEAD, bin_dtype
 from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, base_folder, lives, runs
 from rig.live.stopping import request_stop
+from rig.system.closing import Closing
 from rig.tick.layout import recorded_row
 
 TRIES = 20
@@ -97,7 +98,7 @@ class View(Protocol):
         """Close what is open."""
 
 
-class LiveRun:
+class LiveRun(Closing):
     """A run that is under way, or was when it was opened: what was published last can still be read.
 
     Raises:
@@ -169,12 +170,6 @@ class LiveRun:
         self._frames.close()
         self._traces.close()
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _n_bins(self) -> int:
         return int.from_bytes(self._traces[:HEAD], "little")

@@ -13,8 +13,8 @@ from rig.errors import RigError
 if TYPE_CHECKING:
     from rig.loop.worker.probe import DeviceReport, WakeUps
 
-RATE_HZ = 1000.0
-SECONDS = 1.0
+RATE_HZ = 1000.0  # of the wake-ups that are measured; chosen
+SECONDS = 1.0  # for which wake-ups are measured; chosen
 MEASURED_S = 1.5  # of a device, before settings are recommended and tried
 
 

@@ -16,8 +16,8 @@ from rig.tick.kernels import tick_block
 from rig.tick.layout import TickArrays
 from rig.tick.tick import Tick
 
-CHUNK_S = 0.5
-PACED_CHUNK_S = 0.02
+CHUNK_S = 0.5  # of telemetry, where no clock paces the loop; chosen
+PACED_CHUNK_S = 0.02  # of telemetry, where a clock paces it; chosen: a stop acts within it
 
 
 @runtime_checkable

@@ -1,7 +1,7 @@
 """Recordings as tables of pandas and xarray, with units. Both libraries are optional: ``pip install 'vibrolock[tables]'``."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,7 +38,9 @@ def points_table(recording: Recording) -> "pandas.DataFrame":
         raise _missing("pandas") from None
     campaign = KINDS[recording.kind]
     points: list[Point[object]] = [point_from(table, campaign.result) for table in recording.latest.values()]
-    columns = {column.key: [_number(value_of(point, column.key)) for point in points] for column in campaign.columns}
+    columns = {
+        column.key: np.array([value_of(point, column.key) for point in points], float) for column in campaign.columns
+    }
     table = {
         "level": [point.level for point in points],
         **{name: [getattr(point, name) for point in points] for name in ABOUT},
@@ -178,10 +180,6 @@ def _variables(
             attributes = {"units": scalars[name].unit, "long_name": scalars[name].description}
             out.append((name, part.rows(name, read.start, read.stop)[::every], attributes))
     return out
-
-
-def _number(value: Any) -> float:
-    return float("nan") if value is None else float(value)
 
 
 def _stored_unit(column: Column) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import h5py
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*\Z")
-_COMPRESSED_FROM_BYTES = 65536
+_COMPRESSED_FROM_BYTES = 65536  # smaller arrays gain nothing; chosen
 
 
 def write_arrays(

@@ -18,14 +18,14 @@ from rig.recording import jsontext
 from rig.text.json_values import JsonValue
 
 MAGIC = b"VLJB"
-VERSION = 2
+VERSION = 2  # of the block that is written
 LARGEST_PAYLOAD = 16 * 2**20
 """A block that claims to be longer counts as damaged, which bounds the reader's memory."""
 
 _HEADS = {1: struct.Struct("<4sHHIQ"), 2: struct.Struct("<4sHHIQIQ")}
 _VERSION = struct.Struct("<4xH")
 _CRC = struct.Struct("<I")
-_SEARCH_BYTES = 2**20
+_SEARCH_BYTES = 2**20  # read at a time in search of a block; chosen
 
 
 class BlockKind(IntEnum):

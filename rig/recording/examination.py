@@ -18,10 +18,10 @@ LARGEST_RATIO = 200
 
 SMALL_BYTES = 2**26
 """Bytes that the datasets of any file may declare."""
-_LARGEST_CHUNK_BYTES = 2**28
-_LARGEST_ATTRIBUTE_BYTES = 2**16
-_MOST_ATTRIBUTES = 1000
-_MOST_TEXTS = 2**22
+_LARGEST_CHUNK_BYTES = 2**28  # of a dataset, held in memory to read it; chosen
+_LARGEST_ATTRIBUTE_BYTES = 2**16  # HDF5 stores no longer one beside its object
+_MOST_ATTRIBUTES = 1000  # of an object; chosen: ours have a handful
+_MOST_TEXTS = 2**22  # of a file; chosen
 
 
 def examine(file: "h5py.File", size: int) -> None:

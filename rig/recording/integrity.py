@@ -14,7 +14,7 @@ from rig.system.child import MEMORY_BYTES, ChildFailed, ask_child
 
 _MAGIC, _VERSION = b"VLDIGEST", 1
 _TRAILER = struct.Struct("<8sI32sQ")
-_AT_ONCE = 2**20
+_AT_ONCE = 2**20  # bytes that are digested at a time; chosen
 
 
 def append_trailer(stream: "BinaryIO | io.RawIOBase") -> None:
@@ -61,8 +61,8 @@ VERIFIED = "verified"
 FIRST_WITH_DIGEST = 3
 """Schema from which on every HDF5 file has a digest."""
 
-_TIMEOUT_S, _SLOWEST_BYTES_S = 60.0, 5e6
-_SETTLED_S = 2.0
+_TIMEOUT_S, _SLOWEST_BYTES_S = 60.0, 5e6  # of the child: s, and bytes/s of the slowest disk; chosen
+_SETTLED_S = 2.0  # after the last change: longer than a tick of any file system (2 s on FAT)
 
 _known: dict[tuple[Path, int, int, int, int, int], str] = {}
 """Results by path, device, inode, size and times of a file."""

@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -20,9 +19,10 @@ from rig.recording.blocks import LARGEST_PAYLOAD, MAGIC, TWICE, BlockKind
 from rig.recording.header import Header, packed
 from rig.recording.journal_blocks import Tail
 from rig.recording.journal_contents import JournalContents
+from rig.system.closing import Closing
 from rig.system.locking import synchronise_folder
 
-_ROWS_BLOCK_BYTES = 2**20
+_ROWS_BLOCK_BYTES = 2**20  # of rows in a block; chosen: little is lost with a damaged one
 
 
 def journal_path(output: str | Path) -> Path:
@@ -44,7 +44,7 @@ def damaged_path(path: Path) -> Path:
     return next(candidate for candidate in candidates if not candidate.exists())
 
 
-class JournalWriter:
+class JournalWriter(Closing):
     """Appends to one journal; a context manager. Made by ``create`` or ``reopen``, and alone on its file until closed.
 
     Rows, points and events belong to a part: ``part`` comes first, ``end`` closes it. All methods raise
@@ -176,14 +176,6 @@ class JournalWriter:
                 self._synchronise()
         finally:
             self._blocks.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _append_to_part(self, kind: BlockKind, payload: bytes) -> None:
         if not self._in_part:

@@ -4,8 +4,7 @@ from array import array
 from bisect import bisect_right
 from io import BufferedReader
 from pathlib import Path
-from types import TracebackType
-from typing import Self, cast
+from typing import cast
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from rig.recording.header import Header
 from rig.recording.journal_blocks import Tail, read_journal
 from rig.recording.parts import Part, missing_rows, rows_at_once
 from rig.recording.stored import End, Event, Information, StoredPoint
+from rig.system.closing import Closing
 
 MISSING = -1
 """Offset of rows that cannot be read."""
@@ -22,7 +22,7 @@ MOST_TOLD = 20
 """Gaps of a part that are reported one by one."""
 LARGEST_RATIO = 200
 """Bytes of missing rows that are accepted per byte of the journal."""
-_SMALL_BYTES = 2**26
+_SMALL_BYTES = 2**26  # of missing rows that are accepted of any journal; chosen
 
 
 class JournalPart(Part):
@@ -83,7 +83,7 @@ class JournalPart(Part):
         return values
 
 
-class JournalContents:
+class JournalContents(Closing):
     """Header, parts and tail of a journal; a context manager that holds the journal open for reading.
 
     Rows stay in the file; points, events and eight bytes twice per block of rows are held. Rows in a block that cannot be
@@ -189,11 +189,3 @@ class JournalContents:
     def close(self) -> None:
         """Close the file; may be called twice."""
         self._stream.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 from rig.errors import RecordingError
 from rig.recording.conversion import check_continuation
@@ -17,6 +16,7 @@ from rig.recording.journal_contents import JournalContents
 from rig.recording.parts import Part
 from rig.recording.stored import ChannelTable, Configuration, PlanTable, StoredPoint
 from rig.recording.stored_value_checks import check_stored_values
+from rig.system.closing import Closing
 from vibrolock.results import Result
 
 
@@ -31,7 +31,7 @@ class RecordedPlan(NamedTuple):
     """Numbers in this recording of the points that it asks for, in its order; ``None``: 0, 1, 2 and so on."""
 
 
-class Recording(Result):
+class Recording(Result, Closing):
     """The recording ``OUT.h5``: from the HDF5 file, from the journal beside it, or from both; nothing is written.
 
     A context manager that holds the files open; rows are read when asked for, all else at once.
@@ -148,14 +148,6 @@ class Recording(Result):
     def close(self) -> None:
         """Close the files; may be called twice. Rows can no longer be read."""
         self._stack.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _holds_anything(journal: Path) -> bool:

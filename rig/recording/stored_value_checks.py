@@ -12,8 +12,8 @@ from vibrolock.printable import shown
 
 LARGEST_NUMBER = 1e100
 """A finite number beyond it is no measurement; its square could be no number any more."""
-_LARGEST_INTEGER = 2**63
-_DEEPEST = 32
+_LARGEST_INTEGER = 2**63  # what a signed integer of 8 bytes cannot hold
+_DEEPEST = 32  # levels of nested values; chosen: ours have five
 _COUNTS = ("number", "sample", "row", "stride", "first_sample", "end_sample")
 _TEXTS = ("what", "text", "reason", "quality", "level_unit")
 _TRUTHS = ("accepted", "tripped", "completed")

@@ -13,7 +13,7 @@ from rig.system.child import confine
 if TYPE_CHECKING:
     import h5py
 
-_AT_ONCE = 2**22
+_AT_ONCE = 2**22  # bytes that are read at a time; chosen
 
 
 class Verdict(TypedDict):

@@ -61,11 +61,11 @@ ROW = np.dtype(
 )
 """Scalar part of a telemetry row. Output, phase, frequency and command are those on the converter at that instant."""
 
-SATURATED = 1
-FREQUENCY_CLAMPED = 2
-SENSOR_AT_RANGE = 4
-HELD = 8
-DEVICE_SHIFT = 16
+SATURATED = 1  # flag: the output stood at its limit
+FREQUENCY_CLAMPED = 2  # flag: the frequency stood at an end of its window
+SENSOR_AT_RANGE = 4  # flag: an input was near its range
+HELD = 8  # flag: a law held its level
+DEVICE_SHIFT = 16  # bits by which the flags of the device are shifted
 SAMPLE_LOST = LOST << DEVICE_SHIFT
 
 ROW_COLUMNS: tuple[dict[str, str], ...] = (

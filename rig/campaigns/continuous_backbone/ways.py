@@ -15,8 +15,8 @@ from rig.campaigns.evaluation.vibrations import WHY
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 
 WAYS = ("up", "down")
-FEWEST_INSTANTS = 16
-PIECE_PERIODS = FEWEST_PERIODS + 6.0
+FEWEST_INSTANTS = 16  # of a way, for its smoothed properties; chosen
+PIECE_PERIODS = FEWEST_PERIODS + 6.0  # of a piece whose force is judged: the fewest, and room at its ends; chosen
 
 
 @dataclass(frozen=True)

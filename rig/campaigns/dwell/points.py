@@ -1,7 +1,7 @@
 """Means of a dwell: their contents, their evaluation from recorded rows, and changes that raise an alarm or end the test."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.dwell.plan import DwellPlan
 from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point
+from rig.campaigns.evaluation.drift import relative_change
 from rig.campaigns.evaluation.lost_samples import rms_of_force
 from rig.campaigns.evaluation.point import PART, Point, vibration_of
 from rig.campaigns.evaluation.recorded import accepted_points, specimen_of
@@ -121,7 +122,7 @@ def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[ob
     before, now = _watched(plan, first), _watched(plan, point)
     alike = (one for one in known if one.accepted and _mode_shape(one) == _mode_shape(point))
     before["damping"] = _watched(plan, next(alike, point))["damping"]
-    changes = {name: _change(before[name], now[name]) for name in now}
+    changes = {name: relative_change(before[name], now[name]) for name in now}
     result = replace(
         result,
         changes=Changes(
@@ -168,10 +169,6 @@ def _cycles(point: Point[object]) -> float:
     return (point.settle_periods or 0.0) if length is None else length.cycles_in_mean
 
 
-def _change(first: float | None, now: float | None) -> float | None:
-    return None if not first or now is None else now / first - 1.0
-
-
 def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> Iterator[str]:
     """Yield a sentence for each change beyond its limit in the plan's table ``name``."""
     limits = getattr(plan, name)
@@ -213,13 +210,13 @@ def recorded_course(recording: Recording) -> DwellCourse:
     vibrations = [vibration_of(point) for point in points]
     results, modal = [point.result for point in points], [point.modal for point in points]
     return DwellCourse(
-        cycles=_column(None if result is None else result.cycles for result in results),
-        time_s=_column(None if result is None else result.time_s for result in results),
-        frequency_hz=_column(vibration.frequency_hz for vibration in vibrations),
-        modal_frequency_hz=_column(None if one is None else one.modal_frequency_hz for one in modal),
-        damping_ratio=_column(None if one is None else one.damping_ratio for one in modal),
-        amplitude_m=_column(vibration.amplitude_m for vibration in vibrations),
-        force_n=_column(vibration.force_n for vibration in vibrations),
+        cycles=np.array([None if result is None else result.cycles for result in results], float),
+        time_s=np.array([None if result is None else result.time_s for result in results], float),
+        frequency_hz=np.array([vibration.frequency_hz for vibration in vibrations], float),
+        modal_frequency_hz=np.array([None if one is None else one.modal_frequency_hz for one in modal], float),
+        damping_ratio=np.array([None if one is None else one.damping_ratio for one in modal], float),
+        amplitude_m=np.array([vibration.amplitude_m for vibration in vibrations], float),
+        force_n=np.array([vibration.force_n for vibration in vibrations], float),
         specimen=specimen_of(recording),
     )
 
@@ -228,11 +225,6 @@ def _table(recording: Recording) -> Contents:
     course = vars(recorded_course(recording))
     arrays = {name: values for name, values in course.items() if name != "specimen"}
     return Contents("dwell", course["specimen"], arrays, {"specimen": course["specimen"]}, dict.fromkeys(arrays, 0))
-
-
-def _column(values: Iterable[float | None]) -> NDArray[np.float64]:
-    """Return the values as an array, with NaN for None."""
-    return np.array([np.nan if value is None else value for value in values], float)
 
 
 DWELL = Campaign(

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 WARNED = 2.0  # a nonlinear mode's shape changes by some per cent
 CHANGED = 1.5  # the same against what was measured before in the same run
-REFUSED = 4.0
+REFUSED = 4.0  # factor: a sensitivity that is wrong by 12 dB; chosen
 WARNED_DEG = 5.0  # shipped rigs stay below 0.4 degrees, with friction as well
-REFUSED_DEG = 45.0
+REFUSED_DEG = 45.0  # chosen: beyond it the held phase is no resonance any more
 ALIKE = 1.5  # ratios within this factor, up or down, count as equal: the channels share one cause
 ALIKE_DEG = 15.0  # the same for turns: within this of their mean
 

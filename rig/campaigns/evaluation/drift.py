@@ -38,7 +38,7 @@ def drift_of(points: Iterable[Point[object]]) -> Drift | None:
     if first is None or again is None or not (first.accepted and again.accepted):
         return None
     before, now = _quantities(first), _quantities(again)
-    changes = {name: _change(before.get(name), now.get(name)) for name in ("frequency", "damping", "amplitude")}
+    changes = {name: relative_change(before.get(name), now.get(name)) for name in ("frequency", "damping", "amplitude")}
     return cast(Drift, {"first": first.number, "again": again.number, **changes})
 
 
@@ -57,5 +57,6 @@ def _same(point: Point[object], again: Point[object]) -> bool:
     return wanted == found
 
 
-def _change(first: float | None, again: float | None) -> float | None:
+def relative_change(first: float | None, again: float | None) -> float | None:
+    """Return the relative change of a quantity; None if one of its values is missing, or the first is 0."""
     return None if not first or again is None else again / first - 1.0

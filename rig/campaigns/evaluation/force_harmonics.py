@@ -6,9 +6,9 @@ from controller.harmonics import harmonic_ratios
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.planning.plan import Plan, Target
+from rig.tick.tick import NEGLIGIBLE_BITS
 
-NEGLIGIBLE_BITS = 0.1  # of the converter: an error that always counts as none
-SIGMAS = 3.0
+SIGMAS = 3.0  # standard errors beyond which a harmonic counts as off; the usual choice
 
 
 def with_force_harmonics(

@@ -7,8 +7,8 @@ import numpy as np
 from rig.bench import Bench
 from rig.campaigns.evaluation.rows import Rows, std_of, stretches
 from rig.tick.layout import SAMPLE_LOST
+from rig.tick.sequencer.repetition import LARGEST_LOST
 
-LARGEST_LOST = 0.05  # of a record's samples
 LARGEST_LOST_WITHIN = (
     0.02  # of the window of an instant: a gap is filled from the periods beside it, which are in the window
 )

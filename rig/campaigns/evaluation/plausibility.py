@@ -48,7 +48,7 @@ from rig.campaigns.evaluation.point import Point, Quality, vibration_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 
-REVERSED_DEG = 135.0
+REVERSED_DEG = 135.0  # from here on a turn counts as a wrong sign; halfway between 90 and 180
 SWAPPED = 0.1  # deviation of sizes, as a logarithm, from which it is asked whether two channels are swapped
 SWAPPED_FITS = 0.3  # of that deviation; two channels are called swapped if exchanging them leaves less
 ALLOWANCE = 0.1  # of the largest mode shape: other modes, cross-talk, a sensor some millimetres out of place

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.signals import spans, unwrapped
 
-_TURN = 2.0 * math.pi
+_TURN = 2.0 * math.pi  # rad
 
 
 class Rows(Protocol):

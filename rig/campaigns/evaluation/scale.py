@@ -19,8 +19,8 @@ from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 
-WARNED = 1.5
-REFUSED = 3.0
+WARNED = 1.5  # factor; chosen: damping that differs this much is warned of as well
+REFUSED = 3.0  # factor; chosen: no damping of a mode changes this much at the start
 MORE_DAMPING = 2.0  # growth of the damping from a check to a first level that is not refused
 STEADY = 0.5  # rate of growth over that of a decay by the damping of the check
 OF_RESONANCE = 0.5  # sine of the lag below which the mode alone does not determine the motion per newton

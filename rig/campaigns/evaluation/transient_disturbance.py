@@ -11,7 +11,7 @@ from rig.campaigns.evaluation.rows import Rows, stretches
 STANDS_OUT = (
     4.0  # times the usual change from period to period; noise in a whole period, or a lasting beat, stays below 2
 )
-FEWEST_PERIODS = 4
+FEWEST_PERIODS = 4  # for a median of changes from period to period; chosen
 
 
 def refused_for_a_transient(point: Point[object], bench: Bench, rows: Rows, faults: int, steady: bool) -> bool:

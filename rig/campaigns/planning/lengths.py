@@ -13,7 +13,7 @@ LONGEST_DAYS = 100.0
 """Longest duration of a whole plan if every point takes the longest time allowed for settling."""
 MOST_ROWS = 100_000_000
 """Most samples of one record, which is held in memory until it is evaluated: five hours at 5000 samples/s."""
-_DAY_S = 86400.0
+_DAY_S = 86400.0  # seconds of a day
 _KEYS = {
     SegmentKind.RAMP: ("ramp_periods", "level_ramp_periods", "approach_periods", "ramp_s", "silent_s"),
     SegmentKind.SETTLE: ("settle.longest_periods",),

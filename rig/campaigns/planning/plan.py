@@ -4,7 +4,6 @@ import math
 from abc import abstractmethod
 from typing import Literal, Self
 
-import numpy as np
 from pydantic import AliasChoices, Field, model_validator
 
 from controller import AmplitudeLaw, Law, OpenLoop
@@ -14,6 +13,7 @@ from rig.bench.configuration import Configured
 from rig.campaigns.planning.levels import Levels
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz
+from vibrolock.arrays import Float
 
 MOST_POINTS = 10_000
 """Most points of a plan, including repeats and both directions: at ten seconds a point, more than a day. See also
@@ -148,7 +148,7 @@ class Plan(Configured):
             return 1
         return max(1, round(self.telemetry_s * sample_rate_hz))
 
-    def waveforms(self, sample_rate_hz: float) -> np.ndarray | None:
+    def waveforms(self, sample_rate_hz: float) -> Float | None:
         """Return the waveforms of unit peak that the segments play, float64[n, period]; None if they play none."""
         return None
 

@@ -48,18 +48,7 @@ from vibrolock.one_thread import one_thread
 EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
 UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED, Outcome.NOT_SETTLED}
-OVER = {
-    Outcome.DONE,
-    Outcome.NOT_SETTLED,
-    Outcome.DISTURBED,
-    Outcome.LOST_LOCK,
-    Outcome.UNREACHABLE,
-    Outcome.OUTSIDE_WINDOW,
-    Outcome.NOT_LOCKED,
-    Outcome.OUTPUT_HELD,
-    Outcome.OUTPUT_CONTINUED,
-    Outcome.SAMPLES_LOST,
-}
+OVER = {*Outcome} - {Outcome.PENDING, Outcome.RUNNING, Outcome.SKIPPED, Outcome.INTERRUPTED}
 
 
 P = ParamSpec("P")

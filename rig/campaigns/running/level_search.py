@@ -18,7 +18,7 @@ from rig.campaigns.running.runner import resume_run, run_plan
 from rig.recording.reader import Recording
 
 FIRST = 1e-3  # of the largest voltage, RMS
-LARGEST_RISE = 4.0
+LARGEST_RISE = 4.0  # factor from one level to the next; chosen: 12 dB
 
 
 class MultisineSeries:

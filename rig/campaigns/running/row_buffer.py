@@ -8,7 +8,7 @@ import numpy as np
 from rig.campaigns.evaluation.rows import LongRows, Rows, Spool
 from rig.errors import RecordingError
 
-IN_MEMORY_BYTES = 32 * 2**20
+IN_MEMORY_BYTES = 32 * 2**20  # bytes of rows in memory; more go to files; chosen
 
 
 class RowBuffer:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -79,17 +79,12 @@ def run_plan(plan: Plan, bench: Bench, output: Path, options: RunOptions | None 
                 started=datetime.now(UTC).isoformat(timespec="seconds"),
                 seed=seed,
             )
-            settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz), _checked(facts))
             _refuse_stopped(live)
-            with (
-                back_up(output),
-                _unless_empty(JournalWriter.create(journal_path(output), header)) as journal,
-                _started(session, settings, output) as loop,
-            ):
-                folder = output.absolute().parent
-                execution = Execution(plan, bench, loop, journal, options.progress, None, folder, live, _checked(facts))
-                execution.run({"first_sample": 0, "seed": seed, "about": {**facts, "lead_samples": _lead(loop)}})
-        return _with_further_attempts(_whole(output, options.progress), execution, options, facts, live)
+            run = _Run(plan, bench, output, options, live)
+            with back_up(output):
+                journal = partial(JournalWriter.create, journal_path(output), header)
+                execution = run.measure(session, journal, {"first_sample": 0, "seed": seed, "about": facts})
+        return run.with_further_attempts(_whole(output, options.progress), execution, facts)
 
 
 @ended_in_order()
@@ -133,7 +128,6 @@ def resume_run(
         options = _still_checked(recording, left.bench, _still_rehearsed(recording, options))
     plan, bench = left.plan, left.bench
     if left.to_measure:
-        segments = plan.segments(bench.sample_rate_hz, left.done)
         if not trust_code:
             refuse_code(bench, output.name)
         with _published(plan, bench, output, options) as live:
@@ -141,11 +135,10 @@ def resume_run(
                 live.line("point", stored(point))
             with open_session(bench, drawn, realtime=options.realtime) as session:
                 facts = _facts(plan, bench, session, options)
-                settings = tick_settings(plan, bench, segments, _checked(facts))
                 _refuse_stopped(live)
-                begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
-                execution = _further_part(output, session, settings, begin, {**information, "about": facts})
-            return _with_further_attempts(_whole(output, progress), execution, options, facts, live)
+                run = _Run(plan, bench, output, options, live)
+                execution = run.measure(session, run.further_journal, {**information, "about": facts}, before)
+            return run.with_further_attempts(_whole(output, progress), execution, facts)
     count = "the one point" if len(left.done) == 1 else f"all {len(left.done)} points"
     end = "" if finished else "; its end is written to the file"
     progress.remark(f"nothing is missing: {count} of the plan accepted, nothing is driven{end}")
@@ -171,78 +164,76 @@ def _still_checked(recording: Recording, bench: Bench, options: RunOptions) -> R
     return replace(options, check=_checked(recording.parts[-1].information.get("about", {})))
 
 
-def _further_part(
-    output: Path,
-    session: Session,
-    settings: TickSettings,
-    begin: Callable[[RunningLoop, JournalWriter], Execution],
-    information: Information,
-) -> Execution:
-    """Measure in a new part of a recording; ``begin`` makes its execution, ``information`` is what the part says of itself."""
-    columns = [Column(**column) for column in ROW_COLUMNS]
-    rows = recorded_row(len(settings.bench.channels))
-    with (
-        _unless_empty(continue_recording(output, row_dtype=rows, columns=columns)) as journal,
-        _started(session, settings, output) as loop,
-    ):
-        execution = begin(loop, journal)
-        execution.run({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
-    return execution
+@dataclass(frozen=True)
+class _Run:
+    """A plan on its way into a recording, part by part."""
 
+    plan: Plan
+    bench: Bench
+    output: Path
+    options: RunOptions
+    live: Live
 
-def _with_further_attempts(
-    recording: Recording, execution: Execution, options: RunOptions, facts: About, live: Live
-) -> Recording:
-    """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
+    def measure(
+        self,
+        session: Session,
+        journal: Callable[[], JournalWriter],
+        information: Information,
+        before: MeasuredBefore | None = None,
+    ) -> Execution:
+        """Measure in a new part what ``before`` has left; ``information`` is what the part says of itself."""
+        before = before or MeasuredBefore()
+        checked = _checked(information["about"])
+        segments = self.plan.segments(self.bench.sample_rate_hz, before.done | before.given_up)
+        settings = tick_settings(self.plan, self.bench, segments, checked)
+        folder = self.output.absolute().parent
+        with _unless_empty(journal()) as writer, _started(session, settings, self.output) as loop:
+            execution = Execution(
+                self.plan, self.bench, loop, writer, self.options.progress, before, folder, self.live, checked
+            )
+            execution.run({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
+        return execution
 
-    They are approached as the plan says, as in a resumed run. The run stays armed. It ends when no such point is left, or none
-    with attempts left, and where the device has latched meanwhile: only a person clears that.
-    """
-    plan, bench, output, progress = execution.plan, execution.bench, recording.path, options.progress
-    while again := execution.to_repeat:
-        if not live.another_part():
-            progress.remark("nothing is measured again: a stop was requested")
-            break
-        with recording:
-            before = execution.measured_before_repeat(recording.points)
-            seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before
-            first_sample = recording.n_rows
-        with open_session(bench, seed, realtime=options.realtime) as session:
-            if session.latched:
-                progress.remark(
-                    f"nothing is measured again: {session.latched}; `rig resume {output}` goes on once armed"
-                )
-                return Recording(output)
-            if live.stop_requested:  # while the device was opened
-                return Recording(output)
-            names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
-            progress.remark(f"repeating point {names}: the disturbance may be over")
-            try:
-                choice = settled_queue(plan, bench, session, options)
-            except ConfigurationError as error:
-                progress.remark(f"nothing is measured again: {error}")
-                return Recording(output)
-            about = with_queue({**facts, "device": session.identity}, choice)
-            information: Information = {"first_sample": first_sample, "seed": seed, "about": about}
-            segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
-            settings = tick_settings(plan, bench, segments, _checked(facts))
-            begin = partial(_execution, plan, bench, progress, live, before, _checked(facts))
-            execution = _further_part(output, session, settings, begin, information)
-        recording = _whole(output, progress)
-    return recording
+    def further_journal(self) -> JournalWriter:
+        """Open the journal of a further part."""
+        columns = [Column(**column) for column in ROW_COLUMNS]
+        return continue_recording(self.output, row_dtype=recorded_row(len(self.bench.channels)), columns=columns)
 
+    def with_further_attempts(self, recording: Recording, execution: Execution, facts: About) -> Recording:
+        """Measure again, in a part of their own, the points that were refused for something that passes; return the recording.
 
-def _execution(
-    plan: Plan,
-    bench: Bench,
-    progress: Progress,
-    live: Live,
-    before: MeasuredBefore,
-    scale: CheckedScale | None,
-    loop: RunningLoop,
-    journal: JournalWriter,
-) -> Execution:
-    return Execution(plan, bench, loop, journal, progress, before, journal.path.absolute().parent, live, scale)
+        They are approached as the plan says, as in a resumed run. The run stays armed. It ends when no such point is left, or
+        none with attempts left, and where the device has latched meanwhile: only a person clears that.
+        """
+        progress = self.options.progress
+        while again := execution.to_repeat:
+            if not self.live.another_part():
+                progress.remark("nothing is measured again: a stop was requested")
+                break
+            with recording:
+                before = execution.measured_before_repeat(recording.points)
+                seed = (recording.seed or 0) + len(recording.parts)  # other noise than in the parts before
+                first_sample = recording.n_rows
+            with open_session(self.bench, seed, realtime=self.options.realtime) as session:
+                if session.latched:
+                    progress.remark(
+                        f"nothing is measured again: {session.latched}; `rig resume {self.output}` goes on once armed"
+                    )
+                    return Recording(self.output)
+                if self.live.stop_requested:  # while the device was opened
+                    return Recording(self.output)
+                names = ", ".join(str(execution.numbers[number] + 1) for number in sorted(again))
+                progress.remark(f"repeating point {names}: the disturbance may be over")
+                try:
+                    choice = settled_queue(self.plan, self.bench, session, self.options)
+                except ConfigurationError as error:
+                    progress.remark(f"nothing is measured again: {error}")
+                    return Recording(self.output)
+                about = with_queue({**facts, "device": session.identity}, choice)
+                information: Information = {"first_sample": first_sample, "seed": seed, "about": about}
+                execution = self.measure(session, self.further_journal, information, before)
+            recording = _whole(self.output, progress)
+        return recording
 
 
 def _published(plan: Plan, bench: Bench, output: Path, options: RunOptions) -> AbstractContextManager[Live]:

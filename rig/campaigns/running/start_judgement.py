@@ -17,7 +17,7 @@ from rig.campaigns.planning.plan import Plan, Target
 
 PERIODS = 10
 """Periods at the start voltage that are judged."""
-HARMONICS = 3
+HARMONICS = 3  # evaluated of the vibration at the start; chosen
 LONGEST = 300.0  # periods: largest extension of the start, for modes with little damping
 
 

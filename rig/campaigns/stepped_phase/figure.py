@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_THIN = 0.7
+_THIN = 0.7  # of the usual line width; chosen
 NEAR_DEG = 5.0  # of phase resonance: the point that is marked as resonant
 
 

@@ -13,7 +13,7 @@ from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
 
 FEWEST_PERIODS = 10  # the fundamental is a mean over two periods; fewer than ten show no variation of it
-LONGEST_S = 86400.0
+LONGEST_S = 86400.0  # one day
 
 
 class SweepPlan(TonePlan):

@@ -14,11 +14,11 @@ from rig.loop.worker.probe import Advice, DeviceReport, Settable, Tried, round_t
 from rig.loop.worker.queue_choice import covering_queue
 
 LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
-MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0
+MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0  # a first measurement, a try, the settings of the bench; chosen
 TRIES = 3  # of settings, each with twice the queue or a longer block
 MUCH_LONGER = 4  # times the block, where the rate is not reached
-RATE_TRIES = 2
-LONGER_BLOCKS = (2, 5, 10, 20, 50, 100, 200, 500, 1000)
+RATE_TRIES = 2  # of sample rates; chosen
+LONGER_BLOCKS = (2, 5, 10, 20, 50, 100, 200, 500, 1000)  # samples, tried where a device refuses the block of the bench
 LONGEST_BLOCK_S = 0.2  # as `rig.bench.Bench` allows
 HIGHER = 1.05  # a largest rate that is not more than this many times the bench's is not tried
 

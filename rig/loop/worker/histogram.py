@@ -2,7 +2,7 @@
 
 import math
 
-PER_OCTAVE = 16
+PER_OCTAVE = 16  # bins: 4.4 % wide; chosen
 OCTAVES = 24  # 1 us to 16.8 s
 BINS = PER_OCTAVE * OCTAVES + 2  # one bin below the range, one above
 LARGEST = BINS

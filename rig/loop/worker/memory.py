@@ -17,10 +17,10 @@ from rig.bench import Bench
 from rig.loop.worker.histogram import WORDS, Histogram
 from rig.tick.layout import ROW, TickArrays
 
-CHUNK_S = 0.02
-ALIGNMENT = 64
+CHUNK_S = 0.02  # of telemetry that is handed over at a time; chosen
+ALIGNMENT = 64  # bytes: a cache line
 STOP, TAKEN, PUBLISHED, RELEASE_START, START_JUDGED = range(5)
-CONTROL_WORDS = 8
+CONTROL_WORDS = 8  # of eight bytes before the histograms; five are used
 TIMES = ("wake_up", "execution", "response")
 """Times counted for every block: delay of the block's start, duration, and the sum of both."""
 CONSTANTS = 7  # of the fields of `TickArrays`, the first are constants of the run

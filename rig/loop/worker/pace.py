@@ -9,7 +9,7 @@ from rig.daq import DAQ
 
 DRIFT = 2e-4  # the clocks of host and device differ by less
 WINDOW_S = 0.2  # if no block is on time for so long, the device's clock counts as stopped for a while
-WINDOW_BLOCKS = 20
+WINDOW_BLOCKS = 20  # at least in such a window; chosen
 
 _now = time.monotonic_ns
 _sleep = time.sleep

@@ -17,7 +17,7 @@ from rig.loop.worker.histogram import Histogram
 from rig.loop.worker.pace import HostPace, pacing_of
 from rig.system.privileges import prepare
 
-SETTLE_BLOCKS = 10
+SETTLE_BLOCKS = 10  # exchanged before times count; chosen
 ROUNDING = 1e-9  # of the largest reading: a smaller difference is none
 KEPT_ROWS = 20_000  # of readings, for the smallest step between two
 

@@ -17,7 +17,7 @@ from rig.daq import DAQ, Adjustable
 from rig.loop.recommendation import RESERVE, Timing, milliseconds, queue_reason, shortest_queue
 from rig.loop.worker.probe import measured_timing
 
-MEASURED_S = 1.5
+MEASURED_S = 1.5  # for which 0 V is exchanged before a queue is chosen; chosen
 LONGEST_S = 0.1
 """Longest queue that is chosen, s, unless a block lasts longer."""
 SHORT_S = 0.01  # a delay that is allowed at any frequency

@@ -22,10 +22,10 @@ from rig.loop.worker.spawn import Worker, rebuilt
 from rig.text.json_values import JsonObject
 from rig.tick.tick import TickSettings
 
-RING_S = 10.0
-LONGEST_SILENCE_S = 10.0
-HUNG_S = 0.5
-TIMEOUT_S = 5.0
+RING_S = 10.0  # of rows that wait for a late campaign; chosen
+LONGEST_SILENCE_S = 10.0  # until a loop process counts as hanging; chosen
+HUNG_S = 0.5  # beyond the ramp until a hanging process is killed; chosen
+TIMEOUT_S = 5.0  # beyond the ramp for a process to end; chosen
 
 
 class WorkerLoop:

@@ -30,8 +30,8 @@ SAMPLES_PER_PERIOD = 25
 """Samples per period of the highest excited frequency. The paper has 22.9 and 28.4."""
 FEWEST_SAMPLES_PER_PERIOD = 2.5
 """Fewest samples per period of the highest excited frequency. With fewer, the anti-alias filter cuts off its lines."""
-_SAME_RATIO = 1e-12
-_ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)
+_SAME_RATIO = 1e-12  # relative difference of ratios that is rounding
+_ROUND = (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)  # leading digits of a round sample rate
 
 
 def kinds_with_experiments() -> tuple[str, ...]:

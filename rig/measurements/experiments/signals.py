@@ -13,7 +13,7 @@ from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 
 SKEW_EDGE = 32
 """Samples at either end of a record that are spoilt when a fraction of a sample of skew is removed, in addition to the skew."""
-_KAISER_BETA = 8.6
+_KAISER_BETA = 8.6  # of the window: side lobes 90 dB down
 _RESTORED = 10.0
 """Multiple of a sensor's corner from which on its high-pass is removed from records that are not periodic."""
 _HELD_AT_ZERO = ("velocity", "acceleration")

@@ -9,9 +9,9 @@ from rig.bench import Bench
 from rig.tick.safety.response_plausibility import EXPECTED, VISIBLE
 
 # Only amplitudes above JUDGED times the smallest readable amplitude plus NOISES times the channel's RMS noise are judged.
-JUDGED = 16.0
-NOISES = 8.0
-TOLD_APART = 3.0
+JUDGED = 16.0  # bits of the converter from which the exciter is judged; chosen
+NOISES = 8.0  # standard deviations of noise from which it is judged; chosen
+TOLD_APART = 3.0  # standard errors; chosen
 FLOOR_PART = 0.025  # of the largest voltage: an output that is always allowed
 
 

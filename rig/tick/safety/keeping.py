@@ -21,7 +21,7 @@ import numpy as np
 from vibrolock.compiled import Record, kernel
 
 FAR = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
-FAR_PERIODS = 2
+FAR_PERIODS = 2  # in a row that trip; chosen: one may be a ramp that overshoots
 ARRIVED = 1.5  # times a lower level; what is held has reached it below
 SHAKEN_PERIODS = (
     10  # after a lock in which a level still counts: an amplifier that jumps in a ramp shakes the lock off at once
@@ -29,8 +29,8 @@ SHAKEN_PERIODS = (
 MOVES_MORE = 1.5  # times the motion that the last check foretells; from there on the force counts, too
 AT_RESONANCE = 0.9  # sine of the lag from which on the last check foretells force and motion
 
-LARGEST_CHANGE = 3.0
-CHANGED_PERIODS = 10
+LARGEST_CHANGE = 3.0  # factor of the gain that trips whatever the level explains; chosen
+CHANGED_PERIODS = 10  # in a row that trip; chosen
 NEAR = 0.1  # of its level; what is held is in order within it
 IN_ORDER_PERIODS = 10  # in order in a row, after which the output of a level is known
 COMPARED = 0.7  # sine of a lag below which levels are not compared: exciter and structure may cancel each other there

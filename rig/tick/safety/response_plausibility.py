@@ -18,7 +18,7 @@ LARGEST_RISE = 2.0  # largest output over the output that last sufficed; this al
 CREEP = 1.05  # a period: largest rise of the reference output while the held quantity stays at its level
 OUT_OF_BAND_RISE = 1.5  # rise of the output from which a held quantity that does not follow counts as astray
 OUT_OF_BAND_PART = 0.5  # of its reference; a held quantity below it is astray from a rise of RISEN on
-OUT_OF_BAND_PERIODS = 10
+OUT_OF_BAND_PERIODS = 10  # that trip; chosen: a vibration that builds up recovers earlier
 RISEN = 1.2  # rise from which the output counts as risen; a force that sags during build-up needs no more output
 IN_ORDER = 0.9  # of its level; a held quantity above it follows
 SAGGED = 0.75  # of its level; a force may sag to it while the vibration builds up
@@ -29,7 +29,7 @@ JUMPED = (
 )
 VANISHED = 0.15  # of its level; a jump past a turning point leaves more force than this
 VISIBLE = 8.0  # times the smallest amplitude whose phase can be read: about three bits of the converter
-SILENT_PERIODS = 40
+SILENT_PERIODS = 40  # that trip; chosen
 UNLIKE = (
     0.6  # deviation of sent from needed output, over the largest of the output sent and the terms of the known exciter
 )

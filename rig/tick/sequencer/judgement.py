@@ -17,8 +17,8 @@ UNREACHABLE = int(Outcome.UNREACHABLE)
 OUTSIDE_WINDOW = int(Outcome.OUTSIDE_WINDOW)
 NOT_LOCKED = int(Outcome.NOT_LOCKED)
 
-SATURATED_PERIODS = 20
-CLAMPED_PERIODS = 20
+SATURATED_PERIODS = 20  # in a row at the voltage limit after which a level is out of reach; chosen
+CLAMPED_PERIODS = 20  # in a row at an end of the window after which there is no lock; chosen
 FAR_PERIODS = (
     100  # longer than a lightly damped mode decays; a lock that swings at constant voltage comes near within that
 )
@@ -27,7 +27,7 @@ LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this mul
 SETTLE_RULE = np.dtype([("phase_rad", "f8"), ("amplitude", "f8"), ("average_periods", "i8"), ("settled_periods", "i8")])
 """The settle rule (one record); see `judge_period`."""
 
-LONGEST_AVERAGE = 64
+LONGEST_AVERAGE = 64  # periods that the ring holds
 
 SETTLING = np.dtype(
     [

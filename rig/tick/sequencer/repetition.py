@@ -12,8 +12,8 @@ DONE = int(Outcome.DONE)
 OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
 SAMPLES_LOST = int(Outcome.SAMPLES_LOST)
 OUTPUT_CONTINUED = int(Outcome.OUTPUT_CONTINUED)
-LARGEST_HELD = 0.05
-LARGEST_CONTINUED = 0.25
+LARGEST_HELD = 0.05  # of the samples of a record; measured to do no harm
+LARGEST_CONTINUED = 0.25  # of the samples of a record; measured to do no harm
 LARGEST_LOST = 0.05
 """Parts of a record's samples; with more, it is refused."""
 MOST_ATTEMPTS = 6  # at a record, beyond the retries of the plan, while fewer of its samples are faulty each time
