@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Callable
-from typing import Protocol
 
 from rig.daq import DAQ
 
@@ -15,32 +14,32 @@ _now = time.monotonic_ns
 _sleep = time.sleep
 
 
-class Pace(Protocol):
-    """Waits for the blocks of a loop."""
+class Pace:
+    """Paces the blocks of a loop. This one is lockstep: the device waits for the host, and no block is due at any time."""
 
-    by_device: bool
+    by_device = True
     """Whether the device paces the loop."""
-    has_clock: bool
+    has_clock = False
     """Whether time goes on without the loop, so that it can be late."""
-
-    def wait(self) -> int:
-        """Wait until the next block is due and return the time then (monotonic clock, ns).
-
-        If `DAQ.exchange` waits, return 0 at once.
-        """
-
-    def release(self, begun_ns: int) -> int:
-        """Return when the block that began at ``begun_ns`` was due (monotonic clock, ns)."""
 
     def begin(self) -> None:
         """Start the clock."""
 
+    def wait(self) -> int:
+        """Wait until the next block is due and return the time then (monotonic clock, ns); 0 at once if the exchange waits."""
+        return 0
+
+    def release(self, begun_ns: int) -> int:
+        """Return when the block that began at ``begun_ns`` was due (monotonic clock, ns)."""
+        return begun_ns
+
     @property
     def skipped(self) -> int:
         """Number of whole periods skipped so far because the loop was late by more than a period."""
+        return 0
 
 
-class HostPace:
+class HostPace(Pace):
     """Absolute deadlines of the host's monotonic clock: block j is due j + 1 periods after the start. Waiting never spins.
 
     Missed whole periods are skipped and counted, because a burst of blocks would sample at wrong times.
@@ -82,7 +81,7 @@ class HostPace:
         return self._due
 
 
-class DevicePace:
+class DevicePace(Pace):
     """The device's clock: block j was due j periods after the earliest arrival that any block so far allows.
 
     Every block that arrives still earlier renews the earliest arrival. The earliest arrival also grows by 200 ppm of the time,
@@ -91,9 +90,7 @@ class DevicePace:
     clock has paused, and the reference is set anew.
     """
 
-    by_device = True
     has_clock = True
-    skipped = 0
 
     def __init__(self, period_s: float) -> None:
         self._period_ns = 1e9 * period_s
@@ -105,10 +102,6 @@ class DevicePace:
         """Take the next block as the first."""
         self._earliest = self._lately = math.inf
         self._number = 0
-
-    def wait(self) -> int:
-        """Return 0: the exchange waits."""
-        return 0
 
     def release(self, begun_ns: int) -> int:
         """Return when the block that arrived at ``begun_ns`` was due."""
@@ -122,25 +115,6 @@ class DevicePace:
                 self._earliest = self._lately
             self._lately = math.inf
         return min(begun_ns, int(due))
-
-
-class Lockstep:
-    """A device that waits for the host at every block: no clock runs, and no block is due at any time."""
-
-    by_device = True
-    has_clock = False
-    skipped = 0
-
-    def begin(self) -> None:
-        """Do nothing: there is no clock."""
-
-    def wait(self) -> int:
-        """Return 0, because the exchange waits."""
-        return 0
-
-    def release(self, begun_ns: int) -> int:
-        """Return the block's arrival time."""
-        return begun_ns
 
 
 def pacing_of(daq: DAQ) -> str:
@@ -158,6 +132,6 @@ def pace_of(daq: DAQ) -> Pace:
     paces: dict[str, Callable[[], Pace]] = {
         "host": lambda: HostPace(period_s),
         "device": lambda: DevicePace(period_s),
-        "lockstep": Lockstep,
+        "lockstep": Pace,
     }
     return paces[pacing_of(daq)]()

@@ -48,7 +48,7 @@ class BlockTimes:
 
     A *stall* is a block whose outputs are sent more than 1 ms after the block's release. In ``own_stalls`` the thread's own
     computing time since the previous block explains the delay; in the other stalls the thread was not running. Without a clock
-    (`rig.loop.worker.pace.Lockstep`) no block can be late, and only the duration of a block is counted.
+    (`rig.loop.worker.pace.Pace`) no block can be late, and only the duration of a block is counted.
     """
 
     def __init__(self, pace: Pace, memory: SharedMemory, deadline_ns: int) -> None:
