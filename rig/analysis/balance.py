@@ -42,26 +42,18 @@ class Balance:
 
     def constant_force(self, force_n: float, lags_deg: Float) -> PeriodicResponses:
         """Return the vibrations at a force over phase lags."""
+        rig, near_hz = self.subject.rig, self.subject.near_hz
         with configuration_errors():
             return constant_force_response(
-                self.subject.rig,
-                force_n,
-                lags_deg,
-                near_hz=self.subject.near_hz,
-                harmonics=self.harmonics,
-                samples=self.samples,
+                rig, force_n, lags_deg, near_hz=near_hz, harmonics=self.harmonics, samples=self.samples
             )
 
-    def forced(self, voltage_v: float, frequency_hz: Float) -> PeriodicResponses:
+    def forced(self, voltage_v: float, grid_hz: Float) -> PeriodicResponses:
         """Return the vibrations at a voltage, followed in the order of the frequencies."""
+        rig, near_hz = self.subject.rig, self.subject.near_hz
         with configuration_errors():
             return forced_response(
-                self.subject.rig,
-                voltage_v,
-                frequency_hz,
-                near_hz=self.subject.near_hz,
-                harmonics=self.harmonics,
-                samples=self.samples,
+                rig, voltage_v, grid_hz, near_hz=near_hz, harmonics=self.harmonics, samples=self.samples
             )
 
 

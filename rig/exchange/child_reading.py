@@ -47,12 +47,12 @@ def read_in_child(reader: str, path: Path, what: str, returns: type[T], **option
     with TemporaryDirectory(prefix="vibrolock-") as folder:
         timeout_s = _TIMEOUT_S + path.stat().st_size / _SLOWEST_BYTES_S
         try:
-            told = ask_child(
+            answer = ask_child(
                 "rig.exchange.process", reader, json.dumps(options), str(path), folder, timeout_s=timeout_s
             )
         except ChildFailed as error:
             raise ImportFailed(f"{path}: is no {what}, or a damaged one (reading it {error})") from None
-        if why := told.decode():
+        if why := answer.decode():
             raise ImportFailed(why if why.startswith(str(path)) else f"{path}: {why}")
         found = read_values(Path(folder))
     if not isinstance(found, returns):

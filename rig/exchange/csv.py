@@ -98,19 +98,19 @@ def table_of_ours(path: Path) -> StoredObject | None:
         rows = _matrix(csv.reader(islice(lines, 2, None)))
         arrays: dict[str, Array] = {}
         column = 0
-        for name, told in others["table"].items():
-            shape = list(told["shape"])
-            axis = told["axis"]
+        for name, stored in others["table"].items():
+            shape = list(stored["shape"])
+            axis = stored["axis"]
             trailing = [size for dimension, size in enumerate(shape) if dimension != axis]
-            width = int(np.prod(trailing, dtype=int)) * (2 if told["complex"] else 1)
+            width = int(np.prod(trailing, dtype=int)) * (2 if stored["complex"] else 1)
             block = rows[:, column : column + width]
             column += width
-            if told["complex"]:
+            if stored["complex"]:
                 block = block[:, ::2] + 1j * block[:, 1::2]
             arrays[name] = np.moveaxis(block.reshape(len(rows), *trailing), 0, axis)
         if column != rows.shape[1]:
             raise ValueError(f"{rows.shape[1]} columns, the comment tells of {column}")
-        arrays |= {name: _loose(told) for name, told in others["arrays"].items()}
+        arrays |= {name: _loose(stored) for name, stored in others["arrays"].items()}
         return StoredObject(first.removeprefix(_KIND).strip(), arrays, others["attributes"])
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, csv.Error) as error:
         raise ImportFailed(f"{path}: is a damaged or changed CSV file of ours ({error})") from None
@@ -128,9 +128,9 @@ def _matrix(rows: Iterable[Sequence[str]]) -> Float:
     return np.frombuffer(found).reshape(count, width)
 
 
-def _loose(told: Mapping[str, object]) -> Array:
-    values = np.array(told["values"])
-    return values[..., 0] + 1j * values[..., 1] if told["complex"] else values
+def _loose(stored: Mapping[str, object]) -> Array:
+    values = np.array(stored["values"])
+    return values[..., 0] + 1j * values[..., 1] if stored["complex"] else values
 
 
 def _lines(path: Path) -> Iterator[str]:
@@ -151,19 +151,19 @@ def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Float]:
     for anything that is not a number, for rows of unequal length, and for decimal commas unless the layout has them.
     """
     lines = islice(table_lines(path), 0 if layout is None else layout.skip_lines, None)
-    told = None if layout is None else layout.names
-    first = list(islice(lines, 2 if told is None else 1))
-    if len(first) < (2 if told is None else 1):
+    names_given = None if layout is None else layout.names
+    first = list(islice(lines, 2 if names_given is None else 1))
+    if len(first) < (2 if names_given is None else 1):
         raise ImportFailed(f"{path}: holds no table; wanted is a line of names, then rows of numbers")
     comma = _separator(first, layout)
-    names = [name.strip() for name in (_cells(first[0][1], comma) if told is None else told)]
-    if told is None and (len(set(names)) < len(names) or any(_number(name) is not None for name in names)):
+    names = [name.strip() for name in (_cells(first[0][1], comma) if names_given is None else names_given)]
+    if names_given is None and (len(set(names)) < len(names) or any(_number(name) is not None for name in names)):
         raise ImportFailed(
             f"{path}: the first line must name every column, each differently; it is '{first[0][1][:60]}'"
         )
     point = "." if layout is None else layout.decimal
     rows = array("d")
-    for number, line in chain(first[1 if told is None else 0 :], lines):
+    for number, line in chain(first[1 if names_given is None else 0 :], lines):
         cells = _cells(line, comma)
         values = [_number(cell if point == "." else cell.replace(",", ".")) for cell in cells]
         if not rows and _is_units(cells, values):

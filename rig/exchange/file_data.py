@@ -71,14 +71,11 @@ class FileData:
 
 @dataclass(frozen=True, eq=False)
 class StoredObject:
-    """An object of this program as a MAT or CSV file holds it."""
+    """An object of this program as a MAT or CSV file holds it: its kind, its arrays by name, and everything else."""
 
     kind: str
-    """Kind of the object."""
     arrays: dict[str, NDArray[np.generic]]
-    """Its arrays by name."""
     attributes: dict[str, object]
-    """Everything else."""
 
 
 def from_variables(values: dict[str, Value], units: Mapping[str, Value] | None = None) -> FileData:
@@ -108,9 +105,7 @@ def in_full(group: Mapping[str, Value], before: str = "") -> Iterator[tuple[str,
 
 @dataclass(frozen=True)
 class MappingText:
-    """Text of a proposed mapping."""
+    """Proposed mapping: TOML with comments, and the keys that are left to be filled in."""
 
     text: str
-    """TOML with comments."""
     missing: tuple[str, ...]
-    """Keys that are left to be filled in."""

@@ -41,5 +41,5 @@ def main(reader: str, options: dict[str, object], path: Path, folder: Path) -> s
 
 if __name__ == "__main__":
     confine(float(sys.argv[5]))
-    told = main(sys.argv[1], json.loads(sys.argv[2]), Path(sys.argv[3]), Path(sys.argv[4]))
-    sys.stdout.buffer.write(told.encode("utf-8", "backslashreplace"))
+    reason_given = main(sys.argv[1], json.loads(sys.argv[2]), Path(sys.argv[3]), Path(sys.argv[4]))
+    sys.stdout.buffer.write(reason_given.encode("utf-8", "backslashreplace"))

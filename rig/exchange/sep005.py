@@ -49,13 +49,13 @@ def data_of_series(series: Sequence[Mapping[str, object]]) -> FileData:
     records: dict[str, list[Float]] = {}
     units: dict[str, str] = {}
     for number, one in enumerate(series):
-        name, told = (_text(one, key, number) for key in ("name", "unit_str"))
+        name, given = (_text(one, key, number) for key in ("name", "unit_str"))
         try:
-            unit, factor = si_of(told, name)
+            unit, factor = si_of(given, name)
         except IdentificationError:
             unit, factor = "", 1.0
         if units.setdefault(name, unit) != unit:
-            raise ImportFailed(f"series[{number}].unit_str = {told!r}: {name} was in {units[name]!r} before")
+            raise ImportFailed(f"series[{number}].unit_str = {given!r}: {name} was in {units[name]!r} before")
         records.setdefault(name, []).append(_data(one, number) * factor)
     columns = {name: np.column_stack([r[: min(map(len, found))] for r in found]) for name, found in records.items()}
     channels = {name: ChannelFacts(name=name, unit=unit, in_si=True) for name, unit in units.items() if unit}

@@ -59,7 +59,7 @@ class TimeData:
 
 
 def series_of_records(records: TimeRecords) -> tuple[TimeData, ...]:
-    """Return the records of others as time data, one for each, numbered from 0."""
+    """Return imported records as time data, one for each, numbered from 0."""
     return tuple(
         TimeData(records.channels, one.samples, records.sample_rate_hz, point=number, specimen=records.specimen)
         for number, one in enumerate(records.records)

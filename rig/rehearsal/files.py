@@ -1,4 +1,4 @@
-"""Plans and benches as TOML: an improved plan with what was tried, and a twin that can be run by itself."""
+"""Plans and benches as TOML: an improved plan with the remedies that were tried, and a twin as a bench."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

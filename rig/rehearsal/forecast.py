@@ -15,22 +15,15 @@ MIN_DRAWS = 10  # least number of draws with a value for which quantiles are for
 
 @dataclass(frozen=True)
 class PointForecast:
-    """Forecast of one point; quantiles are empty where too few draws have a value."""
+    """Forecast of one point: level, probability that it is accepted, and quantiles (empty if few draws have a value)."""
 
     level: float
-    """Its level."""
     accepted: float
-    """Probability that it is accepted."""
     frequency_hz: tuple[float, ...] = ()
-    """Quantiles of the frequency, Hz."""
     force_n: tuple[float, ...] = ()
-    """Quantiles of the force, N."""
     amplitude_m: tuple[float, ...] = ()
-    """Quantiles of the displacement, m."""
     voltage_v: tuple[float, ...] = ()
-    """Quantiles of the output, V."""
     damping_ratio: tuple[float, ...] = ()
-    """Quantiles of the modal damping ratio."""
 
 
 @dataclass(frozen=True)

@@ -226,13 +226,27 @@ def rehearse(
     progress: Callable[[Draw, int], None] = lambda _draw, _done: None,
     jobs: int | None = None,
 ) -> Rehearsal:
-    """Run the plan on all twins and return what came of it.
+    """Run the plan on all twins.
 
-    With a ``journal`` every draw is written to it as it is done; a journal of the same rehearsal is taken up again, and it
-    stays until the caller removes it. That of another rehearsal is refused, or replaced to ``begin_anew``. ``progress`` is told
-    of each draw and of the number done. ``jobs`` is as in joblib: None follows `joblib.parallel_config`, so that a cluster is
-    one line of the caller. Raises `RecordingError` for a journal of another rehearsal, or one that cannot be written, and
-    `ConfigurationError` if not a single twin could be computed.
+    Parameters
+    ----------
+    request
+        Plan, bench, knowledge and number of twins.
+    journal
+        File to which every draw is appended. A journal of the same rehearsal is resumed; the caller removes it.
+    begin_anew
+        Whether a journal of another rehearsal is replaced rather than refused.
+    progress
+        Is called with each draw and the number of draws that are done.
+    jobs
+        Number of processes as in joblib; None follows `joblib.parallel_config`, with which a cluster is one line of the caller.
+
+    Raises
+    ------
+    RecordingError
+        For a journal of another rehearsal, or one that cannot be written.
+    ConfigurationError
+        If no twin could be computed.
     """
     done = {} if journal is None else _completed_draws(journal, request, begin_anew)
     for count, draw in enumerate(done.values(), 1):

@@ -1,1 +1,1 @@
-"""Readers of binary formats of others. They run in a process of their own (`rig.exchange.foreign.process`)."""
+"""Readers of binary formats of other programs; a child process runs them (`rig.exchange.process`)."""

@@ -1,6 +1,6 @@
 """HDF5 files of any layout as nested dictionaries; ``name@attribute`` beside a name holds its attributes.
 
-Links to other files, virtual and external datasets are not followed: a file from somebody else must not read other files.
+Links to other files, virtual and external datasets are not followed: a file from another program must not read other files.
 """
 
 from collections.abc import Iterator

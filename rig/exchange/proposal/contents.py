@@ -1,4 +1,4 @@
-"""What a file of somebody else holds: arrays by path, single numbers, lists of structures."""
+"""Contents of a file of another program: arrays by path, single numbers, lists of structures."""
 
 import re
 from collections.abc import Iterator, Mapping

@@ -1,6 +1,6 @@
-"""What arrays in a file may be: roles and units by name, dimensions by their values, sample rates, periods.
+"""Guesses on the arrays of a file: roles and units by name, dimensions by their values, sample rates, periods.
 
-Guesses are proposals. What cannot be told from names and numbers is left open.
+Guesses are proposals. What names and numbers do not show is left open.
 """
 
 import re
@@ -55,7 +55,7 @@ def is_time(name: str, values: NDArray[np.generic]) -> bool:
 def role_of(name: str, unit: str) -> tuple[str, str]:
     """Return role and unit of a channel by its name and the unit that the file tells.
 
-    The role is ``motion`` for drive or response and empty if it cannot be told, the unit ``1`` if it is unknown.
+    The role is ``motion`` for drive or response and empty if it is unknown, the unit ``1`` if it is unknown.
     """
     try:
         known = si_of(unit, name)[0] if unit else ""

@@ -173,8 +173,8 @@ def _rate(found: Sequence[FileContents], times: Sequence[Leaf]) -> tuple[float |
         steps = np.diff(times[0].values.astype(np.float64))
         return float(1.0 / steps.mean()), "", times[0].path
     for contents in found:
-        if (told := rate_in(contents.single)) is not None:
-            return told[1], told[0], ""
+        if (named := rate_in(contents.single)) is not None:
+            return named[1], named[0], ""
     return None, "", ""
 
 

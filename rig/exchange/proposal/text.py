@@ -96,21 +96,21 @@ def text_of(
 
 def _listed(found: Sequence[FileContents]) -> Iterator[str]:
     """Yield one comment for each thing in the files."""
-    told: list[tuple[str, str]] = []
+    listed: list[tuple[str, str]] = []
     for contents in found:
         before = f"{contents.records}[...]." if contents.records else ""
         for leaf in contents.arrays:
             shape = " x ".join(map(str, leaf.values.shape))
             unit = f", {leaf.unit}" if leaf.unit else ""
             where = f" (in {leaf.file})" if leaf.file else ""
-            told.append((f"{before}{leaf.path}", f"{shape}{unit}{where}"))
-        told += [(f"{before}{path}", f"{value:.10g}") for path, value in contents.single.items()]
-        told += [(f"{before}{path}", what) for path, what in contents.others.items()]
-    width = min(max((len(name) for name, _ in told), default=0), 40)
-    for name, what in told[:_MAX_LISTED]:
+            listed.append((f"{before}{leaf.path}", f"{shape}{unit}{where}"))
+        listed += [(f"{before}{path}", f"{value:.10g}") for path, value in contents.single.items()]
+        listed += [(f"{before}{path}", what) for path, what in contents.others.items()]
+    width = min(max((len(name) for name, _ in listed), default=0), 40)
+    for name, what in listed[:_MAX_LISTED]:
         yield f"#   {_one_line(name):<{width}}  {_one_line(what)}"
-    if len(told) > _MAX_LISTED:
-        yield f"#   and {len(told) - _MAX_LISTED} more"
+    if len(listed) > _MAX_LISTED:
+        yield f"#   and {len(listed) - _MAX_LISTED} more"
 
 
 def _sampling(proposal: Proposal) -> Iterator[str]:
@@ -161,11 +161,11 @@ def _common_axes(channels: Sequence[ProposedChannel]) -> tuple[str, ...]:
 def _channel(channel: ProposedChannel, axes: tuple[str, ...], *, full_scale: bool) -> Iterator[str]:
     leaf = channel.leaf
     known = bool(leaf.unit) and channel.unit == leaf.unit
-    told = "as the file tells" if known else "not known"
+    origin = "as the file tells" if known else "not known"
     yield "[[channels]]"
     yield f"name = {_quoted(channel.name)}"
     yield f"role = {_quoted(channel.role)}    # force, drive (motion where the force acts), response, monitor"
-    yield f"unit = {_quoted(channel.unit)}    # {told}"
+    yield f"unit = {_quoted(channel.unit)}    # {origin}"
     yield f"value = {_quoted(leaf.path)}"
     if leaf.file:
         yield f"file = {_quoted(leaf.file)}"

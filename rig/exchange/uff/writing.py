@@ -28,7 +28,7 @@ def write_uff(items: Sequence[Contents], path: Path, encoding: str = "") -> None
     """Write header, units (SI) and the datasets of all items to an empty file; may raise any error of pyuff.
 
     ``encoding`` of the functions (dataset 58) is ``ascii`` (12 digits; 6 for uneven abscissas) or ``binary`` (every bit); by
-    default time data are binary and all else is ASCII. Levels of frequency responses are told apart by the load case, from 1.
+    default time data are binary and all else is ASCII. Levels of frequency responses differ by their load case, from 1.
 
     Raises `RecordingError` for a kind that universal files cannot represent, and for NaN in a function.
     """
@@ -56,8 +56,8 @@ def _functions(items: Sequence[Contents], encoding: str) -> Iterator[Dataset]:
         level += item.kind == _MATRIX
         for dataset in _DATASETS.get(item.kind, _refused)(item):
             case = {"load_case_id": level} if several and item.kind == _MATRIX else {}
-            told = {"binary": int(encoding == "binary")} if encoding and dataset["type"] == 58 else {}
-            yield {**dataset, **case, **told}
+            encoded = {"binary": int(encoding == "binary")} if encoding and dataset["type"] == 58 else {}
+            yield {**dataset, **case, **encoded}
 
 
 def _head(items: Sequence[Contents]) -> list[Dataset]:
@@ -184,7 +184,7 @@ def _frequency_responses(item: Contents) -> Iterator[Dataset]:
         level = item.attributes["levels"][number]
         unit = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2"}[level["kind"]]
         x, force = item.arrays["frequency_hz"][rows], item.arrays["force"][rows]
-        told = _ascii(f"controlled {level['controlled']}, level {float(item.arrays['level'][number])!r}")
+        level_line = _ascii(f"controlled {level['controlled']}, level {float(item.arrays['level'][number])!r}")
         ratio = _function(
             FREQUENCY_RESPONSE, number + 1, level["label"], item, x, item.arrays["response"][rows] / force
         )
@@ -192,8 +192,8 @@ def _frequency_responses(item: Contents) -> Iterator[Dataset]:
         abscissa, drive = axis("abscissa", "Frequency", "Hz"), _at("rsp", "drive", (1, 3))
         ratio |= abscissa | axis("ordinate", level["kind"], unit) | axis("orddenom", "force", "N") | drive
         forces |= abscissa | axis("ordinate", "force", "N") | _at("rsp", "force", (1, 3)) | _nowhere("ref")
-        yield ratio | _at("ref", "force", (1, 3)) | {"id2": _ascii(level["specimen"]), "id5": told}
-        yield forces | {"id2": _ascii(level["specimen"]), "id5": told}
+        yield ratio | _at("ref", "force", (1, 3)) | {"id2": _ascii(level["specimen"]), "id5": level_line}
+        yield forces | {"id2": _ascii(level["specimen"]), "id5": level_line}
 
 
 def _modes(item: Contents) -> Iterator[Dataset]:
