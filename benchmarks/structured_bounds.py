@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from identification import Bound, StructuredModel, bound_of
 from rig.results.files import load
-from rig.results.structured.kind import IdentifiedStructured
+from rig.results.structured.model import IdentifiedStructured
 from vibrolock.arrays import Float
 
 HUNDRED, LEVELS, DECAYS = 100.0, 40, 12.0

@@ -18,11 +18,11 @@ from rig.cli.emulate import emulate
 from rig.cli.exchange import export_, import_
 from rig.cli.flags import with_flags
 from rig.cli.group import Group
-from rig.cli.identify import identify
+from rig.cli.identify import app as identify_app
 from rig.cli.list import list_
 from rig.cli.monitor import monitor
 from rig.cli.options import say_what_is_imported
-from rig.cli.predict import predict
+from rig.cli.predict import app as predict_app
 from rig.cli.rehearse import rehearse_
 from rig.cli.replay import replay_
 from rig.cli.report import report_
@@ -58,8 +58,8 @@ def _common(
 app.command("list")(list_)
 app.command()(new)
 app.command()(schema)
-app.command()(identify)
-app.command()(predict)
+app.add_typer(identify_app, name="identify")
+app.add_typer(predict_app, name="predict")
 app.command("import")(import_)
 app.command("export")(export_)
 app.command("tune")(tune_)

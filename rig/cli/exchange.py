@@ -24,8 +24,8 @@ def import_(
 ) -> None:
     """Bring in measurements, time data and modes from elsewhere."""
     from rig.exchange.reading import import_file
-    from rig.exchange.time_data import TimeData, records_of_series
     from rig.results.files import save
+    from rig.results.time_data.series import TimeData, records_of_series
 
     keep_existing([file], output, overwrite)
     found = import_file(file, format_, mapping, units=units, drive=drive, item=item)

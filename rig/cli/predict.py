@@ -1,142 +1,70 @@
 """``rig predict``: predict vibrations with models."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 import typer
 
+from rig.cli.kind_group import KindGroup, parameter, with_parameters
 from rig.cli.options import Json, Output, Overwrite, keep_existing, show_file
 
+_COMMON = (
+    parameter("model", Annotated[Path, typer.Argument(help="Model of one of the kinds that predict.")]),
+    parameter("output", Output),
+)
+_LAST = (parameter("overwrite", Overwrite, False), parameter("json", Json, False))
 
-def predict(
-    model: Annotated[Path, typer.Argument(help="Nonlinear mode, PNLSS model, structured model or force surface.")],
-    output: Output,
-    forces_n: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--frequency-response",
-            metavar="FORCE_N",
-            help="Predict the frequency response at this constant force; may be repeated.",
-        ),
-    ] = None,
-    voltages_v: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--voltage-response",
-            metavar="VOLT",
-            help="Predict the frequency response of a PNLSS or structured model at this constant voltage (peak), of its input "
-            "or of the exciter; may be repeated.",
-        ),
-    ] = None,
-    held: Annotated[
-        str | None,
-        typer.Option(
-            "--force",
-            help="What is constant: fundamental (peak), rms, or pure-sine. If left out: fundamental; of a PNLSS or structured "
-            "model driven by a force, and without an exciter, pure-sine.",
-        ),
-    ] = None,
-    sweeps: Annotated[
-        list[Path] | None, typer.Option("--sweep", help="Predict the sweeps of this recording; may be repeated.")
-    ] = None,
-    multisines: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--multisine",
-            help="Simulate the realisations of this recording with a PNLSS or structured model; may be repeated.",
-        ),
-    ] = None,
-    planned: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--planned-sweep", metavar="PLAN", help="Predict the sweeps of this plan, yet to be made; may be repeated."
-        ),
-    ] = None,
-    planned_multisines: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--planned-multisine",
-            metavar="PLAN",
-            help="Simulate the multisines of this plan, yet to be made, with a PNLSS or structured model; may be repeated.",
-        ),
-    ] = None,
-    constants: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--constant",
-            metavar="NAME=VALUE",
-            help="Hold this input of a PNLSS model at a value; may be repeated. That of --constant-input holds by itself.",
-        ),
-    ] = None,
-    exciter: Annotated[
-        Path | None,
-        typer.Option(
-            help="Exciter model: sweeps are predicted from the voltage, recorded ones and planned ones. With a PNLSS or "
-            "structured model driven by a force also responses and references at constant fundamental, RMS or voltage, with "
-            "the harmonics that the exciter makes; one driven by the voltage has its own."
-        ),
-    ] = None,
-    zero_crossings: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHICH",
-            help="Read an imposed force between its zero crossings, as the paper did: half-periods (between all of them) or "
-            "periods (those in the same direction).",
-        ),
-    ] = None,
-    modes: Annotated[Path | None, typer.Option(help="Linear model: other modes and other sensors.")] = None,
-    references: Annotated[
-        list[Path] | None,
-        typer.Option("--reference", help="Stepped sines to compare with (recorded or imported); may be repeated."),
-    ] = None,
-    over: Annotated[
-        str | None,
-        typer.Option(
-            help="Compare over frequency or phase, which tells all branches apart. "
-            "If left out: phase where the measured frequency turns back."
-        ),
-    ] = None,
-    allow_extrapolation: Annotated[
-        bool, typer.Option("--allow-extrapolation", help="Answer beyond twice the largest amplitude identified.")
-    ] = False,
-    bands: Annotated[
-        bool,
-        typer.Option(
-            "--bands",
-            help="Give the responses of a structured model 95 % bands, from 40 models that its fit allows; takes as long as "
-            "40 responses. Models with scatter have them anyway.",
-        ),
-    ] = False,
-    trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="Import the functions that a structured or PNLSS model names.")
-    ] = False,
-    overwrite: Overwrite = False,
-    json: Json = False,
-) -> None:
+
+class PredictGroup(KindGroup):
+    """``rig predict``."""
+
+    after: ClassVar[str] = (
+        "All kinds have -o, --overwrite (replace OUTPUT) and --json (print JSON); `rig predict KIND --help` shows the others. "
+        "Without KIND it is that of the model in FILE; a file that is called like a kind is written ./pnlss."
+    )
+
+    def words(self) -> Mapping[str, str]:
+        """Return the words for the kinds, each with a sentence for the help."""
+        from rig.results.kinds import predictions
+
+        return {word: one.text for word, one in predictions().items()}
+
+    def function(self, word: str) -> Callable[..., None]:
+        """Return the function of a kind; of the command without a kind if the word is empty."""
+        from rig.cli.option_parameters import parameters_of
+        from rig.results.kinds import predictions
+
+        known = predictions()
+        models = [known[word].options] if word else [one.options for one in known.values()]
+        found: Callable[..., None] = with_parameters(
+            lambda values: _predict(word, values),
+            [*_COMMON, *parameters_of(models), *_LAST],
+            known[word].text if word else "Predict vibrations with a model, and compare them with recordings.",
+        )
+        return found
+
+    def format_usage(self, ctx: Any, formatter: Any) -> None:
+        """Write how the command is called."""
+        formatter.write_usage(ctx.command_path, "[KIND] FILE -o OUTPUT [OPTIONS]")
+
+
+app = typer.Typer(cls=PredictGroup, help="Predict vibrations with a model, and compare them with recordings.")
+
+
+@app.callback()
+def _predict_() -> None:
     """Predict vibrations with a model, and compare them with recordings."""
+
+
+def _predict(kind: str, values: dict[str, Any]) -> None:
+    from rig.cli.option_parameters import given_in
     from rig.results.files import save
     from rig.results.predict import predict_vibrations
-    from rig.results.predictions.request import PredictionRequest
 
-    given = (model, exciter, modes, *(sweeps or ()), *(multisines or ()), *(references or ()))
-    keep_existing([path for path in given if path is not None], output, overwrite)
-    request = PredictionRequest(
-        forces_n=tuple(forces_n or ()),
-        voltages_v=tuple(voltages_v or ()),
-        held=held,
-        sweeps=tuple(sweeps or ()),
-        multisines=tuple(multisines or ()),
-        planned=tuple(planned or ()),
-        planned_multisines=tuple(planned_multisines or ()),
-        constants=tuple(constants or ()),
-        exciter=exciter,
-        zero_crossings=zero_crossings,
-        modes=modes,
-        references=tuple(references or ()),
-        over=over,
-        allow_extrapolation=allow_extrapolation,
-        bands=bands,
-        trust_code=trust_code,
-    )
-    save(predict_vibrations(model, request), output)
+    model, output, overwrite, json = (values.pop(name) for name in ("model", "output", "overwrite", "json"))
+    given = given_in(values)
+    sources = [one for value in given.values() for one in (value if isinstance(value, list) else [value])]
+    keep_existing([model, *(one for one in sources if isinstance(one, Path))], output, overwrite)
+    save(predict_vibrations(model, given, kind=kind), output)
     show_file(output, json)

@@ -33,8 +33,8 @@ def plot_(
     ] = False,
 ) -> None:
     """Draw what is in a file; of several files, or with axes of one's own, their curves over one another."""
+    from rig.drawing.curves import View
     from rig.drawing.style import restyle
-    from rig.figures.curves import View
     from rig.figures.files import plot
 
     view = View(amplitude, channel, harmonic, _limits_hz(frequency))

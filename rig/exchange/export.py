@@ -7,23 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from identification import HammerTest, IdentificationError, ModalAnalysis, TimeRecords
+from identification import IdentificationError
 from rig.campaigns.evaluation.point import point_name
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.errors import ConfigurationError, RecordingError, RigError
+from rig.exchange.conversion import taken_apart
 from rig.exchange.csv import write_csv
-from rig.exchange.kinds import taken_apart
 from rig.exchange.mat import write_mat
-from rig.exchange.time_data import TimeData, series_of_records
 from rig.exchange.uff.writing import write_uff
 from rig.measurements import bench_of_recording, point_rows
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load
-from rig.results.force_surface.kind import MeasuredSurface
-from rig.results.simulated.model import SimulatedModel
+from rig.results.kinds import KINDS
+from rig.results.time_data.series import TimeData
 from rig.system.whole_file import whole_file
 from rig.text.contents import Contents
 from vibrolock.printable import shown
@@ -59,18 +58,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
             return _time_data(recording, points) if data == "time" else CAMPAIGNS[kind].exchanged(recording)
     if data == "time" or points:
         raise RecordingError(f"{path}: holds a {kind}; samples of points are in recordings")
-    found = load(path)
-    if isinstance(found, MeasuredSurface):
-        return [found.responses]
-    if isinstance(found, TimeRecords):
-        return list(series_of_records(found))
-    if isinstance(found, SimulatedModel):
-        return [found.model]
-    if isinstance(found, HammerTest):
-        return [found.responses]
-    if isinstance(found, ModalAnalysis):
-        return [found.modes] if found.responses is None else [found.modes, found.responses]
-    return [found]
+    return KINDS[kind].objects_of(load(path))
 
 
 def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:

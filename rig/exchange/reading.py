@@ -15,7 +15,7 @@ from vibrolock.printable import shown
 
 if TYPE_CHECKING:
     import identification as i
-    from rig.exchange.time_data import TimeData
+    from rig.results.time_data.series import TimeData
 
     Measurement = (
         i.Backbone
@@ -231,7 +231,7 @@ def _chosen(found: Sequence[T], path: Path, item: int) -> T:
 
 def _read_without(path: Path, form: str, options: _Options) -> "Measurement":
     """Read a file that needs no mapping."""
-    from rig.exchange.kinds import put_together
+    from rig.exchange.conversion import put_together
 
     match form:
         case "uff":

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
+    from rig.drawing.curves import View as View
     from rig.drawing.style import restyle as restyle
-    from rig.figures.curves import View as View
     from rig.figures.results import plot as plot
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

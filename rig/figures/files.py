@@ -10,9 +10,9 @@ from rig.campaigns.evaluation.figure import draw_failure
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
+from rig.drawing.curves import View
 from rig.drawing.page import check_replaceable, page_for
 from rig.errors import RecordingError
-from rig.figures.curves import View
 from rig.figures.lateness import draw_lateness
 from rig.figures.overlay import overlay
 from rig.recording.arrays import kind_of
@@ -83,7 +83,7 @@ def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float
 def _draw_model(page: "Figure", source: Path, kind: str) -> None:
     found = load(source)
     with understood(source, kind):
-        resolve_name(KINDS[kind].draw)(page, found)
+        KINDS[kind].draw_on(page, found)
 
 
 def _draw_recording(page: "Figure", source: Path, *, lateness: bool) -> None:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.drawing.axes import log_axis
+from rig.drawing.curves import Curves, Panel, Quantity, Trace, View
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import COLOURS, MARKERS, REJECTED, engineering, rc, shade, title
 from rig.errors import RecordingError
-from rig.figures.curves import Curves, Panel, Quantity, Trace, View
 from rig.figures.curves_of_files import curves_of, family_of
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def overlay(
     for path in sources[1:]:
         if family_of(path) != first:
             raise RecordingError(
-                f"{sources[0]} and {path}: {first.name} and {family_of(path).name} have no common axes; draw them apart"
+                f"{sources[0]} and {path}: {first} and {family_of(path)} have no common axes; draw them apart"
             )
     found = [curves_of(path, view) for path in sources]
     for path, curves in zip(sources, found, strict=True):
@@ -76,7 +76,7 @@ def overlay(
             _refuse_other_axes(sources[0], found[0], path, curves)
         _check_limits(path, curves, view)
     names = list(labels) or _names(sources)
-    return SIZE_IN, lambda page: _draw(page, names, found, view, first.name)
+    return SIZE_IN, lambda page: _draw(page, names, found, view, first)
 
 
 def _names(sources: Sequence[Path]) -> list[str]:

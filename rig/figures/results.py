@@ -1,48 +1,18 @@
-"""Figures of results in memory, for notebooks and scripts. What is drawn how is one table here."""
+"""Figures of results in memory, for notebooks and scripts."""
 
 from collections.abc import Callable
 from pathlib import Path
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from identification import FrequencyResponse
 from rig.drawing.style import STYLE, page_in
 from rig.figures.files import drawing_of
 from rig.recording.reader import Recording
-from rig.results.kinds import as_kept, kind_of_file_for
+from rig.results.kinds import kind_of_result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-class ResultFigure(NamedTuple):
-    """How one type of result is drawn."""
-
-    draw: str
-    """``module:function`` that draws the result on an empty page, ``(page, result)``."""
-    figure_in: tuple[float, float] = (9.0, 4.0)
-    """Width and height of the page, inches."""
-
-
-RESULTS = {
-    "FrequencyResponse": ResultFigure("rig.figures.responses:draw_response", (9.0, 6.4)),
-    "ForceSurface": ResultFigure("rig.figures.responses:draw_surface", (11.0, 4.5)),
-    "ConstantForceCurve": ResultFigure("rig.figures.responses:draw_constant_force"),
-    "Comparison": ResultFigure("rig.figures.responses:draw_comparison"),
-    "SteadyPrediction": ResultFigure("rig.figures.responses:draw_prediction", (9.0, 6.0)),
-    "ResponseBand": ResultFigure("rig.figures.responses:draw_band"),
-    "SweepPrediction": ResultFigure("rig.figures.responses:draw_prediction", (9.0, 5.0)),
-    "ContinuousBackbone": ResultFigure("rig.figures.backbones:draw_continuous"),
-    "PeriodicResponses": ResultFigure("rig.figures.backbones:draw_periodic"),
-    "DistortionLevels": ResultFigure("rig.figures.spectra:draw_distortion", (9.0, 6.4)),
-    "PeriodicSpectra": ResultFigure("rig.campaigns.multisine.figure:draw_multisine", (9.0, 6.4)),
-    "StabilisationDiagram": ResultFigure("rig.figures.spectra:draw_stabilisation"),
-    "Transient": ResultFigure("rig.figures.spectra:draw_transient", (9.0, 8.0)),
-    "Tuning": ResultFigure("rig.tuning.figure:draw_on", (11.0, 6.8)),
-    "Assessment": ResultFigure("rig.check.figure:draw_check", (9.0, 6.4)),
-}
-"""By the name of the type: results that no file of ours holds. For others see `rig.results.kinds`."""
 
 
 def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Any) -> "tuple[Axes, ...]":
@@ -93,13 +63,10 @@ def _drawing_of(things: tuple[Any, ...], options: dict[str, Any]) -> tuple[tuple
     draw_on = getattr(thing, "draw_on", None)  # of an analysis
     if draw_on is not None:
         return thing.figure_in, draw_on
-    found = next((RESULTS[one.__name__] for one in type(thing).__mro__ if one.__name__ in RESULTS), None)
-    if found is not None:
-        return found.figure_in, lambda page: resolve_name(found.draw)(page, thing)
-    kind = kind_of_file_for(thing)
+    kind = kind_of_result(thing)
     if kind is None or (isinstance(thing, tuple) and not all(isinstance(one, FrequencyResponse) for one in thing)):
         raise TypeError(f"plot: no figure for {type(thing).__name__}; allowed are files, runs, recordings and results")
-    return kind.figure_in, lambda page: resolve_name(kind.draw)(page, as_kept(kind, thing))
+    return kind.figure_in, lambda page: kind.draw_on(page, thing)
 
 
 def _file_of(thing: Any) -> Path | None:

@@ -31,6 +31,8 @@ class Command:
 def commands_of(group: Any, name: str = "rig") -> Iterator[Command]:
     """Yield the commands of a group, and those of the groups in it; ``typer.main.get_command`` returns a group."""
     for word, command in group.commands.items():
+        if not word:  # a group without a subcommand named
+            continue
         full = f"{name} {word}"
         yield _command(getattr(command, "installed", command), full)  # what the studies bring
         if hasattr(command, "commands"):
@@ -66,7 +68,8 @@ def command_entries(group: Any) -> Iterator[Entry]:
         for names, text in command.options:
             for option in option_names(names):
                 full = f"{command.name} {option}"
-                words = (full, full.removeprefix("rig "), option)
+                without_kind = f"{command.name.rpartition(' ')[0]} {option}".removeprefix("rig ")
+                words = (full, full.removeprefix("rig "), without_kind, option)
                 yield Entry("option", full, words, text, f"{command.anchor}{option}")
 
 

@@ -4,29 +4,30 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from numpy.exceptions import ComplexWarning
 
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of, read_arrays, write_arrays
-from rig.results.kind import FileKind
-from rig.results.kinds import KINDS, kind_of_file_for
+from rig.results.kinds import KINDS, kind_of_result
 from vibrolock.printable import error_text
+
+T = TypeVar("T")
 
 _MISFITS = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError, MemoryError)
 
 
-def save(thing: Any, path: Path) -> None:
+def save(result: object, path: Path) -> None:
     """Write a model, a prediction or an imported measurement. The file is written completely or not at all.
 
     Linear modes without responses are written as a modal analysis. A fit or a model without further results is written as an
     identified PNLSS model.
     """
-    kind = kind_of_file_for(thing)
+    kind = kind_of_result(result, stored=True)
     if kind is None:
-        raise RecordingError(f"{path}: a {type(thing).__name__} has no file of its own; known are {', '.join(KINDS)}")
-    write_arrays(path, kind.name, *kind.pack(thing))
+        raise RecordingError(f"{path}: a {type(result).__name__} has no file of its own; known are {', '.join(KINDS)}")
+    write_arrays(path, kind.name, *kind.pack(result))
 
 
 def load(path: Path) -> Any:
@@ -49,9 +50,10 @@ def understood(path: Path, kind: str) -> Iterator[None]:
         raise RecordingError(f"{path}: does not hold what makes a {kind} ({error_text(error)})") from error
 
 
-def load_as(kind: FileKind, path: Path) -> Any:
-    """Load a file that must be of one kind; raise `RecordingError` for any other kind."""
+def load_as(wanted: type[T], path: Path) -> T:
+    """Load a file whose kind loads objects of a type; raise `RecordingError` for a file of another kind."""
+    name = next(name for name, kind in KINDS.items() if kind.loads(wanted))
     found = kind_of(path)
-    if found != kind.name:
-        raise RecordingError(f"{path}: is a file of kind {found}, wanted is one of kind {kind.name}")
-    return load(path)
+    if found != name:
+        raise RecordingError(f"{path}: is a file of kind {found}, wanted is one of kind {name}")
+    return cast(T, load(path))

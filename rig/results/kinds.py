@@ -1,44 +1,65 @@
-"""Registry of the kinds of files: one line for each kind. A kind is imported when a file of it is read or written."""
+"""The list of kinds of results. A kind is declared in a folder of its name; here is one line for each."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pkgutil import resolve_name
 from typing import Any
 
-from rig.results.kind import FileKind
+from rig.results.kind import Exchange, Identification, Prediction, ResultKind
 from vibrolock.on_use import Registry
 
-_DECLARED = {
-    "nonlinear-mode": ("nonlinear_mode.kind:NONLINEAR_MODE", ("NonlinearMode",)),
-    "decay-backbone": ("decay_backbone.kind:DECAY", ("DecayBackbone",)),
-    "linear-modes": ("linear_modes.kind:LINEAR_MODES", ("ModalAnalysis", "LinearModes")),
-    "exciter": ("exciter.kind:EXCITER", ("Exciter",)),
-    "pnlss": ("pnlss.kind:PNLSS", ("IdentifiedPnlss", "PnlssFit", "PnlssModel")),
-    "structured": ("structured.kind:STRUCTURED", ("IdentifiedStructured", "StructuredFit", "StructuredModel")),
-    "force-surface": ("force_surface.kind:FORCE_SURFACE", ("MeasuredSurface",)),
-    "frequency-responses": ("frequency_responses.kind:FREQUENCY_RESPONSES", ("tuple",)),
-    "frequency-response-matrix": ("frequency_response_matrix.kind:RESPONSE_MATRIX", ("FrequencyResponseMatrix",)),
-    "hammer-test": ("hammer_test.kind:HAMMER_TEST", ("HammerTest",)),
-    "measured-backbone": ("measured_backbone.kind:MEASURED_BACKBONE", ("Backbone",)),
-    "time-data": ("time_data.kind:TIME_DATA", ("TimeRecords",)),
-    "predictions": ("predictions.kind:PREDICTIONS", ("Predictions",)),
-    "rehearsal": ("rehearsal.kind:REHEARSAL", ("Rehearsal",)),
-}
-"""By the name in the file: where the kind is declared, and the names of the types that it holds."""
+KINDS: Mapping[str, ResultKind] = Registry(
+    {
+        "nonlinear-mode": "rig.results.nonlinear_mode.kind:KIND",
+        "decay-backbone": "rig.results.decay_backbone.kind:KIND",
+        "linear-modes": "rig.results.linear_modes.kind:KIND",
+        "exciter": "rig.results.exciter.kind:KIND",
+        "pnlss": "rig.results.pnlss.kind:KIND",
+        "structured": "rig.results.structured.kind:KIND",
+        "force-surface": "rig.results.force_surface.kind:KIND",
+        "frequency-responses": "rig.results.frequency_responses.kind:KIND",
+        "frequency-response-matrix": "rig.results.frequency_response_matrix.kind:KIND",
+        "hammer-test": "rig.results.hammer_test.kind:KIND",
+        "measured-backbone": "rig.results.measured_backbone.kind:KIND",
+        "time-data": "rig.results.time_data.kind:KIND",
+        "predictions": "rig.results.predictions.kind:KIND",
+        "rehearsal": "rig.results.rehearsal.kind:KIND",
+    }
+)
+"""Every kind of file other than recordings, by its name in the file. A declaration is imported when it is asked for."""
+
+_IN_MEMORY = "rig.results.in_memory.kinds:KINDS"
+"""Address of the kinds of results that have no file."""
 
 
-KINDS: Mapping[str, FileKind] = Registry({name: f"rig.results.{declared}" for name, (declared, _) in _DECLARED.items()})
-"""Every kind of file other than recordings, by its name in the file."""
+def all_kinds() -> Iterator[ResultKind]:
+    """Yield every kind, those without a file first: of a result that is of two kinds, the first one is shown."""
+    yield from resolve_name(_IN_MEMORY)
+    yield from KINDS.values()
 
 
-def kind_of_file_for(thing: Any) -> FileKind | None:
-    """Return the kind of file that holds an object; None if there is none."""
-    types = {one.__name__ for one in type(thing).__mro__}
-    for name, (_, held) in _DECLARED.items():
-        if types & set(held) and isinstance(thing, KINDS[name].holds):
-            return KINDS[name]
+def kind_of_result(result: object, *, stored: bool = False) -> ResultKind | None:
+    """Return the kind of an object, only of those that have files if ``stored``; None if there is none."""
+    names = {one.__name__ for one in type(result).__mro__}
+    for kind in KINDS.values() if stored else all_kinds():
+        if names & kind.type_names and isinstance(result, kind.types):
+            return kind
     return None
 
 
-def as_kept(kind: FileKind, thing: Any) -> Any:
-    """Return the object as it would be loaded from a file of its kind: linear modes as a modal analysis, for example."""
-    first = kind.holds[0] if isinstance(kind.holds, tuple) else kind.holds
-    return thing if isinstance(thing, first) else kind.unpack(*kind.pack(thing))
+@cache
+def exchanges() -> tuple[Exchange[Any], ...]:
+    """Return how each kind of object is exchanged, of all kinds that are."""
+    return tuple(resolve_name(kind.exchange) for kind in all_kinds() if kind.exchange)
+
+
+@cache
+def identifications() -> Mapping[str, Identification]:
+    """Return how models are identified, by the words for their kinds on the command line."""
+    return {kind.identification.word: kind.identification for kind in KINDS.values() if kind.identification}
+
+
+@cache
+def predictions() -> Mapping[str, Prediction]:
+    """Return how models predict, by the names of their kinds."""
+    return {name: kind.prediction for name, kind in KINDS.items() if kind.prediction}

@@ -1,12 +1,14 @@
 """Results in memory as tables: HTML for notebooks, text for terminals. Both show what ``rig show`` prints of such a file."""
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable
 
 from rig.recording.reader import Recording
-from rig.results.kinds import as_kept, kind_of_file_for
-from rig.show import result_tables
+from rig.results.kind import ResultKind
+from rig.results.kinds import kind_of_result
+from rig.show.summary import summarise_recording
+from rig.show.tables import print_findings, print_points
 from rig.text.console import PrintedTable, collected, print_table
+from vibrolock.printable import printable_strings
 
 _MOST_ROWS = 20
 """Of longer tables, rows evenly apart are shown."""
@@ -31,7 +33,7 @@ _TEMPLATE = """\
 """
 
 
-def as_html(thing: Any) -> str | None:
+def as_html(thing: object) -> str | None:
     """Return a result as HTML without any style of its own; None if there is no table for its type."""
     from jinja2 import Environment
 
@@ -49,7 +51,7 @@ def as_html(thing: Any) -> str | None:
     return Environment(autoescape=True).from_string(_TEMPLATE).render(blocks=parts)
 
 
-def as_text(thing: Any) -> str | None:
+def as_text(thing: object) -> str | None:
     """Return a result as lines of text; None if there is no table for its type."""
     import contextlib
     import io
@@ -66,7 +68,7 @@ def as_text(thing: Any) -> str | None:
     return text.getvalue().rstrip("\n")
 
 
-def _blocks(thing: Any) -> list[str | PrintedTable] | None:
+def _blocks(thing: object) -> list[str | PrintedTable] | None:
     """Return the lines and tables of a result; None if there are none for its type."""
     say = _say_of(thing)
     if say is None:
@@ -76,33 +78,36 @@ def _blocks(thing: Any) -> list[str | PrintedTable] | None:
     return [_thinned(block) if isinstance(block, PrintedTable) else block for block in blocks]
 
 
-def _say_of(thing: Any) -> Callable[[], None] | None:
+def _say_of(thing: object) -> Callable[[], None] | None:
     """Return what prints a result; None if there is nothing for its type."""
     recording = getattr(thing, "recording", thing)  # of a run
     if isinstance(recording, Recording):
-        return lambda: result_tables.say_recording(recording)
-    for one in type(thing).__mro__:
-        if one.__name__ in result_tables.SAY:
-            return lambda: result_tables.SAY[one.__name__](thing)
-    if callable(getattr(thing, "say", None)):  # of an analysis
-        return lambda: thing.say()
-    kind = kind_of_file_for(thing)
-    if kind is None or isinstance(thing, tuple):
-        return None
-    kept = as_kept(kind, thing)
+        return lambda: _say_recording(recording)
+    kind = kind_of_result(thing)
+    if kind is None:
+        say: Callable[[], None] | None = getattr(thing, "say", None)  # of an analysis
+        return say
+    return None if isinstance(thing, tuple) else lambda: _say_kept(kind, thing)
 
-    def say_kept() -> None:
-        summary = kind.summarise(kept)
-        print(f"{kind.name.replace('-', ' ')} of {summary.get('specimen') or 'an unnamed specimen'}")
+
+def _say_kept(kind: ResultKind, thing: object) -> None:
+    summary = kind.summarise(kind.as_kept(thing))
+    if not kind.stored:
         kind.say(summary)
-        _say_notes(summary.get("notes", ()))
-
-    return say_kept
-
-
-def _say_notes(notes: Iterable[str]) -> None:
-    for note in notes:
+        return
+    print(f"{kind.name.replace('-', ' ')} of {summary.get('specimen') or 'an unnamed specimen'}")
+    kind.say(summary)
+    for note in summary.get("notes", ()):
         print(f"note: {note}")
+
+
+def _say_recording(recording: Recording) -> None:
+    """Print the points of a recording with their quality, and what concerns all of them."""
+    found = printable_strings(summarise_recording(recording))
+    ended = found["parts"][-1]["ended"] if found["parts"] else "nothing recorded"
+    print(f"{found['kind']} of {found['specimen']} (bench {found['bench']}): {ended or 'cut short'}")
+    print_points(found["kind"], found["points"])
+    print_findings(found)
 
 
 def _thinned(table: PrintedTable) -> PrintedTable:

@@ -27,9 +27,9 @@ from rig.errors import RecordingError
 from rig.measurements import response_matrices
 from rig.recording.reader import Recording
 from rig.results.files import load_as, save
-from rig.results.pnlss.kind import PNLSS, IdentifiedPnlss
+from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.simulated.data_fingerprints import uses_of
-from rig.results.structured.kind import STRUCTURED, IdentifiedStructured
+from rig.results.structured.model import IdentifiedStructured
 from studies.reproduce.exciter import exciter_of
 from studies.reproduce.options import Options
 from studies.reproduce.recordings import recorded
@@ -187,7 +187,9 @@ def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment
 
 
 def _kept(options: Options, path: Path) -> IdentifiedPnlss | IdentifiedStructured:
-    found: IdentifiedPnlss | IdentifiedStructured = load_as(PNLSS if options.model == "pnlss" else STRUCTURED, path)
+    found: IdentifiedPnlss | IdentifiedStructured = (
+        load_as(IdentifiedPnlss, path) if options.model == "pnlss" else load_as(IdentifiedStructured, path)
+    )
     if found.fit is None:
         raise RecordingError(f"{path}: holds a model without its fit; remove the file, and it is identified again")
     return found

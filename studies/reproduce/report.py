@@ -7,7 +7,7 @@ from typing import Any
 
 from identification.models import SAME_LEVEL
 from rig.errors import RecordingError
-from rig.results.predictions.kind import CUT
+from rig.results.predictions.table import CUT
 from rig.system.text_files import read_text
 from rig.text.console import number, print_table
 from studies.reproduce.folder import write_json

@@ -6,7 +6,7 @@ from typing import Any
 
 from identification import ErrorTable, Experiment, IdentificationError, PnlssModel, StructuredModel
 from identification.scatter import OwnModel
-from rig.results.simulated.model import rows_of_scatter
+from rig.results.simulated.table import rows_of_scatter
 from studies.reproduce.folder import prepare
 from studies.reproduce.identified import Models, identify_all
 from studies.reproduce.options import Options

@@ -10,7 +10,7 @@ from identification.nonlinear import STANDARD_ERRORS
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan, plan_from
-from rig.results import files
+from rig.results.kinds import KINDS as RESULTS
 from tests.docs.pages import ROOT
 from tests.recorded import recorded_run
 
@@ -73,7 +73,7 @@ MODELS = "HDF5 file of a model or of imported measurements"
 
 
 def test_every_kind_of_file_is_in_the_table():
-    assert re.findall(r"^\| `([a-z-]+)` \|", section(MODELS), re.MULTILINE) == list(files.KINDS)
+    assert re.findall(r"^\| `([a-z-]+)` \|", section(MODELS), re.MULTILINE) == list(RESULTS)
 
 
 @pytest.mark.parametrize("model", [NonlinearMode, LinearModes, FrequencyResponseMatrix])

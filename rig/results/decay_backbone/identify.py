@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,9 @@ from rig.measurements import bench_of_recording, decays, point_rows
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.decay_backbone.options import DecayOptions
-from rig.results.time_data.kind import TIME_DATA
+
+if TYPE_CHECKING:
+    from rig.results.kind import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +33,7 @@ class _Record:
     specimen: str
 
 
-def identified_decay(paths: Sequence[Path], options: DecayOptions, near_hz: Sequence[float] = ()) -> DecayBackbone:
+def identify(paths: Sequence[Path], options: DecayOptions, progress: "Progress | None" = None) -> DecayBackbone:
     """Evaluate the decay in one recorded point of a recording, or in one record of time data.
 
     The mode shape at the drive point is taken as given in the options; without it a force that acts during the decay, as that
@@ -39,8 +42,8 @@ def identified_decay(paths: Sequence[Path], options: DecayOptions, near_hz: Sequ
     if len(paths) != 1:
         raise ConfigurationError(f"`kind` decay: {len(paths)} files given, allowed is one")
     if kind_of(paths[0]) in kinds_that_yield(DecayBackbone):
-        return _measured(paths[0], options, near_hz)
-    if kind_of(paths[0]) == TIME_DATA.name:
+        return _measured(paths[0], options)
+    if kind_of(paths[0]) == "time-data":
         record = _record_of(paths[0], options.point)
     else:
         record = _recorded(paths[0], options.point)
@@ -48,19 +51,18 @@ def identified_decay(paths: Sequence[Path], options: DecayOptions, near_hz: Sequ
         record.samples,
         record.channels,
         sample_rate_hz=record.sample_rate_hz,
-        near_hz=near_hz or None,
+        near_hz=options.near or None,
         start_s=options.start_s,
         stop_s=options.stop_s,
         drive_mode_shape=options.drive_mode_shape,
         specimen=record.specimen,
-        **({} if options.levels is None else {"number": options.levels}),
+        number=options.levels,
     )
 
 
-def _measured(path: Path, options: DecayOptions, near_hz: Sequence[float]) -> DecayBackbone:
+def _measured(path: Path, options: DecayOptions) -> DecayBackbone:
     """Return a decay of a decay campaign: of the given point, or of the one with the largest amplitude."""
-    given = ["near"] if near_hz else []
-    given += [name for name, is_given in options.given().items() if is_given and name != "point"]
+    given = [name for name in type(options).model_fields if name in options.model_fields_set - {"point"}]
     if given:
         raise ConfigurationError(f"`{given[0]}`: a decay campaign knows it from its plan; leave it out")
     with Recording(path) as recording:

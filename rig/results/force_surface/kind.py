@@ -1,107 +1,24 @@
-"""Files of force surfaces. They contain the measured levels; the surface is fitted again on each use."""
+"""Force surfaces: force over displacement and phase."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from rig.results.kind import Identification, Prediction, ResultKind
 
-import numpy as np
-
-from identification import (
-    ForceSurface,
-    FrequencyResponse,
-    force_surface,
-    pack_frequency_responses,
-    unpack_frequency_responses,
-)
-from rig.results.kind import Arrays, Attributes, FileKind
-from rig.text.console import number, print_table
-from vibrolock.results import Result
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredSurface(Result):
-    """Levels of a response-controlled test, the surface through them, and notes on missing points of the plan."""
-
-    responses: tuple[FrequencyResponse, ...]
-    notes: tuple[str, ...] = ()
-
-    @cached_property
-    def surface(self) -> ForceSurface:
-        """Surface fitted to the levels; raises `IdentificationError` if they do not define one."""
-        return force_surface(self.responses)
-
-
-def _pack(measured: MeasuredSurface) -> tuple[Arrays, Attributes]:
-    arrays, attributes = pack_frequency_responses(measured.responses)
-    return arrays, {**attributes, "notes": list(measured.notes)}
-
-
-def _unpack(arrays: Arrays, attributes: Attributes) -> MeasuredSurface:
-    return MeasuredSurface(unpack_frequency_responses(arrays, attributes), tuple(attributes.get("notes", ())))
-
-
-def _summarise(measured: MeasuredSurface) -> dict[str, Any]:
-    surface = measured.surface
-    resonance = surface.at_lag(90.0)
-    points = _points_at(measured.responses, surface.amplitude_m)
-    levels = [
-        {
-            "amplitude_m": float(fit.amplitude_m),
-            "points": points[index],
-            "frequency_hz": None,
-            "force_n": None,
-            "fit_residual": float(fit.residual),
-        }
-        for index, fit in enumerate(surface.levels)
-    ]
-    for amplitude, frequency, force in zip(
-        resonance.amplitude_m, resonance.frequency_hz, resonance.force_n, strict=True
-    ):
-        at = int(np.argmin(np.abs(surface.amplitude_m - amplitude)))
-        levels[at] |= {"frequency_hz": float(frequency), "force_n": float(force)}
-    return {
-        "specimen": surface.specimen,
-        "levels": levels,
-        "next_level_m": surface.next_level_m(),
-        "notes": list(measured.notes),
-    }
-
-
-def _points_at(responses: Sequence[FrequencyResponse], amplitudes_m: np.ndarray) -> list[int]:
-    """Return the number of measured points of every level."""
-    nearest = [int(np.argmin(np.abs(amplitudes_m - response.level))) for response in responses]
-    return [
-        sum(response.frequency_hz.size for response, at in zip(responses, nearest, strict=True) if at == index)
-        for index in range(amplitudes_m.size)
-    ]
-
-
-def _say(summary: dict[str, Any]) -> None:
-    print(f"{len(summary['levels'])} levels of displacement; at phase resonance:")
-    print_table(
-        ("level mm", "points", "frequency Hz", "force N", "fit leaves %"),
-        [
-            (
-                number(level["amplitude_m"], ".5f", 1e3),
-                str(level["points"]),
-                number(level["frequency_hz"], ".4f"),
-                number(level["force_n"], ".4f"),
-                number(level["fit_residual"], ".3f", 100.0),
-            )
-            for level in summary["levels"]
-        ],
-    )
-    print(f"one more level would tell most at {1e3 * summary['next_level_m']:.4g} mm")
-
-
-FORCE_SURFACE = FileKind(
+KIND = ResultKind(
     name="force-surface",
-    holds=MeasuredSurface,
-    pack=_pack,
-    unpack=_unpack,
-    summarise=_summarise,
-    say=_say,
+    holds=("rig.results.force_surface.model:MeasuredSurface",),
+    storage="rig.results.force_surface.storage:STORAGE",
+    table="rig.results.force_surface.table:TABLE",
     draw="rig.drawing.force_surface:draw_measured_surface",
     figure_in=(11.0, 7.0),
+    exported="rig.results.force_surface.model:exported",
+    identification=Identification(
+        "force-surface",
+        "Force over displacement and phase, from held levels.",
+        "rig.results.force_surface.options:ForceSurfaceOptions",
+        "rig.results.force_surface.identify:identify",
+    ),
+    prediction=Prediction(
+        "Frequency responses at constant force.",
+        "rig.results.force_surface.prediction_options:ForceSurfacePrediction",
+        "rig.results.force_surface.predict:predict",
+    ),
 )

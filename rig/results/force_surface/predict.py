@@ -1,6 +1,6 @@
 """Predictions of frequency responses at constant force, cut from a force surface."""
 
-from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -12,23 +12,24 @@ from identification import (
     SteadyPrediction,
     compare,
 )
-from rig.errors import ConfigurationError, RecordingError
-from rig.results.force_surface.kind import MeasuredSurface
-from rig.results.predictions.request import PredictionRequest
+from rig.errors import RecordingError
+from rig.results.files import load_as
+from rig.results.force_surface.model import MeasuredSurface
+from rig.results.force_surface.prediction_options import ForceSurfacePrediction
+from rig.results.predictions.references import stepped_sines
 
 _INTERVAL = 1.96
 
 
-def surface_predictions(
-    measured: MeasuredSurface, request: PredictionRequest, references: Sequence[FrequencyResponse]
-) -> Predictions:
-    """Return the curves at the requested forces and at those of ``references``, with errors over the phase.
+def predict(model: Path, request: ForceSurfacePrediction) -> Predictions:
+    """Return the curves at the requested forces and at those of the references, with errors over the phase.
 
     The frequency is not suitable for the comparison: where a curve ends at the lowest level, points of the branch beyond have
-    no counterpart. Raises `ConfigurationError` for requests that a force surface cannot answer, `RecordingError` for references
+    no counterpart. Raises `RecordingError` for references
     whose fundamental force was not held, `identification.IdentificationError` for forces beyond the measured levels.
     """
-    _check(request)
+    measured = load_as(MeasuredSurface, model)
+    references = [one for path in request.references for one in stepped_sines(path)]
     for measured_at in references:
         if measured_at.controlled != "force":
             raise RecordingError(
@@ -55,26 +56,6 @@ def surface_predictions(
         specimen=measured.surface.specimen,
         notes=(*measured.notes, *strangers),
     )
-
-
-def _check(request: PredictionRequest) -> None:
-    """Refuse options that only a nonlinear mode understands."""
-    given = {
-        "held": request.held not in (None, "fundamental"),
-        "sweeps": bool(request.sweeps),
-        "multisines": bool(request.multisines),
-        "planned": bool(request.planned),
-        "planned_multisines": bool(request.planned_multisines),
-        "constants": bool(request.constants),
-        "exciter": request.exciter is not None,
-        "modes": request.modes is not None,
-        "allow_extrapolation": request.allow_extrapolation,
-    }
-    for name in (name for name, is_given in given.items() if is_given):
-        raise ConfigurationError(
-            f"`{name}`: means nothing to a force surface, which answers `forces_n` and `references`, at constant "
-            "fundamental force between its measured levels"
-        )
 
 
 def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> SteadyPrediction:

@@ -1,45 +1,13 @@
-"""Files of stepped-sine measurements."""
+"""Stepped-sine measurements: frequency responses at several levels."""
 
-from typing import Any
+from rig.results.kind import ResultKind
 
-from identification import FrequencyResponse, pack_frequency_responses, unpack_frequency_responses
-from rig.results.kind import FileKind
-from rig.text.console import number, print_table
-
-
-def _summarise(responses: tuple[FrequencyResponse, ...]) -> dict[str, Any]:
-    return {
-        "specimen": responses[0].specimen,
-        "responses": [
-            {
-                "label": response.label,
-                "samples": int(response.frequency_hz.size),
-                "lowest_hz": float(response.frequency_hz.min()),
-                "highest_hz": float(response.frequency_hz.max()),
-            }
-            for response in responses
-        ],
-        "notes": [],
-    }
-
-
-def _say(summary: dict[str, Any]) -> None:
-    print(f"{len(summary['responses'])} levels")
-    print_table(
-        ("level", "samples", "from Hz", "to Hz"),
-        [
-            (r["label"], str(r["samples"]), number(r["lowest_hz"], ".2f"), number(r["highest_hz"], ".2f"))
-            for r in summary["responses"]
-        ],
-    )
-
-
-FREQUENCY_RESPONSES = FileKind(
+KIND = ResultKind(
     name="frequency-responses",
-    holds=tuple,
-    pack=pack_frequency_responses,
-    unpack=unpack_frequency_responses,
-    summarise=_summarise,
-    say=_say,
+    holds=("builtins:tuple",),
+    storage="rig.results.frequency_responses.storage:STORAGE",
+    table="rig.results.frequency_responses.table:TABLE",
     draw="rig.results.frequency_responses.figure:draw_responses",
+    exchange="rig.results.frequency_responses.exchange:EXCHANGE",
+    curves=("frequency responses", "rig.results.frequency_responses.curves:curves"),
 )

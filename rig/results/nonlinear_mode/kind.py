@@ -1,61 +1,24 @@
-"""Files of nonlinear-mode models."""
+"""Nonlinear modes: modal frequency, damping and shape over the amplitude."""
 
-from functools import partial
-from typing import Any
+from rig.results.kind import Identification, Prediction, ResultKind
 
-from identification import NonlinearMode
-from identification.common import decode, encode
-from rig.results.kind import FileKind
-from rig.text.console import number, print_table
-
-
-def _summarise(mode: NonlinearMode) -> dict[str, Any]:
-    return {
-        "specimen": mode.specimen,
-        "source": mode.source,
-        "frequency_shift": mode.frequency_shift,
-        "drive_mode_shape": mode.drive_mode_shape,
-        "drive_mode_shape_std": mode.drive_mode_shape_std,
-        "drive_mode_shape_source": mode.drive_mode_shape_source,
-        "points": mode.table(),
-        "notes": list(mode.notes),
-    }
-
-
-def _say(summary: dict[str, Any]) -> None:
-    print_table(
-        ("force N", "amplitude mm", "modal frequency Hz", "+-", "damping %", "+-", "all harmonics %", "phase lag deg"),
-        [
-            (
-                number(p["force_n"], ".4f"),
-                number(p["amplitude_m"], ".5f", 1e3),
-                number(p["modal_frequency_hz"], ".4f"),
-                number(p["modal_frequency_bound_95_hz"], ".4f"),
-                number(p["damping_ratio"], ".4f", 100.0),
-                number(p["damping_ratio_bound_95"], ".4f", 100.0),
-                number(p["damping_ratio_total_power"], ".4f", 100.0),
-                number(p["phase_lag_deg"], ".2f"),
-            )
-            for p in summary["points"]
-        ],
-    )
-    print(f"frequency, last point over first: {100.0 * summary['frequency_shift']:+.2f} %")
-    if summary["drive_mode_shape"] is not None:
-        std, source = summary["drive_mode_shape_std"], summary["drive_mode_shape_source"]
-        bound = "" if std is None else f" +- {1.96 * std:.2g}"
-        print(
-            f"mode shape at the drive point: {summary['drive_mode_shape']:.5g}{bound} kg^-1/2"
-            + (f", {source}" if source else "")
-        )
-
-
-NONLINEAR_MODE = FileKind(
+KIND = ResultKind(
     name="nonlinear-mode",
-    holds=NonlinearMode,
-    pack=encode,
-    unpack=partial(decode, NonlinearMode),
-    summarise=_summarise,
-    say=_say,
+    holds=("identification:NonlinearMode",),
+    table="rig.results.nonlinear_mode.table:TABLE",
     draw="rig.drawing.nonlinear_mode:draw_mode",
     figure_in=(12.0, 6.4),
+    curves=("backbones", "rig.results.nonlinear_mode.curves:curves"),
+    exchange="rig.results.nonlinear_mode.exchange:EXCHANGE",
+    identification=Identification(
+        "nonlinear-mode",
+        "Nonlinear mode, from backbones, decays or stepped sines.",
+        "rig.results.nonlinear_mode.options:NonlinearModeOptions",
+        "rig.results.nonlinear_mode.identify:identify",
+    ),
+    prediction=Prediction(
+        "Frequency responses at constant force, and sweeps.",
+        "rig.results.nonlinear_mode.prediction_options:NonlinearModePrediction",
+        "rig.results.nonlinear_mode.predict:predict",
+    ),
 )

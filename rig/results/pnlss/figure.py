@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import PnlssFit
-    from rig.results.pnlss.kind import IdentifiedPnlss
+    from rig.results.pnlss.model import IdentifiedPnlss
 
 
 def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:

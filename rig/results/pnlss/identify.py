@@ -1,32 +1,31 @@
 """Identify nonlinear state-space models from recordings: data, validation data, fit and errors."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from identification import (
-    FitProgress,
     FitSettings,
     fit_pnlss,
     identify_pnlss,
 )
 from rig.errors import ConfigurationError, RecordingError
 from rig.results.files import load_as
-from rig.results.pnlss.kind import PNLSS, IdentifiedPnlss, check_trusted
+from rig.results.kind import Remark
+from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.pnlss.options import PnlssOptions
 from rig.results.simulated.data_files import exciter_in
 from rig.results.simulated.data_fingerprints import uses_of
 from rig.results.simulated.fit_data import FitData, fit_data, fitted
-from rig.results.simulated.options import DataOptions
 
-Progress = Callable[[FitProgress], None]
+if TYPE_CHECKING:
+    from rig.results.kind import Progress
 
 
-def identified_pnlss(
-    paths: Sequence[Path], options: PnlssOptions, of_data: DataOptions, progress: Progress | None = None
-) -> IdentifiedPnlss:
+def identify(paths: Sequence[Path], options: PnlssOptions, progress: "Progress | None" = None) -> IdentifiedPnlss:
     """Identify one model from all recordings together.
 
     After Ctrl-C, return the state reached; `PnlssOptions.resume` continues from it. Raises `RecordingError` for files with
@@ -35,16 +34,16 @@ def identified_pnlss(
     begun, scatter = time.perf_counter(), None
     earlier = None if options.resume is None else _earlier(options.resume)
     if earlier is not None:
-        check_trusted(options.resume, earlier.model, bool(options.trust_code))
-    data = fit_data(paths, of_data, "PNLSS", like=None if earlier is None else earlier.model)
+        earlier.check_trusted(options.resume, options.trust_code)
+    data = fit_data(paths, options, "PNLSS", like=None if earlier is None else earlier.model)
     if options.constant_input:
         data = data.with_constant_input()
     data = replace(data, notes=(*data.notes, *_remarks(data, paths)))
     if earlier is not None and earlier.fit is not None:
-        if earlier.scatter is not None or of_data.scattering:
+        if earlier.scatter is not None or options.scatter:
             raise ConfigurationError(f"{options.resume}: a fit with scatter does not go on; leave `resume` out")
         _check_resumed(options, earlier, data)
-    settings = FitSettings() if options.iterations is None else FitSettings(iterations=options.iterations)
+    settings = FitSettings(iterations=options.iterations)
     if earlier is not None and earlier.fit is not None:
         fit = fit_pnlss(
             earlier.fit.last,
@@ -58,15 +57,15 @@ def identified_pnlss(
     else:
         how = partial(
             identify_pnlss,
-            states=2 if options.states is None else options.states,
+            states=options.states,
             degrees=options.chosen_degrees,
-            output_degrees=() if options.output_polynomials is False else None,
+            output_degrees=None if options.output_polynomials else (),
             saturating=options.saturating_features,
-            function=options.function or "tanh",
+            function=options.function,
             settings=settings,
             progress=progress,
         )
-        fit, scatter = fitted(how, data, of_data)
+        fit, scatter = fitted(how, data, options.scatter)
     found = IdentifiedPnlss(
         model=fit.model,
         fit=fit,
@@ -77,6 +76,15 @@ def identified_pnlss(
         uses=uses_of(data.training, data.validation),
     )
     return found.judged(data.training, data.validation, fit.initial_states, data.runs)
+
+
+def remark(found: IdentifiedPnlss, path: Path) -> Remark | None:
+    """Return how a fit that did not converge goes on."""
+    if found.fit is None or not (found.fit.limited or found.fit.interrupted):
+        return None
+    if found.fit.interrupted:
+        return Remark(f"interrupted; the best so far is in {path}, and --resume goes on", unfinished=True)
+    return Remark(f"the fit was {found.fit.message}; --resume with more --iterations goes on")
 
 
 def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
@@ -96,7 +104,7 @@ def _earlier(path: Path) -> IdentifiedPnlss:
     """Load the fit to be continued."""
     if not path.exists():
         raise RecordingError(f"{path}: there is nothing to resume; leave `resume` out")
-    found: IdentifiedPnlss = load_as(PNLSS, path)
+    found: IdentifiedPnlss = load_as(IdentifiedPnlss, path)
     if found.fit is None:
         raise RecordingError(f"{path}: holds a model from elsewhere and no fit that could go on")
     return found
@@ -112,5 +120,5 @@ def _check_resumed(options: PnlssOptions, earlier: IdentifiedPnlss, data: FitDat
             "`validation` and `relative`"
         )
     done = 0 if earlier.fit is None else earlier.fit.history.iterations
-    if options.iterations is not None and options.iterations <= done:
+    if "iterations" in options.model_fields_set and options.iterations <= done:
         raise ConfigurationError(f"`iterations` = {options.iterations}: {done} are done; allowed is more")

@@ -1,167 +1,30 @@
-"""Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one experiment."""
+"""Nonlinear state-space models (PNLSS)."""
 
-from collections import Counter
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import Any
+from rig.results.kind import Identification, Prediction, ResultKind
 
-import numpy as np
-
-from identification import (
-    Features,
-    PnlssFit,
-    PnlssModel,
-)
-from identification.common import decode, encode
-from identification.models import is_users
-from rig.errors import ConfigurationError
-from rig.results.kind import Arrays, Attributes, FileKind
-from rig.results.simulated.model import (
-    SimulatedModel,
-    errors_in,
-    say_errors,
-    say_scatter,
-    scatter_in,
-)
-from rig.text.console import number
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class IdentifiedPnlss(SimulatedModel):
-    """A nonlinear state-space model and its origin.
-
-    Parameters
-    ----------
-    model
-        The model.
-    fit
-        The fit of which the model is the best iterate; None for a model from another source.
-    """
-
-    model: PnlssModel
-    fit: PnlssFit | None = None
-
-    @property
-    def linear(self) -> PnlssModel | None:
-        """Linear start of the fit; None if unknown."""
-        return None if self.fit is None else self.fit.linear
-
-
-def _pack(found: IdentifiedPnlss | PnlssFit | PnlssModel) -> tuple[Arrays, Attributes]:
-    if isinstance(found, PnlssFit):
-        found = IdentifiedPnlss(model=found.model, fit=found)
-    elif isinstance(found, PnlssModel):
-        found = IdentifiedPnlss(model=found)
-    return encode(found)
-
-
-def functions_of(model: PnlssModel) -> list[str]:
-    """Return the functions of the user, ``module:name``, that a model names. To simulate it, they are imported."""
-    named = (*model.state_features.functions, *model.output_features.functions)
-    return [name for name in dict.fromkeys(named) if is_users(name)]
-
-
-def check_trusted(path: Path | None, model: PnlssModel, trusted: bool) -> None:
-    """Raise `ConfigurationError` if a model names code of a user that is not trusted."""
-    if (functions := functions_of(model)) and not trusted:
-        raise ConfigurationError(
-            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
-            "`trust_code`"
-        )
-
-
-def poles_of(model: PnlssModel) -> list[dict[str, float]]:
-    """Natural frequencies (Hz) and damping ratios of the linear part, lowest first, one per pair of poles."""
-    values = np.linalg.eigvals(model.a).astype(complex)
-    s = np.log(values[(np.abs(values) > 0.0) & (values.imag >= 0.0)]) * model.sample_rate_hz
-    rows = [{"frequency_hz": float(abs(p) / (2.0 * np.pi)), "damping_ratio": float(-p.real / abs(p))} for p in s]
-    return sorted(rows, key=lambda row: row["frequency_hz"])
-
-
-def _features(features: Features) -> dict[str, Any]:
-    """Count the features of each kind."""
-    functions = Counter(features.functions or ("tanh",) * len(features.weights))
-    degrees = Counter(int(degree) for degree in features.exponents.sum(axis=1))
-    return {
-        "monomials": {str(degree): degrees[degree] for degree in sorted(degrees)},
-        "saturating": functions["tanh"],
-        "functions": dict(functions),
-        "bounded": bool(np.isfinite(features.limits).any()),
-    }
-
-
-def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
-    model, fit = found.model, found.fit
-    return {
-        "specimen": model.specimen,
-        "states": model.states,
-        "inputs": [channel.name for channel in model.inputs],
-        "outputs": [channel.name for channel in model.outputs],
-        "sample_rate_hz": model.sample_rate_hz,
-        "state_features": _features(model.state_features),
-        "output_features": _features(model.output_features),
-        "nonlinear_coefficients": model.nonlinear_coefficients,
-        "poles": poles_of(model),
-        "fit": None
-        if fit is None
-        else {
-            "iterations": fit.history.iterations,
-            "chosen": fit.chosen,
-            "training_error": fit.training_error,
-            "validation_error": fit.validation_error,
-            "stopped": fit.message,
-            "limited": fit.limited,
-            "interrupted": fit.interrupted,
-            "seconds": float(fit.history.seconds[-1]),
-        },
-        "scatter": scatter_in(found),
-        **errors_in(found),
-        "training": list(model.training),
-        "state_range": model.state_range.tolist(),
-        "input_range": model.input_range.tolist(),
-        "seconds": found.seconds,
-        "notes": list(dict.fromkeys([*found.notes, *model.notes])),
-    }
-
-
-def _said(features: dict[str, Any]) -> str:
-    """Describe features in words."""
-    parts = [f"{count} of degree {degree}" for degree, count in features["monomials"].items()]
-    parts += [f"{count} {name}" for name, count in features["functions"].items()]
-    return (", ".join(parts) or "none") + (", bounded" if features["bounded"] else "")
-
-
-def _say(summary: dict[str, Any]) -> None:
-    inputs, outputs = ", ".join(summary["inputs"]), ", ".join(summary["outputs"])
-    print(f"{summary['states']} states at {summary['sample_rate_hz']:g} Hz; {inputs} to {outputs}")
-    print(
-        f"{summary['nonlinear_coefficients']} nonlinear coefficients; features of the states: "
-        f"{_said(summary['state_features'])}; of the outputs: {_said(summary['output_features'])}"
-    )
-    modes = (f"{p['frequency_hz']:.4f} Hz, {100.0 * p['damping_ratio']:.3f} %" for p in summary["poles"])
-    print(f"poles of the linear part: {'; '.join(modes)}")
-    if summary["fit"] is not None:
-        fit = summary["fit"]
-        judged = number(fit["validation_error"], ".3f", 100.0)
-        print(
-            f"iteration {fit['chosen']} of {fit['iterations']} chosen: error {number(fit['training_error'], '.3f', 100.0)} % "
-            f"in training, {'no validation data' if judged == '-' else f'{judged} % in validation'}; "
-            f"{number(summary['seconds'], '.1f')} s in all"
-        )
-        more = "; more --iterations go on with --resume" if fit["limited"] else ""
-        print(f"why the fit ended: {fit['stopped']}{more}")
-    say_scatter(summary["scatter"])
-    say_errors(summary)
-
-
-PNLSS = FileKind(
+KIND = ResultKind(
     name="pnlss",
-    holds=(IdentifiedPnlss, PnlssFit, PnlssModel),
-    pack=_pack,
-    unpack=partial(decode, IdentifiedPnlss),
-    summarise=_summarise,
-    say=_say,
+    holds=(
+        "rig.results.pnlss.model:IdentifiedPnlss",
+        "identification:PnlssFit",
+        "identification:PnlssModel",
+    ),
+    whole="rig.results.pnlss.model:whole",
+    table="rig.results.pnlss.table:TABLE",
     draw="rig.results.pnlss.figure:draw_pnlss",
     figure_in=(12.0, 7.5),
+    exchange="rig.results.pnlss.exchange:EXCHANGE",
+    exported="rig.results.simulated.model:exported",
+    identification=Identification(
+        "pnlss",
+        "Nonlinear state-space model, fitted to signals over time.",
+        "rig.results.pnlss.options:PnlssOptions",
+        "rig.results.pnlss.identify:identify",
+        "rig.results.pnlss.identify:remark",
+    ),
+    prediction=Prediction(
+        "Frequency responses, sweeps and multisines.",
+        "rig.results.pnlss.prediction_options:PnlssPrediction",
+        "rig.results.simulated.predict:predict",
+    ),
 )

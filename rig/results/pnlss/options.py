@@ -1,51 +1,66 @@
 """Options for the identification of a nonlinear state-space model."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
 
 from rig.errors import ConfigurationError
-from rig.results.simulated.options import Options
+from rig.results.options import Listed, Option
+from rig.results.simulated.options import FitDataOptions
+
+_OF_THE_FIT = ("states", "degrees", "output_polynomials", "saturating", "rate_hz", "input", "outputs")
+"""Options that a fit which goes on has already."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PnlssOptions(Options):
-    """Options of ``rig identify --model pnlss``. None selects the default.
+class PnlssOptions(FitDataOptions):
+    """Options of ``rig identify pnlss``."""
 
-    Raises `ConfigurationError` for values that are not allowed.
-    """
+    kind: ClassVar[str] = "pnlss"
 
-    states: int | None = None
-    """Number of states, two per mode of vibration; 2 if None."""
-    degrees: str | None = None
-    """Degrees of the monomials, separated by commas; empty: none. Default: ``2,3``, or none if there are saturating features.
-    """
-    output_polynomials: bool | None = None
-    """Whether monomials also act on the outputs; yes if None."""
-    saturating: int | None = None
-    """Number of saturating features. They replace the monomials unless degrees are given; none if None."""
-    function: str | None = None
-    """Function of the saturating features: ``tanh``, ``square``, ``cube``, or ``module:name`` of the user; tanh if None."""
-    trust_code: bool | None = None
-    """Whether to import the function of the user, or those that the model to be continued names."""
-    constant_input: bool | None = None
-    """Whether the model has a constant input of 1 beside the others, whose effect compensates offsets; no if None."""
-    iterations: int | None = None
-    """Largest number of iterations of the fit; 1000 if None."""
-    resume: Path | None = None
-    """File of an earlier fit to the same data, which is continued."""
+    states: int = Field(2, ge=1)
+    """Number of states, two per mode of vibration."""
+    degrees: Annotated[
+        tuple[Annotated[int, Field(ge=2, le=12)], ...] | None,
+        Listed,
+        Option(
+            metavar="LIST",
+            default="2,3; none beside --saturating",
+            allowed='are whole numbers from 2 to 12 with commas, such as 2,3; 1 is the linear part, "" is none',
+        ),
+    ] = None
+    """Degrees of the monomials; "" for none."""
+    input: Literal["force", "voltage"] = "force"
+    """Input of the model: force or voltage."""
+    output_polynomials: Annotated[bool, Option(help="Keep the outputs linear in states and input.")] = True
+    """Whether monomials also act on the outputs."""
+    saturating: Annotated[int, Option(metavar="K")] = Field(0, ge=0)
+    """Saturating features (tanh) in place of the monomials; with --degrees, beside them."""
+    function: Annotated[str, Option(metavar="NAME")] = "tanh"
+    """Function of the saturating features: tanh, square, cube, or MODULE:NAME of your own."""
+    trust_code: bool = False
+    """Import the function of --function, or those of the model that goes on."""
+    constant_input: bool = False
+    """Add a constant input, against offsets."""
+    iterations: int = Field(1000, ge=0)
+    """Largest number of iterations; the fit ends sooner if it has converged."""
+    resume: Annotated[Path | None, Option(is_output=True)] = None
+    """Go on with the model in OUTPUT, from the same files."""
 
-    def __post_init__(self) -> None:
-        for name, value, least in (
-            ("states", self.states, 1),
-            ("saturating", self.saturating, 0),
-            ("iterations", self.iterations, 0),
-        ):
-            if value is not None and value < least:
-                raise ConfigurationError(f"`{name}` = {value}: allowed is {least} and above")
-        self.chosen_degrees  # noqa: B018 refused here, not when it is asked for
-        if self.function is None:
-            return
-        from identification.models import FUNCTIONS, is_users
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if "function" in self.model_fields_set:
+            self._check_function()
+        for name in _OF_THE_FIT if self.resume is not None else ():
+            if name in self.model_fields_set:
+                raise ConfigurationError(f"`{name}`: is that of the fit that goes on; leave it out")
+        return self
+
+    def _check_function(self) -> None:
+        from identification.models import (
+            FUNCTIONS,  # only on use: nothing else here needs models
+            is_users,
+        )
 
         if not self.saturating:
             raise ConfigurationError(f"`function` = {self.function}: is of features; add `saturating`, their number")
@@ -59,22 +74,18 @@ class PnlssOptions(Options):
             )
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return (self.input,)
+
+    @property
     def chosen_degrees(self) -> tuple[int, ...]:
-        """Degrees as numbers; empty for an empty text, or if saturating features replace the monomials."""
-        try:
-            found = tuple(sorted({int(part) for part in (self.degrees or "").split(",") if part.strip()}))
-        except ValueError:
-            found = (0,)
-        if any(not 2 <= degree <= 12 for degree in found):
-            raise ConfigurationError(
-                f"`degrees` = {self.degrees!r}: allowed are whole numbers from 2 to 12 with commas, such as 2,3; 1 is the "
-                'linear part, "" is none'
-            )
+        """Degrees in rising order; by default none if saturating features replace the monomials."""
         if self.degrees is None:
             return () if self.saturating else (2, 3)
-        return found
+        return tuple(sorted(set(self.degrees)))
 
     @property
     def saturating_features(self) -> int | tuple[int, int]:
         """Number of saturating features as `identification.identify_pnlss` takes it. Linear outputs have none of them."""
-        return (self.saturating or 0, 0) if self.output_polynomials is False else self.saturating or 0
+        return self.saturating if self.output_polynomials else (self.saturating, 0)

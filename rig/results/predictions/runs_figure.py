@@ -7,7 +7,7 @@ import numpy as np
 
 from identification import Predictions, SimulatedRun
 from rig.drawing.style import MARKERS, REJECTED, plain_log, say_why_empty, shade
-from rig.results.predictions.kind import PLANNED
+from rig.results.predictions.table import PLANNED
 
 
 def draw_runs(area: Any, predictions: Predictions) -> None:

@@ -26,9 +26,6 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
 
-CROSSINGS = ("half-periods", "periods")
-"""Zero crossings between which a force is read: all of them, or only those in the same direction."""
-
 
 @dataclass(frozen=True)
 class SweepModels:
@@ -41,7 +38,7 @@ class SweepModels:
     exciter: Exciter | None
     """Exciter model; without it, the recorded force is imposed."""
     zero_crossings: str | None
-    """Zero crossings between which the imposed force is read, one of `CROSSINGS`; None if the force is demodulated."""
+    """Zero crossings between which the imposed force is read: ``half-periods`` or ``periods``; None: it is demodulated."""
     allow_extrapolation: bool
     """Whether to predict beyond twice the largest identified modal amplitude."""
 

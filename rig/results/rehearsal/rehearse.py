@@ -21,7 +21,6 @@ from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, discard_d
 from rig.rehearsal.remedies import improve
 from rig.results.files import load, load_as, save
 from rig.results.kinds import KINDS
-from rig.results.rehearsal.kind import REHEARSAL
 
 FURTHER_SEED = 1
 """Added to the seed of a rehearsal for that of the improved plan, which was chosen by the first one's twins."""
@@ -156,7 +155,7 @@ def twin_into(request: RehearsalRequest, number: int, output: Path) -> dict[str,
 
 def load_rehearsal(path: Path) -> Rehearsal:
     """Load a rehearsal; raise `RecordingError` for anything else."""
-    found = load_as(REHEARSAL, path)
+    found = load_as(Rehearsal, path)
     if not isinstance(found, Rehearsal):
         raise RecordingError(f"{path}: holds no rehearsal")
     return found

@@ -1,8 +1,8 @@
 """Files from which experiments are made: recordings, and time data of others."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
 
 from identification import Experiment, IdentificationError, TimeRecords, time_experiments
 from identification.experiments import suitable_rate_hz
@@ -13,30 +13,29 @@ from rig.measurements.points_left_out import points_left_out
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load_as
-from rig.results.time_data.kind import TIME_DATA
 
-KINDS = (*kinds_with_experiments(), TIME_DATA.name)
+KINDS = (*kinds_with_experiments(), "time-data")
 """Kinds of files from which experiments are made."""
 
 
 def time_records_in(path: Path) -> TimeRecords:
     """Load time data."""
-    return cast(TimeRecords, load_as(TIME_DATA, path))
+    return load_as(TimeRecords, path)
 
 
 def experiments_in(
-    path: Path, rate_hz: float, channels: dict[str, Any]
+    path: Path, rate_hz: float, inputs: Sequence[str], outputs: Sequence[str] | None
 ) -> tuple[tuple[Experiment, ...], tuple[str, ...]]:
     """Return the experiments in a file, and notes on what is missing.
 
     Experiments of time data are named after the file and the record. Raises `RecordingError` or `IdentificationError` if there
     are none.
     """
-    if kind_of(path) != TIME_DATA.name:
+    if kind_of(path) != "time-data":
         with Recording(path) as recording:
-            return experiments(recording, rate_hz=rate_hz, **channels), points_left_out(recording)
+            return experiments(recording, rate_hz=rate_hz, inputs=inputs, outputs=outputs), points_left_out(recording)
     try:
-        found = time_experiments(time_records_in(path), rate_hz=rate_hz, **channels)
+        found = time_experiments(time_records_in(path), rate_hz=rate_hz, inputs=inputs, outputs=outputs)
     except IdentificationError as error:
         raise IdentificationError(f"{path}: {error}") from None
     return tuple(replace(one, name=f"{path.stem}, {one.name}") for one in found), ()
@@ -44,7 +43,7 @@ def experiments_in(
 
 def rates_hz_in(path: Path) -> tuple[float, float]:
     """Return the sample rate that suits the data in a file, and the one at which they were recorded, Hz."""
-    if kind_of(path) == TIME_DATA.name:
+    if kind_of(path) == "time-data":
         records = time_records_in(path)
         return suitable_rate_hz(records), records.sample_rate_hz
     with Recording(path) as recording:
@@ -53,7 +52,7 @@ def rates_hz_in(path: Path) -> tuple[float, float]:
 
 def specimen_in(path: Path) -> str:
     """Return the name of the specimen; empty if it has none."""
-    if kind_of(path) == TIME_DATA.name:
+    if kind_of(path) == "time-data":
         return time_records_in(path).specimen
     with Recording(path) as recording:
         return bench_of_recording(recording).specimen.name
@@ -61,7 +60,7 @@ def specimen_in(path: Path) -> str:
 
 def exciter_in(path: Path) -> str:
     """Return what names the exciter of a test: the bench, or the file of time data."""
-    if kind_of(path) == TIME_DATA.name:
+    if kind_of(path) == "time-data":
         return path.name
     with Recording(path) as recording:
         return bench_of_recording(recording).name

@@ -16,8 +16,7 @@ from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
 from rig.results.simulated.data_files import KINDS, experiments_in, rates_hz_in, specimen_in
 from rig.results.simulated.data_fingerprints import features_of
-from rig.results.simulated.options import DataOptions
-from rig.results.time_data.kind import TIME_DATA
+from rig.results.simulated.options import FitDataOptions, RunEffect
 
 Fit = TypeVar("Fit", StructuredFit, PnlssFit)
 
@@ -59,7 +58,7 @@ class FitData:
 
 def fit_data(
     paths: Sequence[Path],
-    options: DataOptions,
+    options: FitDataOptions,
     what: str,
     *,
     like: Simulator | None = None,
@@ -90,13 +89,11 @@ def fit_data(
         If the data does not allow the identification.
     """
     _check_files(paths, options.validation, what, kinds, needs_lines=like is None)
-    channels = options.channels
+    inputs, outputs = options.inputs, options.outputs
     if like is not None:
         rate_hz = like.sample_rate_hz
-        channels = {
-            "inputs": tuple(channel.name for channel in like.inputs),
-            "outputs": [channel.name for channel in like.outputs],
-        }
+        inputs = tuple(channel.name for channel in like.inputs)
+        outputs = tuple(channel.name for channel in like.outputs)
     else:
         rate_hz = options.rate_hz or _common_rate_hz(paths)
     held = options.hold_out if options.hold_out is not None else (0 if options.validation else 1)
@@ -107,7 +104,7 @@ def fit_data(
     notes: list[str] = []
     most = 0
     for path in paths:
-        found, missing = experiments_in(path, rate_hz, channels)
+        found, missing = experiments_in(path, rate_hz, inputs, outputs)
         notes += missing
         most = max(most, *(len(same) for same in _alike(found)), 0)
         kept, out = _held_out(found, held)
@@ -118,7 +115,7 @@ def fit_data(
             f"`hold_out` = {options.hold_out}: no level has more than {most} realisations; allowed is 0 to {max(most - 1, 1)}"
         )
     for path in options.validation:
-        found, _ = experiments_in(path, rate_hz, channels)
+        found, _ = experiments_in(path, rate_hz, inputs, outputs)
         validation, of_validation = validation + list(found), of_validation + [str(path)] * len(found)
     _check_alive([*training, *validation])
     if options.relative:
@@ -126,16 +123,14 @@ def fit_data(
     return FitData(tuple(training), tuple(validation), (*of_training, *of_validation), tuple(notes))
 
 
-def fitted(fit: Callable[..., Fit], data: FitData, options: DataOptions) -> tuple[Fit, RunScatter | None]:
+def fitted(fit: Callable[..., Fit], data: FitData, scatter: Sequence[RunEffect]) -> tuple[Fit, RunScatter | None]:
     """Call ``fit(training, validation=...)``, with the shifts of the recordings if they are asked for."""
-    if not options.scattering:
+    if not scatter:
         return fit(data.training, validation=data.validation), None
     if len(set(data.runs)) < 2:
         raise ConfigurationError("`scatter`: needs two recordings at least, each of which is a run; add others")
-    found, scatter = fit_with_scatter(
-        fit, data.training, validation=data.validation, runs=data.runs, kinds=options.scattering
-    )
-    return cast(Fit, found), scatter
+    found, shifts = fit_with_scatter(fit, data.training, validation=data.validation, runs=data.runs, kinds=scatter)
+    return cast(Fit, found), shifts
 
 
 def _check_alive(experiments: Sequence[Experiment]) -> None:
@@ -166,7 +161,7 @@ def _check_files(
             )
     if twice := next((one for one, other in combinations(validation, 2) if one.samefile(other)), None):
         raise ConfigurationError(f"`validation` = {twice}: is given twice; each file once")
-    if needs_lines and not {"multisine", TIME_DATA.name} & {kinds[path] for path in paths}:
+    if needs_lines and not {"multisine", "time-data"} & {kinds[path] for path in paths}:
         raise ConfigurationError(
             f"{', '.join(f'{path} ({kinds[path]})' for path in paths)}: no multisine among them, which a fit begins with; "
             "add one (or imported time data)"

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import compress
+from pathlib import Path
 from typing import Any, Self, cast
 
 import numpy as np
@@ -20,8 +21,8 @@ from identification import (
 )
 from identification.common import stored
 from identification.experiments import Simulator
-from rig.results.kind import Arrays, Attributes
-from rig.text.console import number, print_table
+from rig.errors import ConfigurationError
+from rig.results.arrays import Arrays, Attributes
 from vibrolock.results import Result
 
 
@@ -75,6 +76,23 @@ class SimulatedModel(Result):
     def linear(self) -> Simulator | None:
         """Linear start of the fit; None if unknown."""
         return None
+
+    @property
+    def functions(self) -> list[str]:
+        """Functions of the user, ``module:name``, that the model names. To simulate it, they are imported."""
+        return []
+
+    def allowed_by_fit(self, count: int) -> list[Simulator] | None:
+        """Return models drawn by the covariance of the fit; None if it is unknown."""
+        return None
+
+    def check_trusted(self, path: Path | None, trusted: bool) -> None:
+        """Raise `ConfigurationError` if the model names code of a user that is not trusted."""
+        if self.functions and not trusted:
+            raise ConfigurationError(
+                f"{path}: function = {self.functions[0]!r}: is code that the model names, and is not imported unless you trust "
+                "it: `trust_code`"
+            )
 
     def judged(
         self,
@@ -131,80 +149,6 @@ class SimulatedModel(Result):
         return replace(self, spectra=spectra, stretch=output_stretch(model, shown))
 
 
-def scatter_in(found: SimulatedModel) -> list[dict[str, Any]] | None:
-    """Return the widths of the scatter as ``rig show --json`` prints them."""
-    return None if found.scatter is None else rows_of_scatter(found.scatter)
-
-
-def rows_of_scatter(of: RunScatter) -> list[dict[str, Any]]:
-    """Return the widths of a scatter, one row for each effect."""
-    return [
-        {
-            "effect": str(effect),
-            "width": width.width,
-            "width_low": width.low,
-            "width_high": width.high,
-            "mean_std": width.mean_std,
-            "recordings": len(of.runs),
-            "settled": of.settled,
-        }
-        for effect, width in zip(of.effects, of.widths, strict=True)
-    ]
-
-
-def say_scatter(rows: list[dict[str, Any]] | None) -> None:
-    """Print the widths of the scatter, if there is any."""
-    if not rows:
-        return
-    print(
-        f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those "
-        "with each run's shifts"
-    )
-    print_table(
-        ("shift of", "standard deviation %", "95 % interval", "+- of the middle %"),
-        [
-            (
-                row["effect"],
-                number(row["width"], ".3g", 100.0),
-                f"{number(row['width_low'], '.3g', 100.0)} to {number(row['width_high'], '.3g', 100.0)}",
-                number(row["mean_std"], ".2g", 196.0),
-            )
-            for row in rows
-        ],
-    )
-    if not rows[0]["settled"]:
-        print("the shifts had not settled when the fit ended")
-
-
-def errors_in(found: SimulatedModel) -> dict[str, Any]:
-    """Return the errors as ``rig show --json`` prints them."""
-    return {
-        "errors": [run.row() for run in found.runs],
-        "linear_errors": [run.row() for run in found.linear_runs],
-    }
-
-
-def say_errors(summary: dict[str, Any]) -> None:
-    """Print the errors of all experiments, if there are any."""
-    if not summary["errors"]:
-        return
-    print("relative errors of the model, in brackets those of its linear start, %")
-    linear = summary["linear_errors"] or [None] * len(summary["errors"])
-    print_table(
-        ("experiment", "use", *summary["outputs"], "range use"),
-        [
-            (
-                run["name"],
-                run["use"],
-                *(_error(run, before, name) for name in summary["outputs"]),
-                "unbounded" if run["unbounded"] else number(run["range_use"], ".2f"),
-            )
-            for run, before in zip(summary["errors"], linear, strict=True)
-        ],
-    )
-
-
-def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str:
-    """Return one error of the model, with the error of the linear start in brackets."""
-    own = "unbounded" if run["unbounded"] else number(run["errors"][name], ".3f", 100.0)
-    return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"
+def exported(found: SimulatedModel) -> list[Simulator]:
+    """Return what is exported of a file: the model."""
+    return [found.model]

@@ -1,7 +1,7 @@
 """Steady vibrations of PNLSS and structured models, compared with stepped sines."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,7 +15,7 @@ from identification import (
     SteadyStates,
     compare,
 )
-from identification.prediction import Over
+from rig.results.predictions.references import Reference
 from rig.results.simulated.driven_models import DrivenModel, frequency_response_at, steady_state_at
 
 Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
@@ -27,20 +27,6 @@ _ALIKE = 0.01
 """Relative difference of amplitudes below which two vibrations count as the same."""
 _HARMONIC = 0.01
 """Second harmonic of a reference's force over its fundamental above which a predicted force without harmonics is noted."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A measured response and how it is compared."""
-
-    measured: FrequencyResponse
-    """The measured response."""
-    over: Over
-    """Quantity over which it is compared."""
-    over_asked: bool = False
-    """Whether the user asked for that quantity."""
-    second_harmonic: float | None = None
-    """Second harmonic of the force over its fundamental at the largest response; None if unknown."""
 
 
 def default_held(model: DrivenModel, exciter: Exciter | None) -> Held:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import NonlinearElement
-    from rig.results.structured.kind import IdentifiedStructured
+    from rig.results.structured.model import IdentifiedStructured
 
 _BEYOND = 1.5
 """Drawn displacements relative to the largest of the training data."""

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING
 
 from identification import LinearModes, ModalAnalysis, fit_structured
 from identification.common import one_specimen
@@ -11,19 +11,20 @@ from identification.models import linear_start
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
 from rig.results.files import load_as
-from rig.results.linear_modes.kind import LINEAR_MODES
 from rig.results.simulated.data_fingerprints import uses_of
 from rig.results.simulated.fit_data import fit_data, fitted
-from rig.results.simulated.options import DataOptions
-from rig.results.structured.kind import IdentifiedStructured
+from rig.results.structured.model import IdentifiedStructured
 from rig.results.structured.options import MODES_OF_A_STRUCTURE, StructuredOptions
+
+if TYPE_CHECKING:
+    from rig.results.kind import Progress
 
 _KINDS = ("multisine", "sweep", "time-data")
 """Data that may begin at rest."""
 
 
-def identified_structured(
-    paths: Sequence[Path], modes: Path, options: StructuredOptions, of_data: DataOptions
+def identify(
+    paths: Sequence[Path], options: StructuredOptions, progress: "Progress | None" = None
 ) -> IdentifiedStructured:
     """Identify one model from all recordings together, beginning with the modes in a file.
 
@@ -31,8 +32,10 @@ def identified_structured(
     identification.
     """
     begun = time.perf_counter()
+    modes = options.modes
+    assert modes is not None
     found = _modes_in(modes)
-    data = fit_data(paths, of_data, "structured", kinds=_KINDS)
+    data = fit_data(paths, options, "structured", kinds=_KINDS)
     one_specimen(**{str(modes): found.specimen, str(paths[0]): data.training[0].specimen})
     known = options.suspension_stiffness_n_m
     fit, scatter = fitted(
@@ -44,7 +47,7 @@ def identified_structured(
             support=True if known is None else known,
         ),
         data,
-        of_data,
+        options.scatter,
     )
     identified = IdentifiedStructured(
         model=fit.model,
@@ -61,7 +64,7 @@ def identified_structured(
 
 def _modes_in(path: Path) -> LinearModes:
     """Load linear modes; if there are none, say how to make them."""
-    if not path.exists() or (kind := kind_of(path)) != LINEAR_MODES.name:
+    if not path.exists() or (kind := kind_of(path)) != "linear-modes":
         what = f"is a file of kind {kind}" if path.exists() else "does not exist"
         raise RecordingError(f"{path}: {what}, wanted are {MODES_OF_A_STRUCTURE}")
-    return cast(ModalAnalysis, load_as(LINEAR_MODES, path)).modes
+    return load_as(ModalAnalysis, path).modes

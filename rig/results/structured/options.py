@@ -1,11 +1,13 @@
 """Options for the identification of a structured model."""
 
-import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Self
+
+from pydantic import Field, model_validator
 
 from rig.errors import ConfigurationError
-from rig.results.simulated.options import Options
+from rig.results.options import Option
+from rig.results.simulated.options import FitDataOptions
 
 if TYPE_CHECKING:
     from identification import ElementPlan
@@ -13,30 +15,29 @@ if TYPE_CHECKING:
 
 MODES_OF_A_STRUCTURE = (
     "the modes with which a structured model begins; make them from a test at a low level with "
-    "`rig identify RECORDING --model linear -o MODES.h5`"
+    "`rig identify linear RECORDING -o MODES.h5`"
 )
 """End of messages about a missing file of modes."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class StructuredOptions(Options):
-    """Options of ``rig identify --model structured``. None selects the default.
+class StructuredOptions(FitDataOptions):
+    """Options of ``rig identify structured``."""
 
-    Raises `ConfigurationError` for values that are not allowed.
-    """
+    kind: ClassVar[str] = "structured"
 
-    laws: tuple[str, ...] = ()
-    """Elements, each as kinds of its laws with commas: ``polynomial-spring,masing``; after ``@`` the output at which it acts,
-    or two with a colon between them. One element with ``polynomial-spring,polynomial-damper`` if empty."""
+    modes: Path | None = None
+    """Linear model with which the fit begins; required."""
+    laws: Annotated[tuple[str, ...], Option(metavar="LIST", default="polynomial-spring,polynomial-damper")] = ()
+    """Laws of an element, with @OUTPUT or @OUTPUT:OUTPUT where it acts; repeated for further elements, kept while they pay."""
+    suspension_stiffness_n_m: Annotated[float | None, Option(metavar="N_PER_M", default="fitted")] = Field(None, ge=0.0)
+    """Stiffness of the exciter's suspension, as in `rig show EXCITER`; 0 for none."""
 
-    suspension_stiffness_n_m: float | None = None
-    """Stiffness of the exciter's suspension, N/m, 0 for none; fitted if None."""
-
-    def __post_init__(self) -> None:
-        stiffness = self.suspension_stiffness_n_m
-        if stiffness is not None and not 0.0 <= stiffness < math.inf:
-            raise ConfigurationError(f"`suspension_stiffness_n_m` = {stiffness:g}: allowed is 0 and above")
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.modes is None:
+            raise ConfigurationError(f"`modes`: is missing, {MODES_OF_A_STRUCTURE}")
         self.elements()  # refused here, not when it is asked for
+        return self
 
     def elements(self) -> "tuple[ElementPlan, ...]":
         """Return the elements as `identification.fit_structured` takes them."""

@@ -18,7 +18,7 @@ from rig.errors import ConfigurationError
 from rig.measurements import bench_of_recording
 from rig.recording.reader import Recording
 from rig.results.files import load_as
-from rig.results.structured.kind import STRUCTURED, functions_of
+from rig.results.structured.model import IdentifiedStructured
 from vibrolock.arrays import Float
 
 _FAITHFUL = 1e-6
@@ -39,12 +39,9 @@ def structured_model(path: Path, *, trust_code: bool = False) -> StructuredModel
 
     Raises `RecordingError` for another file, `ConfigurationError` for functions that are not trusted.
     """
-    model: StructuredModel = load_as(STRUCTURED, path).model
-    if (functions := functions_of(model)) and not trust_code:
-        raise ConfigurationError(
-            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
-            "`trust_code`"
-        )
+    found = load_as(IdentifiedStructured, path)
+    found.check_trusted(path, trust_code)
+    model = found.model
     return model
 
 

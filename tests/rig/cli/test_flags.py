@@ -5,28 +5,17 @@ import pytest
 from rig.arming.run_options import RunOptions
 from rig.cli.app import app
 from rig.cli.flags import flags, with_flags
-from rig.results.decay_backbone.options import DecayOptions
-from rig.results.identify_request import Request
-from rig.results.pnlss.options import PnlssOptions
-from rig.results.predictions.request import PredictionRequest
-from rig.results.simulated.options import DataOptions
-from rig.results.structured.options import StructuredOptions
+from rig.results.kinds import identifications, predictions
 from rig.tuning import TuningRequest
 from studies.reproduce.options import Options
 
-FILLED_OTHERWISE = {"pnlss", "structured", "decay", "data", "specimen", "folder", "progress", "about"}
+FILLED_OTHERWISE = {"specimen", "folder", "progress", "about"}
 """Fields that no single option fills."""
 
 
 @pytest.mark.parametrize(
     "request_",
     [
-        Request,
-        DataOptions,
-        DecayOptions,
-        PnlssOptions,
-        StructuredOptions,
-        PredictionRequest,
         TuningRequest,
         Options,
         RunOptions,
@@ -34,6 +23,13 @@ FILLED_OTHERWISE = {"pnlss", "structured", "decay", "data", "specimen", "folder"
 )
 def test_every_field_of_a_request_has_its_option(request_):
     assert {field.name for field in fields(request_)} - FILLED_OTHERWISE <= set(flags(app))
+
+
+@pytest.mark.parametrize("kinds", [identifications(), predictions()])
+def test_every_option_of_a_kind_has_its_flag_and_its_kind(kinds):
+    for word, kind in kinds.items():
+        assert kind.options.kind == word
+        assert set(kind.options.names()) <= set(flags(app))
 
 
 def test_a_field_becomes_its_option_and_other_words_in_backticks_stay():

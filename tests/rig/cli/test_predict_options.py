@@ -1,12 +1,10 @@
 """What ``rig predict`` asks for is what was typed."""
 
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
 from rig.errors import ConfigurationError
-from rig.results.predictions.request import PredictionRequest
 
 
 @pytest.fixture
@@ -14,7 +12,8 @@ def asked(command, monkeypatch):
     """What a line asks for; nothing is predicted."""
     requests = []
 
-    def note(model, request):
+    def note(model, request, *, kind):
+        assert not kind
         requests.append((model, request))
         raise ConfigurationError("noted")
 
@@ -25,12 +24,12 @@ def asked(command, monkeypatch):
         assert "noted" in ended.err, ended.err
         ((model, request),) = requests
         assert model == Path("MODEL.h5")
-        return {field.name: getattr(request, field.name) for field in fields(request)}
+        return {name: tuple(value) if isinstance(value, list) else value for name, value in request.items()}
 
     return of
 
 
-PLAIN = {field.name: getattr(PredictionRequest(forces_n=(0.25,)), field.name) for field in fields(PredictionRequest)}
+PLAIN = {"forces_n": (0.25,)}
 
 
 @pytest.mark.parametrize(

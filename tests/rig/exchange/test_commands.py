@@ -12,8 +12,8 @@ import scipy.io
 
 import rig
 from identification import FrequencyResponseMatrix, ModalAnalysis, nonlinear_mode
+from rig.exchange.conversion import taken_apart
 from rig.exchange.export import write_contents
-from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file
 from rig.results.files import load, save
 

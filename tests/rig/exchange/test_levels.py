@@ -73,8 +73,8 @@ def test_ascii_and_binary_are_what_they_say_and_pyuff_reads_the_same_from_both(m
 
 
 def test_binary_keeps_every_bit_of_uneven_frequencies_where_ascii_keeps_six_digits(responses, tmp_path):
+    from rig.exchange.conversion import taken_apart
     from rig.exchange.export import write_contents
-    from rig.exchange.kinds import taken_apart
 
     for encoding, digits in (("ascii", 1e-5), ("binary", 0.0)):
         path = tmp_path / f"{encoding}.uff"

@@ -10,10 +10,10 @@ import scipy.io
 from identification import Backbone, FrequencyResponseMatrix, NonlinearMode
 from rig.errors import ConfigurationError
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.conversion import taken_apart
 from rig.exchange.export import write_contents
-from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file, read_mapping
-from rig.exchange.time_data import TimeData
+from rig.results.time_data.series import TimeData
 from tests.rig.exchange.conftest import CHANNELS
 
 GRAVITY = 9.80665

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from identification import NonlinearMode
-from identification.common import decode, encode
+from identification.storage import decode, encode
+from rig.exchange.conversion import put_together, taken_apart
 from rig.exchange.export import write_contents
-from rig.exchange.kinds import KINDS, put_together, taken_apart
 from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.reading import import_file
-from rig.exchange.time_data import TimeData
 from rig.exchange.uff.reading import read_uff, time_data_in
+from rig.results.kinds import exchanges
+from rig.results.time_data.series import TimeData
 from tests.rig.exchange.conftest import CHANNELS
 
 NAMES = ("backbone", "mode", "matrix", "modes", "responses")
@@ -122,7 +123,8 @@ def test_several_objects_are_a_structure_array_of_which_one_is_chosen(matrix, tm
 
 
 def test_every_kind_has_a_name_of_its_own():
-    assert len({kind.name for kind in KINDS}) == len({kind.type for kind in KINDS}) == len(KINDS)
+    known = exchanges()
+    assert len({one.name for one in known}) == len({one.type for one in known}) == len(known)
 
 
 def test_numbers_of_a_table_are_those_that_numpy_reads(backbone, tmp_path):

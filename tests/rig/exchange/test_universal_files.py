@@ -8,11 +8,11 @@ import pyuff
 
 from identification import LinearModes
 from rig.exchange.child_reading import ImportFailed
+from rig.exchange.conversion import taken_apart
 from rig.exchange.export import write_contents
-from rig.exchange.kinds import taken_apart
 from rig.exchange.reading import import_file
-from rig.exchange.time_data import TimeData
 from rig.exchange.uff.reading import read_uff, time_data_in
+from rig.results.time_data.series import TimeData
 from tests.rig.exchange.conftest import CHANNELS
 
 FREQUENCY = np.arange(20.0, 30.0, 0.5)

@@ -6,15 +6,15 @@ from matplotlib.colors import to_rgba
 
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.multisine.points import recorded_spectra
+from rig.drawing.curves import View
 from rig.drawing.style import COLOURS
 from rig.errors import RecordingError
-from rig.figures.curves import View
 from rig.figures.files import plot
 from rig.figures.overlay import overlay
 from rig.recording.reader import Recording
 from rig.results.files import save
 from rig.results.identify import identify_model
-from rig.results.identify_request import Request
+from rig.results.nonlinear_mode.options import NonlinearModeOptions
 from rig.show.summary import summarise
 from tests.rig.figures.conftest import texts
 
@@ -64,7 +64,7 @@ def test_two_backbones_lie_where_their_points_are(recordings, drawn, tmp_path):
 
 def test_a_model_lies_over_the_recording_that_it_was_made_of(recordings, drawn, tmp_path):
     path = recordings["continuous-backbone"]
-    save(identify_model([path], Request()), tmp_path / "model.h5")
+    save(identify_model([path], NonlinearModeOptions()), tmp_path / "model.h5")
     page = drawn(overlay([path, tmp_path / "model.h5"], ["measured", "50 $ model"]))
     measured, model = (line.get_xydata() for line in page.axes[0].get_lines() if line.get_marker() in ("o", "s"))
     np.testing.assert_allclose(model, measured, rtol=1e-6)

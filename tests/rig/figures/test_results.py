@@ -19,9 +19,8 @@ from identification import (
     periodic_spectra,
 )
 from rig import figures
-from rig.figures.results import RESULTS
 from rig.results.files import save
-from rig.results.kinds import KINDS
+from rig.results.kinds import all_kinds
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response
 from tests.identification.rigs import CHANNELS, one_mode_point
@@ -205,7 +204,7 @@ def test_a_narrow_page_is_asked_for_once_for_all_figures(mode):
 def test_every_line_of_the_table_names_a_function():
     from pkgutil import resolve_name
 
-    for one in [*RESULTS.values(), *KINDS.values()]:
+    for one in all_kinds():
         assert callable(resolve_name(one.draw))
 
 

@@ -8,7 +8,6 @@ from rig.errors import ConfigurationError
 from rig.results.decay_backbone.options import DecayOptions
 from rig.results.files import save
 from rig.results.identify import identify_model
-from rig.results.identify_request import Request
 
 RATE_HZ, FREQUENCY_HZ, DAMPING = 1000.0, 20.0, 0.01
 
@@ -30,7 +29,7 @@ def file(tmp_path):
 
 
 def test_a_record_of_time_data_has_the_frequency_and_damping_of_its_mode(file):
-    found = identify_model([file], Request(kind="decay", near="20", decay=DecayOptions(point=2))).mode()
+    found = identify_model([file], DecayOptions(near="20", point=2)).mode()
     assert found.amplitude_m[0] > 0.6e-3  # the second record; the first begins at half of that
     np.testing.assert_allclose(found.modal_frequency_hz[:8], FREQUENCY_HZ, rtol=2e-4)
     np.testing.assert_allclose(found.damping_ratio[:8], DAMPING, rtol=2e-2)
@@ -41,4 +40,4 @@ def test_a_record_of_time_data_has_the_frequency_and_damping_of_its_mode(file):
 )
 def test_a_record_that_is_not_there_is_refused(file, point, said):
     with pytest.raises(ConfigurationError, match=said):
-        identify_model([file], Request(kind="decay", decay=DecayOptions(point=point)))
+        identify_model([file], DecayOptions(point=point))

@@ -16,7 +16,6 @@ from rig.results.files import load, save
 from rig.results.frequency_response_matrix.figure import draw_response_matrix
 from rig.results.predict import predict_vibrations
 from rig.results.predictions.figure import draw_predictions
-from rig.results.predictions.request import PredictionRequest
 
 
 def page_of(draw, thing, size=(12.0, 7.0)):
@@ -40,13 +39,13 @@ def legend_of(page):
 
 @pytest.fixture(scope="module")
 def predicted(shelf):
-    request = PredictionRequest(
-        forces_n=(0.1, 0.15),
-        sweeps=(shelf / "sweep.h5",),
-        exciter=shelf / "EX.h5",
-        modes=shelf / "LIN.h5",
-        references=(shelf / "stepped.h5",),
-    )
+    request = {
+        "forces_n": (0.1, 0.15),
+        "sweeps": (shelf / "sweep.h5",),
+        "exciter": shelf / "EX.h5",
+        "modes": shelf / "LIN.h5",
+        "references": (shelf / "stepped.h5",),
+    }
     return predict_vibrations(shelf / "NM.h5", request)
 
 
@@ -114,7 +113,7 @@ def test_a_page_too_small_for_all_sweeps_says_so(predicted):
 
 def test_a_response_that_was_asked_for_and_measured_is_predicted_once(shelf, tmp_path):
     mode = shelf / "NM.h5"
-    (curve,) = predict_vibrations(mode, PredictionRequest(forces_n=(0.1,))).steady
+    (curve,) = predict_vibrations(mode, {"forces_n": (0.1,)}).steady
     every = slice(None, None, 20)
     held = FrequencyResponse(
         frequency_hz=curve.frequency_hz[every],
@@ -126,7 +125,7 @@ def test_a_response_that_was_asked_for_and_measured_is_predicted_once(shelf, tmp
         label="0.1 N",
     )
     save((held,), tmp_path / "held.h5")
-    asked = PredictionRequest(forces_n=(0.1, 0.15), references=(tmp_path / "held.h5",))
+    asked = {"forces_n": (0.1, 0.15), "references": (tmp_path / "held.h5",)}
     found = predict_vibrations(mode, asked)
     assert [one.name for one in found.steady] == ["0.15 N", "0.1 N"]
     assert [reference is None for reference in found.steady_references] == [True, False]

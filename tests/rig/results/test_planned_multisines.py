@@ -11,7 +11,7 @@ from identification import Channel, Experiment, Features, PnlssModel, Prediction
 from rig.campaigns.plans import plan_from
 from rig.errors import ConfigurationError
 from rig.results.files import load, save
-from rig.results.pnlss.kind import IdentifiedPnlss
+from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.predictions.runs_figure import draw_runs
 from rig.results.simulated.constants import all_inputs, constants_of, with_constants
 from rig.results.simulated.planned_multisines import planned_multisines

@@ -12,7 +12,7 @@ from identification import predict_sweep
 from rig.measurements import sweeps
 from rig.recording.reader import Recording
 from rig.results.files import load, save
-from rig.results.identify import modes_in
+from rig.results.measured import modes_in
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response
 

@@ -17,7 +17,7 @@ from rig.campaigns.plans import plan_from
 from rig.errors import RecordingError
 from rig.results.files import load, save
 from rig.results.structured.figure import draw_structured
-from rig.results.structured.kind import IdentifiedStructured
+from rig.results.structured.model import IdentifiedStructured
 from rig.results.structured.options import StructuredOptions
 from tests.recorded import recorded_at
 from tests.rig.exchange.structured_models import structure
@@ -35,19 +35,13 @@ def recordings(tmp_path_factory) -> Path:
 
 def _fill(folder: Path) -> None:
     from rig.results.identify import identify_model
-    from rig.results.identify_request import Request
-    from rig.results.simulated.options import DataOptions
+    from rig.results.linear_modes.options import LinearOptions
 
     for name, level in (("low", 0.02), ("lines", 0.4)):
         recorded_at(folder / f"{name}.h5", plan_from(LINES | {"levels_rms_v": [level]}, name), seed=1)
-    save(identify_model([folder / "low.h5"], Request(kind="linear", count=1)), folder / "modes.h5")
-    request = Request(
-        kind="structured",
-        modes=folder / "modes.h5",
-        structured=StructuredOptions(laws=("polynomial-spring",)),
-        data=DataOptions(rate_hz=200.0, outputs="drive"),
-    )
-    save(identify_model([folder / "lines.h5"], request), folder / "S.h5")
+    save(identify_model([folder / "low.h5"], LinearOptions(count=1)), folder / "modes.h5")
+    options = StructuredOptions(modes=folder / "modes.h5", laws=("polynomial-spring",), rate_hz=200.0, outputs="drive")
+    save(identify_model([folder / "lines.h5"], options), folder / "S.h5")
 
 
 @pytest.fixture
@@ -279,7 +273,7 @@ def test_a_file_that_lacks_an_array_is_named(tmp_path):
 def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
     page = (Path(__file__).parents[3] / "docs/how-to/identify-a-structured-model.md").read_text(encoding="utf-8")
     for name in sorted(set(LAWS) - {"user-spring"}):
-        ((law,),) = [plan.laws for plan in StructuredOptions(laws=(name,)).elements()]
+        ((law,),) = [plan.laws for plan in StructuredOptions(modes="m.h5", laws=(name,)).elements()]
         assert isinstance(law, LAWS[name])
         assert f"`{name}`" in page
 
@@ -288,7 +282,7 @@ def test_every_law_but_a_function_of_ones_own_is_an_option_and_in_the_how_to():
     ("place", "between"), [("", ()), ("@drive", ("drive",)), ("@ drive : base", ("drive", "base"))]
 )
 def test_an_element_acts_at_the_outputs_after_its_laws(place, between):
-    (plan,) = StructuredOptions(laws=(f"polynomial-spring, masing{place}",)).elements()
+    (plan,) = StructuredOptions(modes="m.h5", laws=(f"polynomial-spring, masing{place}",)).elements()
     assert [type(law) for law in plan.laws] == [LAWS["polynomial-spring"], LAWS["masing"]]
     assert plan.between == between
 

@@ -20,11 +20,10 @@ def model(shelf):
     """A model of the one-sided magnet beam beside its recordings, and the plan of a sweep."""
     from rig.results.files import save
     from rig.results.identify import identify_model
-    from rig.results.identify_request import Request
-    from rig.results.simulated.options import DataOptions
+    from rig.results.structured.options import StructuredOptions
 
     recorded_at(shelf / "lines.h5", plan_from(LINES, "lines"), seed=1)
-    request = Request(kind="structured", modes=shelf / "LIN.h5", data=DataOptions(rate_hz=400.0, outputs="drive"))
+    request = StructuredOptions(modes=shelf / "LIN.h5", rate_hz=400.0, outputs="drive")
     save(identify_model([shelf / "lines.h5"], request), shelf / "ST.h5")
     plan = SWEEP | {"levels_v": [0.3]}
     (shelf / "ahead.toml").write_text("\n".join(f"{name} = {json.dumps(value)}" for name, value in plan.items()))

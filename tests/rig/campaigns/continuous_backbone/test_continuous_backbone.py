@@ -17,7 +17,7 @@ from rig.errors import ConfigurationError
 from rig.figures.files import plot
 from rig.measurements import continuous_backbones
 from rig.results.identify import identify_model
-from rig.results.identify_request import Request
+from rig.results.nonlinear_mode.options import NonlinearModeOptions
 from rig.show.summary import summarise
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 from simulators import VirtualRig
@@ -87,7 +87,7 @@ def test_standard_errors_are_stated_and_hold_the_truth(recorded, truth):
 
 
 def test_it_gives_a_nonlinear_mode_and_a_figure(recorded, tmp_path, truth):
-    mode = identify_model([recorded], Request())
+    mode = identify_model([recorded], NonlinearModeOptions())
     assert mode.source == "continuous backbone"
     assert np.all(mode.damping_ratio_std > 0.0)
     properties = ModalProperties.of(mode)
@@ -103,7 +103,7 @@ def test_repeats_are_backbones_of_their_own_and_make_one_mode(tmp_path):
         assert run.complete
         assert [one.amplitude_m.size for one in continuous_backbones(run.recording)] == [3, 3]
         assert run.backbone().repeats == (1, 1, 1, 2, 2, 2)
-    assert identify_model([path], Request()).modal_frequency_hz.size == 3
+    assert identify_model([path], NonlinearModeOptions()).modal_frequency_hz.size == 3
 
 
 def test_at_the_voltage_limit_the_level_turns_and_what_was_reached_is_kept():

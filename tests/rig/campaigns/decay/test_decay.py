@@ -189,20 +189,21 @@ def test_a_plan_without_a_measured_plant_is_refused_before_anything_moves():
 
 
 def test_a_decay_becomes_a_model_of_a_file(magnet, tmp_path):
+    from rig.results.decay_backbone.options import DecayOptions
     from rig.results.files import load
     from rig.results.identify import identify_model
-    from rig.results.identify_request import Request
+    from rig.results.nonlinear_mode.options import NonlinearModeOptions
 
     with pytest.raises(ConfigurationError, match="a decay campaign knows it from its plan"):
-        identify_model([magnet.path], Request(kind="decay", near="24"))
-    found = identify_model([magnet.path], Request(kind="decay"))
+        identify_model([magnet.path], DecayOptions(near="24"))
+    found = identify_model([magnet.path], DecayOptions())
     assert isinstance(found, DecayBackbone)
     assert found.mode().amplitude_m[0] == pytest.approx(decays(magnet)[1].mode().amplitude_m[0])
     from rig.results.files import save
 
     save(found, tmp_path / "decay.h5")
     assert load(tmp_path / "decay.h5").mode().table() == found.mode().table()
-    mode = identify_model([tmp_path / "decay.h5"], Request())
+    mode = identify_model([tmp_path / "decay.h5"], NonlinearModeOptions())
     assert mode.source == "free decay"
 
 

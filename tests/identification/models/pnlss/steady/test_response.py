@@ -19,7 +19,7 @@ from identification import (
 )
 from identification.storage import decode, encode
 from rig.results.predictions.figure import draw_predictions
-from rig.results.predictions.kind import PREDICTIONS
+from rig.results.predictions.table import TABLE
 from tests.identification.models.pnlss.steady.oscillators import HZ, oscillator, shaker
 
 CUBIC, FORCE_N = 6e8, 1.2
@@ -65,7 +65,7 @@ def test_predictions_are_compared_packed_shown_and_drawn_like_any_other(capsys: 
     np.testing.assert_array_equal(again.steady[0].displacement_m, found.displacement_m)
     np.testing.assert_array_equal(again.steady[0].modal_amplitude, np.full(found.frequency_hz.size, np.nan))
     assert again.steady[0].notes == found.notes
-    PREDICTIONS.say(PREDICTIONS.summarise(again))
+    TABLE.say(TABLE.summarise(again))
     shown = capsys.readouterr().out
     assert "held: a force without harmonics" in shown
     assert f"{found.fold_frequency_hz[0]:.4f}" in shown

@@ -1,7 +1,7 @@
-"""What is printed of results that no file of ours holds, and of recordings in short."""
+"""Tables of results that have no file."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,26 +20,16 @@ from identification import (
     Transient,
 )
 from rig.check import report as checks
-from rig.check.assessment import Assessment
-from rig.figures.responses import as_predictions
-from rig.recording.reader import Recording
-from rig.results.predictions.kind import PREDICTIONS
-from rig.show.summary import summarise_recording
-from rig.show.tables import print_findings, print_points
+from rig.results.in_memory.responses import as_predictions
+from rig.results.kind import Table
+from rig.results.predictions.table import TABLE as PREDICTIONS
 from rig.text.console import number, print_table
 from rig.tuning import Tuning
 from rig.tuning.report import lines
 from simulators.analysis import PeriodicResponses
-from vibrolock.printable import printable, printable_strings
+from vibrolock.printable import printable
 
-
-def say_recording(recording: Recording) -> None:
-    """Print the points of a recording with their quality, and what concerns all of them."""
-    found = printable_strings(summarise_recording(recording))
-    ended = found["parts"][-1]["ended"] if found["parts"] else "nothing recorded"
-    print(f"{found['kind']} of {found['specimen']} (bench {found['bench']}): {ended or 'cut short'}")
-    print_points(found["kind"], found["points"])
-    print_findings(found)
+T = TypeVar("T")
 
 
 def _say_response(found: FrequencyResponse) -> None:
@@ -132,10 +122,6 @@ def _say_comparison(found: Comparison) -> None:
     )
 
 
-def _say_prediction(found: SteadyPrediction | SweepPrediction) -> None:
-    PREDICTIONS.say(PREDICTIONS.summarise(as_predictions(found)))
-
-
 def _say_band(found: ResponseBand) -> None:
     print(f"of {found.draws} draws; +- are 95 %")
     print_table(
@@ -187,30 +173,31 @@ def _say_transient(found: Transient) -> None:
     )
 
 
+def _summarise_prediction(found: SteadyPrediction | SweepPrediction) -> dict[str, Any]:
+    return PREDICTIONS.summarise(as_predictions(found))
+
+
 def _say_tuning(found: Tuning) -> None:
     for line in lines(found):
         print(printable(line))
 
 
-def _say_check(found: Assessment) -> None:
-    checks.print_summary(checks.summary(found))
+def _table(say: Callable[[T], None]) -> Table[T, T]:
+    """Return the table of a result that is printed without a summary."""
+    return Table(lambda result: result, say)
 
 
-SAY: Mapping[str, Callable[[Any], None]] = {
-    "FrequencyResponse": _say_response,
-    "ForceSurface": _say_surface,
-    "ConstantForceCurve": _say_curve,
-    "ContinuousBackbone": _say_continuous,
-    "DistortionLevels": _say_distortion,
-    "Comparison": _say_comparison,
-    "SteadyPrediction": _say_prediction,
-    "SweepPrediction": _say_prediction,
-    "ResponseBand": _say_band,
-    "StabilisationDiagram": _say_stabilisation,
-    "PeriodicResponses": _say_periodic,
-    "PeriodicSpectra": _say_spectra,
-    "Transient": _say_transient,
-    "Tuning": _say_tuning,
-    "Assessment": _say_check,
-}
-"""What prints a result, by the name of its type; others have a kind of file, which prints them."""
+RESPONSE = _table(_say_response)
+SURFACE = _table(_say_surface)
+CURVE = _table(_say_curve)
+CONTINUOUS = _table(_say_continuous)
+DISTORTION = _table(_say_distortion)
+COMPARISON = _table(_say_comparison)
+BAND = _table(_say_band)
+STABILISATION = _table(_say_stabilisation)
+PERIODIC = _table(_say_periodic)
+SPECTRA = _table(_say_spectra)
+SWEEP = _table(_say_transient)
+PREDICTION = Table(_summarise_prediction, PREDICTIONS.say)
+TUNING = _table(_say_tuning)
+CHECK = Table(checks.summary, checks.print_summary)

@@ -1,6 +1,5 @@
 """Exchange of structured models: modes, shapes, and forces of the elements as numbers and as tables over displacement."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,6 +7,8 @@ import numpy as np
 from identification import StructuredModel
 from identification.common import decode, encode
 from identification.models import Damper, Joint, Spring, UserSpring
+from rig.results.arrays import Arrays, Attributes
+from rig.results.kind import Exchange
 from rig.text.contents import Contents
 
 _POINTS = 201
@@ -64,7 +65,10 @@ def structured_parts(model: StructuredModel) -> Contents:
     return Contents("structured", model.specimen, out, attributes, {}, {n: u for n, u in _UNITS.items() if n in out})
 
 
-def structured_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> StructuredModel:
+def structured_from(arrays: Arrays, attributes: Attributes) -> StructuredModel:
     """Convert the output of `structured_parts` back to a model."""
     names = ("frequency_hz", "damping_ratio", "input_shapes", "output_shapes", "direct")
     return decode(StructuredModel, {name: np.asarray(arrays[name]) for name in names}, attributes)
+
+
+EXCHANGE = Exchange("structured", StructuredModel, structured_parts, structured_from)

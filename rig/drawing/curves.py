@@ -1,12 +1,14 @@
 """What curves of several files laid over one another are made of, and how one wants to see them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Channel
+from identification import Backbone, Channel, FrequencyResponseMatrix, NonlinearMode
+from rig.drawing.style import unit_text
 from rig.errors import RecordingError
 from vibrolock.arrays import Float
 
@@ -51,6 +53,14 @@ class Quantity(NamedTuple):
     """Unit of the values; m is shown as mm or µm."""
     role: Literal["amplitude", "frequency", ""] = ""
     """What a `View` does to the axis."""
+
+
+FREQUENCY = Quantity("frequency", "Hz", "frequency")
+LAG = Quantity("phase lag of displacement", "deg")
+FORCE = Quantity("fundamental force", "N", "amplitude")
+DISPLACEMENT = Quantity("displacement amplitude", "m", "amplitude")
+ONE_AMPLITUDE = "the file holds the fundamental of the drive point alone"
+"""Why a `View` of another channel or harmonic is refused."""
 
 
 class Panel(NamedTuple):
@@ -124,3 +134,50 @@ def peak(
         values = values / (2.0 * np.pi * view.harmonic * frequency_hz) ** _DERIVATIVE[channel.unit]
         return Quantity(f"displacement amplitude{of}{which}", "m", "amplitude"), values
     return Quantity(f"amplitude of {channel.name}{which}", channel.unit, "amplitude"), values
+
+
+def backbone_curves(modes: Sequence[tuple[Backbone | None, NonlinearMode]], view: View, omitted: str = "") -> Curves:
+    """Return modal frequency and damping over the amplitude, with 95 % intervals.
+
+    ``modes`` come with the backbones that they were identified from where the file holds these; several are repeats.
+    """
+    traces, across = [], DISPLACEMENT
+    for number, (measured, mode) in enumerate(modes, 1):
+        amplitude = mode.amplitude_m
+        if measured is None:
+            view.only(of=ONE_AMPLITUDE)
+        else:
+            harmonics = np.array([point.harmonics for point in measured.points])
+            across, amplitude = peak(measured.points[0].channels, harmonics, measured.frequency_hz, view)
+        order = np.argsort(mode.amplitude_m)
+        lines = tuple(
+            Line(amplitude[order], scale * getattr(mode, name)[order], scale * mode.bound_95(name)[order])
+            for name, scale in (("modal_frequency_hz", 1.0), ("damping_ratio", 100.0))
+        )
+        traces.append(Trace(f"repeat {number}" if len(modes) > 1 else "", lines))
+    panels = (
+        Panel(across, Quantity("modal frequency", "Hz", "frequency")),
+        Panel(across, Quantity("modal damping ratio", "%")),
+    )
+    return Curves(panels, tuple(traces), modes[0][1].specimen, omitted)
+
+
+def transfer_curves(levels: Mapping[str, FrequencyResponseMatrix], view: View, omitted: str = "") -> Curves:
+    """Return the frequency response from the force to the channel at each level: size and phase."""
+    view.only("channel", of="a frequency response has no harmonics; they are in the scatter over realisations")
+    panels: tuple[Panel, ...] = ()
+    traces = []
+    for name, matrix in levels.items():
+        motions = [row for row, channel in enumerate(matrix.outputs) if channel.role in ("drive", "response")]
+        outputs = tuple(matrix.outputs[row] for row in motions)
+        channel = motions[channel_of(outputs, view)]
+        value = matrix.value[:, channel, 0]
+        unit = unit_text(f"{matrix.outputs[channel].unit}/{matrix.inputs[0].unit}")
+        of = f"{matrix.outputs[channel].name} over {matrix.inputs[0].name}"
+        panels = (
+            Panel(FREQUENCY, Quantity(of, unit, "amplitude"), log=True),
+            Panel(FREQUENCY, Quantity("phase", "deg")),
+        )
+        degrees = (np.degrees(np.angle(value)) + 90.0) % 360.0 - 90.0  # the curve has no jump at 0 or 180 deg
+        traces.append(Trace(name, (Line(matrix.frequency_hz, np.abs(value)), Line(matrix.frequency_hz, degrees))))
+    return Curves(panels, tuple(traces), next(iter(levels.values())).specimen, omitted)

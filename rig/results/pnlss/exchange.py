@@ -1,12 +1,13 @@
 """Exchange of nonlinear state-space models: coefficient matrices under the names used by PNLSS toolboxes."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from identification import PnlssModel
 from identification.common import decode, encode
+from rig.results.arrays import Arrays, Attributes
+from rig.results.kind import Exchange
 from rig.text.contents import Contents
 
 _NAMES = {
@@ -46,9 +47,12 @@ def pnlss_parts(model: PnlssModel) -> Contents:
     return Contents("pnlss", model.specimen, out, attributes, {}, units)
 
 
-def pnlss_from(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> PnlssModel:
+def pnlss_from(arrays: Arrays, attributes: Attributes) -> PnlssModel:
     """Convert the output of `pnlss_parts` back to a model."""
     inside = {name: np.asarray(arrays[outside]) for outside, name in _NAMES.items()}
     for name in ("state_features/exponents", "output_features/exponents"):
         inside[name] = inside[name].astype(np.int64)
     return decode(PnlssModel, inside, attributes)
+
+
+EXCHANGE = Exchange("pnlss", PnlssModel, pnlss_parts, pnlss_from)

@@ -16,8 +16,8 @@ from identification import (
 )
 from identification.common import MOTION_UNIT
 from rig.drawing.style import MAIN, REJECTED, SECOND, shade, title, unit_text
-from rig.figures.axes import branches, length_factor
 from rig.results.frequency_responses.figure import draw_responses
+from rig.results.in_memory.axes import branches, length_factor
 from rig.results.predictions.figure import draw_predictions
 
 if TYPE_CHECKING:

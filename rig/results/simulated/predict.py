@@ -10,55 +10,45 @@ from identification import (
     Exciter,
     FrequencyResponse,
     IdentificationError,
-    PnlssModel,
     PredictionError,
     Predictions,
     ResponseBand,
     SteadyPrediction,
-    StructuredModel,
 )
-from identification.models import band_of_responses, drawn
+from identification.models import band_of_responses
 from rig.errors import ConfigurationError
-from rig.results.exciter.kind import EXCITER
-from rig.results.files import load_as
-from rig.results.kind import FileKind
-from rig.results.pnlss.kind import IdentifiedPnlss, check_trusted
-from rig.results.predictions.request import PredictionRequest
+from rig.results.files import load, load_as
+from rig.results.predictions.references import references_in
 from rig.results.simulated.constants import constants_of
 from rig.results.simulated.driven_models import DrivenModel, frequency_response_at
+from rig.results.simulated.model import SimulatedModel
 from rig.results.simulated.multisines import simulated_multisines
 from rig.results.simulated.planned_multisines import planned_multisines
-from rig.results.simulated.steady import Held, Reference, compared, default_held
+from rig.results.simulated.prediction_options import SimulatedPrediction
+from rig.results.simulated.steady import Held, compared, default_held
 from rig.results.simulated.sweep_models import SimulatedSweepModels
 from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
-from rig.results.structured.kind import IdentifiedStructured, functions_of
 
 _DRAWS = 40
 """Models of a band."""
 
 
-def simulated_predictions(
-    path: Path, kind: FileKind, request: PredictionRequest, references: Sequence[Reference]
-) -> Predictions:
+def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     """Return the requested predictions, with errors where there is a reference. Unbounded runs are also results.
 
     Raises `ConfigurationError` for requests that such a model cannot answer and for code that is not trusted,
     `identification.IdentificationError` if it has no periodic vibration or its channels do not fit.
     """
-    found: IdentifiedPnlss | IdentifiedStructured = load_as(kind, path)
-    model = found.model
-    if isinstance(model, PnlssModel):
-        check_trusted(path, model, request.trust_code)
-    elif (functions := functions_of(model)) and not request.trust_code:
-        raise ConfigurationError(
-            f"{path}: function = {functions[0]!r}: is code that the model names, and is not imported unless you trust it: "
-            "`trust_code`"
-        )
+    found: SimulatedModel = load(path)
+    references = [one for file in request.references for one in references_in(file, request.over)]
+    model = cast(DrivenModel, found.model)
+    found.check_trusted(path, request.trust_code)
     _check(request, model, path)
-    exciter = None if request.exciter is None else cast(Exciter, load_as(EXCITER, request.exciter))
+    bands_asked = getattr(request, "bands", False)
+    exciter = None if request.exciter is None else load_as(Exciter, request.exciter)
     constants = constants_of(model, request.constants, path)
     fixed: dict[str, Any] = {"exciter": exciter, **({"held_inputs": constants} if constants else {})}
-    held = cast(Held, request.held or default_held(model, exciter))
+    held: Held = request.held or default_held(model, exciter)
     references_held = default_held(model, exciter)
     alone = request.forces_without_reference([one.measured for one in references], references_held)
     steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
@@ -66,9 +56,9 @@ def simulated_predictions(
         for one, levels in ((held, alone), ("voltage", request.voltages_v))
         for level in levels
     ]
-    if request.bands and not steady:
+    if bands_asked and not steady:
         raise ConfigurationError("`bands`: are those of responses without a reference; add `forces_n` or `voltages_v`")
-    others = _others(found, request.bands, path) if steady else []
+    others = _others(found, bands_asked, path) if steady else []
     bands = [_band(others, one, fixed) for one, _, _ in steady]
     steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
     models = SimulatedSweepModels(model, exciter, constants)
@@ -78,7 +68,7 @@ def simulated_predictions(
     for plan in request.planned_multisines:
         more, remarks = planned_multisines(plan, model, exciter, constants)
         runs, said = (*runs, *more), (*said, *remarks)
-    if request.bands and None in bands:
+    if bands_asked and None in bands:
         said = (*said, "a response has no band where most of the models that the fit allows have no such response")
     if any(bands):
         of = (
@@ -109,17 +99,17 @@ def simulated_predictions(
     )
 
 
-def _others(found: IdentifiedPnlss | IdentifiedStructured, asked: bool, path: Path) -> Sequence[DrivenModel]:
+def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenModel]:
     """Return models of fresh runs, or else, if asked for, models that the fit allows."""
     if found.scatter is not None:
-        return list(found.scatter.fresh(found.model, _DRAWS))
+        return list(found.scatter.fresh(cast(DrivenModel, found.model), _DRAWS))
     if not asked:
         return []
-    if not isinstance(found, IdentifiedStructured) or found.fit is None:
+    if (models := found.allowed_by_fit(_DRAWS)) is None:
         raise ConfigurationError(
             f"`bands`: {path} has a model without its fit, whose covariance they need; leave it out"
         )
-    return list(drawn(found.fit, _DRAWS))
+    return cast(Sequence[DrivenModel], models)
 
 
 def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Mapping[str, Any]) -> ResponseBand | None:
@@ -133,19 +123,8 @@ def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Map
     return band_of_responses(responses) if len(responses) > _DRAWS // 2 else None
 
 
-def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
-    """Refuse options that only a nonlinear mode understands, and requests that the model's channels do not allow."""
-    given = {
-        "zero_crossings": request.zero_crossings is not None,
-        "modes": request.modes is not None,
-        "allow_extrapolation": request.allow_extrapolation,
-    }
-    which = "structured" if isinstance(model, StructuredModel) else "PNLSS"
-    for name in (name for name, is_given in given.items() if is_given):
-        raise ConfigurationError(
-            f"`{name}`: means nothing to a {which} model, which answers `forces_n`, `voltages_v`, `references`, `sweeps`, "
-            "`planned`, `multisines` and `planned_multisines`"
-        )
+def _check(request: SimulatedPrediction, model: DrivenModel, path: Path) -> None:
+    """Refuse requests that the model's channels do not allow."""
     steady = bool(request.forces_n or request.voltages_v or request.references)
     swept = bool(request.sweeps or request.planned)
     inputs, outputs = ([channel.role for channel in channels] for channels in (model.inputs, model.outputs))
@@ -176,13 +155,13 @@ def _check(request: PredictionRequest, model: DrivenModel, path: Path) -> None:
         )
 
 
-def _asked(request: PredictionRequest, alone: Sequence[float], measured: FrequencyResponse) -> bool:
+def _asked(request: SimulatedPrediction, alone: Sequence[float], measured: FrequencyResponse) -> bool:
     """Return whether the response to the force of a reference was asked for too, and so is wanted over the whole band."""
     others = set(request.forces_n) - set(alone)
     return measured.controlled == "force" and any(math.isclose(force, measured.level, rel_tol=1e-6) for force in others)
 
 
-def _default(request: PredictionRequest, held: Held) -> tuple[str, ...]:
+def _default(request: SimulatedPrediction, held: Held) -> tuple[str, ...]:
     """Return a note on the held force if it was chosen by default."""
     if request.held is not None or held != "pure-sine":
         return ()

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification import ContinuousBackbone
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
-from rig.figures.axes import band, branches, length_factor
+from rig.results.in_memory.axes import band, branches, length_factor
 from simulators.analysis import PeriodicResponses
 
 if TYPE_CHECKING:

@@ -1,0 +1,29 @@
+"""Levels of a response-controlled test. The surface is fitted again on each use."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from identification import (
+    ForceSurface,
+    FrequencyResponse,
+    force_surface,
+)
+from vibrolock.results import Result
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredSurface(Result):
+    """Levels of a response-controlled test, the surface through them, and notes on missing points of the plan."""
+
+    responses: tuple[FrequencyResponse, ...]
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def surface(self) -> ForceSurface:
+        """Surface fitted to the levels; raises `IdentificationError` if they do not define one."""
+        return force_surface(self.responses)
+
+
+def exported(measured: MeasuredSurface) -> list[tuple[FrequencyResponse, ...]]:
+    """Return what is exported of a file: the measured levels."""
+    return [measured.responses]

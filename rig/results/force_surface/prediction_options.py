@@ -1,0 +1,16 @@
+"""Options of predictions by a force surface."""
+
+from typing import Annotated, ClassVar, Literal
+
+from rig.results.options import Option
+from rig.results.predictions.options import PredictionOptions
+
+
+class ForceSurfacePrediction(PredictionOptions):
+    """Options of ``rig predict force-surface``: it answers between its measured levels, at constant fundamental force."""
+
+    kind: ClassVar[str] = "force-surface"
+    takes: ClassVar[str] = "a force surface, which answers"
+
+    held: Annotated[Literal["fundamental"] | None, Option(flag="--force")] = None
+    """What is constant: the fundamental."""

@@ -1,0 +1,1 @@
+"""Results that have no file of their own."""

@@ -1,0 +1,75 @@
+"""Measured responses with which predictions are compared."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from identification import (
+    FrequencyResponse,
+)
+from identification.prediction import Over
+from rig.campaigns.evaluation.point import spectrum_of, vibration_of
+from rig.campaigns.evaluation.recorded import points_of
+from rig.errors import RecordingError
+from rig.measurements import STEPPED, frequency_responses
+from rig.recording.arrays import kind_of
+from rig.recording.reader import Recording
+from rig.results.files import load_as
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A measured response and how it is compared."""
+
+    measured: FrequencyResponse
+    """The measured response."""
+    over: Over
+    """Quantity over which it is compared."""
+    over_asked: bool = False
+    """Whether the user asked for that quantity."""
+    second_harmonic: float | None = None
+    """Second harmonic of the force over its fundamental at the largest response; None if unknown."""
+
+
+def over_of(measured: FrequencyResponse, asked: Over | None) -> Over:
+    """Return the quantity over which a reference is compared."""
+    return asked or ("phase" if _turns_back(measured.frequency_hz) else "frequency")
+
+
+def _turns_back(frequency_hz: np.ndarray) -> bool:
+    """Whether the frequency turns back along a branch. Then only the phase distinguishes vibrations at the same frequency."""
+    steps = np.diff(frequency_hz)
+    return bool((steps > 0.0).any() and (steps < 0.0).any())
+
+
+def references_in(path: Path, asked: Over | None) -> list[Reference]:
+    """Return stepped sines with the second harmonic of their force, if it was recorded."""
+    ratios: dict[tuple[float, float], float] = {}
+    if kind_of(path) in STEPPED:
+        with Recording(path) as recording:
+            row = [channel["role"] for channel in recording.channels].index("force")
+            for point in (point for point in points_of(recording) if point.accepted):
+                force = np.abs(spectrum_of(point).harmonics[row])
+                if force.size > 2 and force[1] > 0.0:
+                    ratios[point.level, vibration_of(point).frequency_hz] = float(force[2] / force[1])
+    found = []
+    for measured in stepped_sines(path):
+        top = float(measured.frequency_hz[int(np.argmax(measured.amplitude_m))])
+        over = over_of(measured, asked)
+        found.append(Reference(measured, over, asked is not None, ratios.get((measured.level, top))))
+    return found
+
+
+def stepped_sines(path: Path) -> Sequence[FrequencyResponse]:
+    """Return the levels of a stepped-sine recording, or of imported stepped sines."""
+    kind = kind_of(path)
+    if kind == "frequency-responses":
+        return load_as(tuple, path)
+    if kind not in STEPPED:
+        raise RecordingError(
+            f"{path}: is a file of kind {kind}; a reference is a stepped-sine recording or imported stepped sines"
+        )
+    with Recording(path) as recording:
+        return frequency_responses(recording)

@@ -1,0 +1,46 @@
+"""A structured model and its origin."""
+
+from dataclasses import dataclass
+
+from identification import StructuredFit, StructuredModel
+from identification.experiments import Simulator
+from identification.models import UserSpring, drawn
+from rig.results.simulated.model import (
+    SimulatedModel,
+)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentifiedStructured(SimulatedModel):
+    """A structured model and its origin.
+
+    Parameters
+    ----------
+    model
+        The model.
+    fit
+        Its fit; None for a model from another source.
+    linear
+        Modes with which the fit began, without elements; None if unknown.
+    """
+
+    model: StructuredModel
+    fit: StructuredFit | None = None
+    linear: StructuredModel | None = None
+
+    @property
+    def functions(self) -> list[str]:
+        """Functions of the user, ``module:name``, that the model names."""
+        named = [law.function for element in self.model.elements for law in element.laws if isinstance(law, UserSpring)]
+        return list(dict.fromkeys(named))
+
+    def allowed_by_fit(self, count: int) -> list[Simulator] | None:
+        """Return models drawn by the covariance of the fit; None if it is unknown."""
+        return None if self.fit is None else list(drawn(self.fit, count))
+
+
+def whole(found: StructuredFit | StructuredModel) -> IdentifiedStructured:
+    """Return a fit or a model without further results as an identified model."""
+    if isinstance(found, StructuredFit):
+        return IdentifiedStructured(model=found.model, fit=found)
+    return IdentifiedStructured(model=found)

@@ -1,0 +1,179 @@
+"""Files of structured models: the model, its fit, its errors by experiment, and the spectra of one experiment."""
+
+from contextlib import suppress
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
+from identification.models import Joint, std_of
+from rig.results.kind import Table
+from rig.results.simulated.table import errors_in, say_errors, say_scatter, scatter_in
+from rig.results.structured.model import IdentifiedStructured
+from rig.text.console import number, print_table
+
+_LEAST_SUPPORT_N_M = 1e-3
+"""Stiffness of the support below which it counts as none."""
+
+
+_Modes = list[dict[str, float | None]]
+_SAME = 1e-6
+"""Relative difference of frequencies below which small vibrations are those of the linear part."""
+
+
+def _linear_part(model: StructuredModel, fit: StructuredFit | None) -> _Modes:
+    """Natural frequencies (Hz) and damping ratios as they were fitted with their standard errors, None where unknown."""
+    errors = {} if fit is None else dict(zip(fit.names, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
+    size = np.concatenate([model.frequency_hz, model.damping_ratio])
+    names = [f"{name} {index + 1}" for name in ("frequency", "damping") for index in range(len(model.frequency_hz))]
+    return _rows(model, size * np.array([errors.get(name, np.nan) for name in names]))
+
+
+def _small_vibrations(found: IdentifiedStructured) -> _Modes | None:
+    """Return the same at rest, where joints stick; None if the model does not vibrate there, or names code."""
+    if found.functions:
+        return None
+    model, fit = found.model, found.fit
+    std = np.full(2 * len(model.frequency_hz), np.nan)
+    try:
+        at_rest = model.linearised()
+    except IdentificationError:
+        return None
+    if fit is not None:
+        with suppress(IdentificationError):  # at a distance of the standard errors the model may not exist
+            std = std_of(fit, _numbers_at_rest)
+    return _rows(at_rest, std)
+
+
+def _numbers_at_rest(model: StructuredModel) -> np.ndarray:
+    at_rest = model.linearised()
+    return np.concatenate([at_rest.frequency_hz, at_rest.damping_ratio])
+
+
+def _rows(model: StructuredModel, std: np.ndarray) -> _Modes:
+    """Rows of modes; ``std``: first those of the frequencies, then those of the damping ratios."""
+    values = np.array([model.frequency_hz, std[: std.size // 2], model.damping_ratio, std[std.size // 2 :]])
+    names = ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_ratio_std")
+    return [
+        {name: float(value) if np.isfinite(value) else None for name, value in zip(names, row, strict=True)}
+        for row in values.T
+    ]
+
+
+def _differ(one: _Modes, other: _Modes) -> bool:
+    pairs = [(a[name], b[name]) for a, b in zip(one, other, strict=True) for name in ("frequency_hz", "damping_ratio")]
+    return any(a is not None and b is not None and abs(a - b) > _SAME * abs(b) for a, b in pairs)
+
+
+def _element(element: NonlinearElement) -> dict[str, Any]:
+    """Describe an element in numbers."""
+    return {
+        "direction": element.direction.tolist(),
+        "scale_m": element.scale_m,
+        "reach_m": element.reach * element.scale_m,
+        "largest_m": None if element.largest is None else element.largest * element.scale_m,
+        "between": list(element.between),
+        "laws": [law.as_dict() for law in element.laws],
+    }
+
+
+def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
+    model, fit = found.model, found.fit
+    fitted, at_rest = _linear_part(model, fit), _small_vibrations(found)
+    return {
+        "specimen": model.specimen,
+        "inputs": [channel.name for channel in model.inputs],
+        "outputs": [channel.name for channel in model.outputs],
+        "sample_rate_hz": model.sample_rate_hz,
+        "steps": model.steps,
+        "modes": at_rest,
+        "linear_part": None if at_rest is not None and not _differ(fitted, at_rest) else fitted,
+        "elements": [_element(element) for element in model.elements],
+        "joints": any(isinstance(law, Joint) for element in model.elements for law in element.laws),
+        "support_n_m": model.support_n_m,
+        "fit": None
+        if fit is None
+        else {
+            "numbers": len(fit.names),
+            "training_error": fit.training_error,
+            "evaluations": fit.evaluations,
+            "stopped": fit.message,
+            "seconds": fit.seconds,
+            "trials": [asdict(trial) for trial in fit.trials],
+        },
+        "scatter": scatter_in(found),
+        **errors_in(found),
+        "training": list(model.training),
+        "seconds": found.seconds,
+        "notes": [
+            *found.notes,
+            *(f"names a function, {one}: simulations import it" for one in found.functions),
+        ],
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    inputs, outputs = ", ".join(summary["inputs"]), ", ".join(summary["outputs"])
+    print(f"{summary['steps']} steps a sample at {summary['sample_rate_hz']:g} Hz; {inputs} to {outputs}")
+    if summary["fit"] is not None:
+        fit = summary["fit"]
+        print(
+            f"{fit['numbers']} numbers fitted, error {number(fit['training_error'], '.3f', 100.0)} % in training, "
+            f"{fit['evaluations']} simulations; {number(summary['seconds'], '.1f')} s in all; {fit['stopped']}"
+        )
+    if summary["modes"] is not None:
+        print("small vibrations, all joints stuck" if summary["joints"] else "small vibrations")
+        _say_modes(summary["modes"])
+    if summary["linear_part"] is not None:
+        print("fitted linear part, all joints slipping" if summary["joints"] else "fitted linear part")
+        _say_modes(summary["linear_part"])
+    print("elements")
+    modes = len(summary["modes"] or summary["linear_part"])
+    print_table(
+        ("element", "laws", "largest mm", "reach mm", *(f"direction {i + 1}" for i in range(modes))),
+        [
+            (
+                str(index),
+                ", ".join(law["kind"] for law in element["laws"]),
+                number(element["largest_m"], ".4f", 1e3),
+                number(element["reach_m"], ".4f", 1e3),
+                *(number(value, ".4f") for value in element["direction"]),
+            )
+            for index, element in enumerate(summary["elements"], 1)
+        ],
+    )
+    _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
+    if summary["support_n_m"] > _LEAST_SUPPORT_N_M:
+        print(f"unseen support at the drive point: {number(summary['support_n_m'], '.4g')} N/m")
+    say_scatter(summary["scatter"])
+    say_errors(summary)
+
+
+def _say_trials(trials: list[dict[str, Any]]) -> None:
+    """Say what further elements brought on the validation data."""
+    for trial in (trial for trial in trials if np.isfinite(trial["gain"])):
+        sure = f", {trial['at_least']:.3g} at least (95 %)" if np.isfinite(trial["at_least"]) else ", one experiment"
+        what = "kept" if trial["kept"] else "left out"
+        print(
+            f"element with {', '.join(trial['laws'])}: errors in validation {trial['gain']:.3g} times smaller{sure}; {what}"
+        )
+
+
+def _say_modes(modes: _Modes) -> None:
+    print_table(
+        ("mode", "frequency Hz", "+-", "damping %", "+-"),
+        [
+            (
+                str(index),
+                number(mode["frequency_hz"], ".4f"),
+                number(mode["frequency_std_hz"], ".2g", 1.96),
+                number(mode["damping_ratio"], ".4f", 100.0),
+                number(mode["damping_ratio_std"], ".2g", 196.0),
+            )
+            for index, mode in enumerate(modes, 1)
+        ],
+    )
+
+
+TABLE = Table(_summarise, _say)

@@ -1,0 +1,71 @@
+"""Samples over time of one recorded point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification import Channel, IdentificationError, TimeRecord, TimeRecords
+from rig.campaigns.evaluation.point import point_name
+
+
+@dataclass(frozen=True, eq=False)
+class TimeData:
+    """Evenly sampled signals.
+
+    Parameters
+    ----------
+    channels
+        One per row of ``samples``.
+    samples
+        float[n_channels, n], in the SI unit of each channel; NaN where samples were lost in transfer.
+    sample_rate_hz
+        Samples per second.
+    start_s
+        Time of the first sample.
+    point
+        Stored number of the point, from 0.
+    specimen
+        Name of the specimen.
+
+    Raises
+    ------
+    IdentificationError
+        If shapes do not agree, for inf, or for a rate that is not above zero.
+    """
+
+    channels: tuple[Channel, ...]
+    samples: NDArray[np.floating]
+    sample_rate_hz: float
+    start_s: float = 0.0
+    point: int = 0
+    specimen: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))
+        samples = np.asarray(self.samples)
+        object.__setattr__(self, "samples", samples)
+        if samples.ndim != 2 or samples.shape[0] != len(self.channels) or not samples.size:
+            raise IdentificationError(f"samples: shape {samples.shape} for {len(self.channels)} channels")
+        for channel, row in zip(self.channels, samples, strict=True):
+            if np.any(np.isinf(row)):
+                where = int(np.argmax(np.isinf(row)))
+                raise IdentificationError(f"samples: channel '{channel.name}' is {row[where]} at [{where}]")
+        if not (np.isfinite(self.sample_rate_hz) and self.sample_rate_hz > 0.0):
+            raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be finite and above zero")
+
+
+def series_of_records(records: TimeRecords) -> tuple[TimeData, ...]:
+    """Return imported records as time data, one for each, numbered from 0."""
+    return tuple(
+        TimeData(records.channels, one.samples, records.sample_rate_hz, point=number, specimen=records.specimen)
+        for number, one in enumerate(records.records)
+    )
+
+
+def records_of_series(data: TimeData) -> TimeRecords:
+    """Return time data of this program as one record; raise `IdentificationError` for lost samples, which are NaN."""
+    record = TimeRecord(samples=np.asarray(data.samples, np.float64), name=point_name(data.point))
+    return TimeRecords(
+        channels=data.channels, sample_rate_hz=data.sample_rate_hz, records=(record,), specimen=data.specimen
+    )
