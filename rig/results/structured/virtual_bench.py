@@ -41,8 +41,7 @@ def structured_model(path: Path, *, trust_code: bool = False) -> StructuredModel
     """
     found = load_as(IdentifiedStructured, path)
     found.check_trusted(path, trust_code)
-    model = found.model
-    return model
+    return found.model
 
 
 def bench_like(name_or_path: str, *, trust_code: bool = False) -> Bench:
