@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -252,7 +252,7 @@ def rehearse(
     for count, draw in enumerate(done.values(), 1):
         progress(draw, count)
     missing = [number for number in range(request.draws) if number not in done]
-    for draw in _run(request, missing, jobs):
+    for _, draw in ensemble({str(number): number for number in missing}, request, n_jobs=jobs):
         done[draw.number] = draw
         if journal is not None:
             _append(journal, asdict(draw))
@@ -261,11 +261,6 @@ def rehearse(
     if not any(draw.trial.computed for draw in draws):
         raise ConfigurationError(f"none of {len(draws)} twins could be computed: {draws[0].trial.text}")
     return Rehearsal(facts=request.facts, draws=draws, finished=datetime.now(UTC).isoformat(timespec="seconds"))
-
-
-def _run(request: RehearsalRequest, numbers: Sequence[int], jobs: int | None) -> Iterator[Draw]:
-    for _, draw in ensemble({str(number): number for number in numbers}, request, n_jobs=jobs):
-        yield draw
 
 
 def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool) -> dict[int, Draw]:
@@ -289,7 +284,9 @@ def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool)
             "`overwrite` to begin anew"
         )
     if len(tables) < len(lines):
-        _write(journal, tables)
+        discard_draws(journal)
+        for table in tables:
+            _append(journal, table)
     draws = _DRAWS.validate_python(tables[1:])
     return {draw.number: draw for draw in draws if draw.number < request.draws}
 
@@ -300,12 +297,6 @@ def _complete_lines(lines: Iterable[str]) -> Iterator[Mapping[str, object]]:
             yield json.loads(line)
         except json.JSONDecodeError:
             return
-
-
-def _write(journal: Path, tables: Sequence[Mapping[str, object]]) -> None:
-    discard_draws(journal)
-    for table in tables:
-        _append(journal, table)
 
 
 def _append(journal: Path, table: Mapping[str, object]) -> None:

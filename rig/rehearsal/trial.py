@@ -1,7 +1,7 @@
 """Trial of a rehearsal: the plan on one virtual rig, by the same runner, loop and evaluation as a test."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import count
 
 import numpy as np
@@ -81,19 +81,19 @@ class Trial:
     twin could not be built or simulated."""
     text: str
     """The same in a sentence."""
-    tripped: bool
+    tripped: bool = False
     """Whether the run tripped."""
-    completed: bool
+    completed: bool = False
     """Whether every point was accepted."""
-    channel: str
+    channel: str = ""
     """Channel of a trip; empty for none."""
-    level: float
+    level: float = float("nan")
     """Level at which it tripped; NaN otherwise."""
     duration_s: float
     """Time on the rig, s."""
-    shares: Mapping[str, float]
+    shares: Mapping[str, float] = field(default_factory=dict)
     """Largest value over its limit, by limit: ``voltage``, and force or acceleration, displacement and range of channels."""
-    points: tuple[TrialPoint, ...]
+    points: tuple[TrialPoint, ...] = ()
     """Points that were measured or failed, in the order of measurement."""
 
     @property
@@ -185,7 +185,7 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
     try:
         plan.check(bench)
     except RigError as error:
-        return _without_rows(REFUSED, str(error), 0.0)
+        return Trial(end=REFUSED, text=str(error), duration_s=0.0)
     journal = _MemoryJournal()
     execution, samples = _part(plan, bench, seed, journal, None)
     for number in count(1):
@@ -238,21 +238,7 @@ def _trial(bench: Bench, execution: Execution, samples: int, journal: _MemoryJou
 def not_computed(error: Exception) -> Trial:
     """Return the trial of a twin whose computation failed."""
     text = str(error) if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
-    return _without_rows(NOT_COMPUTED, text, float("nan"))
-
-
-def _without_rows(end: str, text: str, duration_s: float) -> Trial:
-    return Trial(
-        end=end,
-        text=text,
-        tripped=False,
-        completed=False,
-        channel="",
-        level=float("nan"),
-        duration_s=duration_s,
-        shares={},
-        points=(),
-    )
+    return Trial(end=NOT_COMPUTED, text=text, duration_s=float("nan"))
 
 
 def _points(plan: Plan, stored: Sequence[Mapping[str, object]]) -> list[TrialPoint]:

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from rig.exchange import child_reading
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.child_values import read_values, write_values
-from rig.exchange.file_data import FileData
+from rig.exchange.file_data import ChannelFacts, FileData
 from rig.exchange.mat import read_mat
 from rig.system.child import ChildFailed
 
@@ -76,6 +76,15 @@ json_like = st.recursive(
 def test_nested_values_come_back_as_they_were(tmp_path, value):
     write_values(value, tmp_path)
     same(read_values(tmp_path), value)
+
+
+def test_what_a_reader_says_of_its_channels_comes_back(tmp_path):
+    facts = {"F": ChannelFacts(name="Force", unit="N", scale=2.0, offset=-1.0, sample_rate_hz=1e3, start_s=0.5)}
+    write_values(FileData(values={"F": np.arange(3.0)}, channels=facts, sample_rate_hz=1e3), tmp_path)
+    found = read_values(tmp_path)
+    assert isinstance(found, FileData)
+    assert (found.channels, found.sample_rate_hz, found.unit("F")) == (facts, 1e3, "N")
+    same(found.values, {"F": np.arange(3.0)})
 
 
 CRASHES_SCIPY = (
