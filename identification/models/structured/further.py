@@ -1,33 +1,29 @@
 """Initial values of an element at a given place, or beside others: what is left of the equations of motion of all modes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, product
-from typing import NamedTuple, cast
 
 import numpy as np
 
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
-from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.kernels import slide_along
-from identification.models.structured.laws import (
-    FROM_ZERO,
-    POSITIVE,
-    Damper,
-    Joint,
-    Law,
-    PolynomialDamper,
-    PolynomialSpring,
-    Spring,
-)
+from identification.models.structured.laws import Damper, Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.modal_motion import LOWEST, modal_spectra
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.start import HIGHEST, softened, started
+from identification.models.structured.regression import (
+    Regression,
+    bounded_regression,
+    by_law,
+    law_force,
+    linear_in,
+    with_regression,
+)
+from identification.models.structured.start import HIGHEST
 from vibrolock.arrays import Complex, Float
 
 _ANGLES = np.pi * np.arange(1, 8) / 8.0
-"""Angles of directions between two modes that are tried."""
+"""Angles of directions between two modes that are tried, rad. Chosen: between neighbours the residual changes little."""
 
 
 @dataclass(frozen=True)
@@ -87,15 +83,7 @@ def with_further_element(
     direction[:measured_modes] = best.direction
     if plan.between:
         direction = model.place_of(plan.between) @ model.output_shapes
-    element = NonlinearElement(
-        direction=direction,
-        scale_m=best.scale_m,
-        laws=tuple(started(law, numbers, best.scale_m) for law, numbers in zip(best.laws, best.numbers, strict=True)),
-        reach=reach,
-        between=plan.between,
-    )
-    changed = softened(model, range(measured_modes), best.stiffness, best.damping)
-    return replace(changed, elements=(*model.elements, element))
+    return with_regression(model, best, range(measured_modes), reach, (direction, plan.between))
 
 
 def _directions(shapes: Float) -> list[Float]:
@@ -128,7 +116,7 @@ class _Motion:
         left = model.input_shapes[:modes] @ inputs - dynamic * spectra
         for element in model.elements:
             phi = element.phi[:modes]
-            force = sum(_force(law, phi @ self.q, element.scale_m * phi @ self.rate) for law in element.laws)
+            force = sum(law_force(law, phi @ self.q, element.scale_m * phi @ self.rate) for law in element.laws)
             left = left - element.scale_m * phi[:, None] * (np.fft.rfft(force) / n)
         self.left = left[:, self.lines]
 
@@ -138,58 +126,23 @@ class _Motion:
         return np.asarray(np.ravel(self.weight * direction[:, None] * spectrum))
 
 
-def _force(law: Law, x: Float, speed: Float) -> Float:
-    """Force of a law over a period, N; ``speed`` in m/s."""
-    if isinstance(law, Spring):
-        return law.force(x)
-    if isinstance(law, Damper):
-        return law.damping(x) * speed
-    out = np.zeros_like(x)
-    slide_along(np.ascontiguousarray(cast(Joint, law).sliders().T), np.ascontiguousarray(x), out)
-    return out
-
-
-class _Found(NamedTuple):
-    direction: Float
-    scale_m: float
-    laws: list[Law]
-    numbers: list[Float]
-    """Linear numbers of each law, J or J s."""
-    stiffness: Float
-    """Change of the squared frequency of each mode."""
-    damping: Float
-    """Change of twice the damping ratio times the frequency of each mode, rad/s."""
-    residual: float
-
-
-def _regression(parts: Sequence[_Motion], direction: Float, laws: list[Law]) -> _Found:
+def _regression(parts: Sequence[_Motion], direction: Float, laws: list[Law]) -> Regression:
     """Return the numbers in which ``laws`` are linear."""
-    from scipy.optimize import lsq_linear  # only on use: it takes long to load
-
     scale = max(float(np.max(np.abs(direction @ part.q))) for part in parts)
-    linear = [law for law in laws if law.linear]
-    basis = [one for law in linear for one in law.basis()]
+    basis = [one for law in linear_in(laws) for one in law.basis()]
     modes = np.eye(direction.size)
     rows = []
     for part in parts:
         x, speed = direction @ part.q / scale, direction @ part.rate
-        columns = [part.column(direction, _force(one, x, speed)) for one in basis]
+        columns = [part.column(direction, law_force(one, x, speed)) for one in basis]
         columns += [
             part.column(mode, of) for motion in (part.q, part.rate) for mode, of in zip(modes, motion, strict=True)
         ]
         rows.append(np.array(columns).T)
     a, y = np.concatenate(rows), np.concatenate([np.ravel(part.weight * part.left) for part in parts])
-    a, y = np.concatenate([a.real, a.imag]), np.concatenate([y.real, y.imag])
-    sizes = [np.size(getattr(law, law.linear)) for law in linear]
-    ways = [law.free[law.linear] for law in linear]
-    least = np.repeat([0.0 if way in (POSITIVE, FROM_ZERO) else -np.inf for way in ways], sizes)
-    bounds = np.append(least, np.full(2 * direction.size, -np.inf)), np.full(least.size + 2 * direction.size, np.inf)
-    norm = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
-    numbers = lsq_linear(a / norm, y, bounds=bounds, method="bvls").x / norm
-    split = iter(np.split(numbers[: least.size], np.cumsum(sizes)[:-1]))
-    # a damper's numbers are N s/m, J s once they are multiplied by the squared scale, as `started` expects
-    found = [
-        next(split) * scale ** (2 if isinstance(law, Damper) else 1) if law.linear else np.zeros(0) for law in laws
-    ]
-    stiffness, damping = np.split(numbers[least.size :], 2)
-    return _Found(direction, scale, laws, found, stiffness, damping, float(np.linalg.norm(a @ numbers - y)))
+    numbers, residual = bounded_regression(laws, np.concatenate([a.real, a.imag]), np.concatenate([y.real, y.imag]))
+    found, rest = by_law(laws, numbers)
+    # a damper's numbers are N s/m, J s once they are multiplied by the squared scale
+    found = [one * scale ** (2 if isinstance(law, Damper) else 1) for one, law in zip(found, laws, strict=True)]
+    stiffness, damping = np.split(rest, 2)
+    return Regression(direction, scale, laws, found, stiffness, damping, residual)

@@ -1,9 +1,7 @@
 """Initial values of a structured model: modes from a modal test, and a linear regression for the nonlinear element."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import product
-from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -12,11 +10,17 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.fitting.bounded_steps import qr_r
 from identification.linear.modes import LinearModes
-from identification.models.structured.elements import NonlinearElement
-from identification.models.structured.kernels import slide_along
-from identification.models.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, Law, Spring
+from identification.models.structured.laws import Joint, Law, Spring
 from identification.models.structured.modal_motion import LOWEST, modal_spectra
 from identification.models.structured.model import StructuredModel
+from identification.models.structured.regression import (
+    Regression,
+    bounded_regression,
+    by_law,
+    law_force,
+    linear_in,
+    with_regression,
+)
 from vibrolock.arrays import Complex, Float
 
 HIGHEST = 6.0
@@ -24,10 +28,7 @@ HIGHEST = 6.0
 _POSITIONS = np.linspace(-1.0, 1.0, 21)
 """Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
 _RESIDUAL_DAMPING = 0.02
-_LEAST_STIFFNESS, _LEAST_DAMPING = 0.25, 0.2
-"""What the initial element leaves of stiffness and damping of its mode."""
-_TINY = 1e-6
-"""Initial value (N) of a positive number that the regression finds to be zero."""
+"""Damping ratio of the mode that stands for the residual. Chosen: it is far above the band, where it does not count."""
 _HIGHEST_RESIDUAL, _OF_STEPS = 0.6, 0.35
 """Highest frequency of the residual's mode, relative to the sample rate and to the rate of the steps. Modes far above the band
 may have none. A lower mode with the same static receptance has a larger mass, and an exciter is simulated more easily with it.
@@ -98,41 +99,13 @@ def with_element(
     parts = [_Equation(linear, mode, spectra, q, shape / scale) for spectra, q in zip(coordinates, times, strict=True)]
     places = _POSITIONS * float(np.sqrt(np.mean(np.concatenate(times) ** 2)))
     found = [
-        _regression(parts, list(tried), places, linear.omega[mode])
+        _regression(parts, list(tried), places, linear.omega[mode], (shape, scale))
         for tried in product(*(law.candidates() for law in laws))
     ]
     best = min(found, key=lambda one: one.residual)
     direction = np.zeros(len(linear.omega))
     direction[mode] = shape
-    element = NonlinearElement(
-        direction=direction,
-        scale_m=scale,
-        laws=tuple(started(law, numbers, scale) for law, numbers in zip(best.laws, best.numbers, strict=True)),
-        reach=reach,
-    )
-    return replace(softened(linear, [mode], [best.stiffness], [best.damping]), elements=(element,))
-
-
-def softened(
-    model: StructuredModel, modes: Sequence[int], stiffness: Sequence[float] | Float, damping: Sequence[float] | Float
-) -> StructuredModel:
-    """Return the model with changes of squared frequencies and of twice damping ratio times frequency (rad/s), limited."""
-    omega, rate = model.omega.copy(), model.damping_ratio * model.omega
-    for mode, softer, less in zip(modes, stiffness, damping, strict=True):
-        omega[mode] = np.sqrt(max(omega[mode] ** 2 + softer, _LEAST_STIFFNESS * omega[mode] ** 2))
-        rate[mode] = max(rate[mode] + 0.5 * less, _LEAST_DAMPING * rate[mode])
-    return replace(model, frequency_hz=omega / (2.0 * np.pi), damping_ratio=rate / omega)
-
-
-def started(law: Law, numbers: Float, scale: float) -> Law:
-    """Return a law with the linear numbers that the regression found in J or J s."""
-    if not law.linear:
-        return law
-    found = numbers / (scale**2 if isinstance(law, Damper) else scale)
-    least = {POSITIVE: _TINY, FROM_ZERO: 0.0}.get(law.free[law.linear], -np.inf)
-    found = np.maximum(found, least)  # the bounds of the regression hold up to rounding
-    value = getattr(law, law.linear)
-    return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})
+    return with_regression(linear, best, [mode], reach, (direction, ()))
 
 
 def _root(function: Callable[[float], float], places: Float) -> float:
@@ -187,36 +160,17 @@ class _Equation:
 
     def _forces(self, law: Law, position: float) -> list[Float]:
         x = self.phi * (self.q + position)
-        if isinstance(law, Spring):
-            return [one.force(x) for one in law.basis()]
-        if isinstance(law, Damper):
-            return [one.damping(x) * self.phi * self.rate for one in law.basis()]
-        found = [np.zeros_like(x) for _ in law.basis()]
-        for one, out in zip(cast(list[Joint], law.basis()), found, strict=True):
-            slide_along(np.ascontiguousarray(one.sliders().T), x, out)
-        return found
+        return [law_force(one, x, self.phi * self.rate) for one in law.basis()]
 
 
-class _Found(NamedTuple):
-    laws: list[Law]
-    numbers: list[Float]
-    """Linear numbers of each law, J."""
-    stiffness: float
-    """Change of the squared frequency."""
-    damping: float
-    """Change of twice the damping ratio times the frequency, rad/s."""
-    residual: float
+def _regression(
+    parts: Sequence[_Equation], laws: list[Law], places: Float, omega: float, element: tuple[float, float]
+) -> Regression:
+    """Return the numbers in which ``laws`` are linear, at the mean position of static balance.
 
-
-def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omega: float) -> _Found:
-    """Return the numbers in which ``laws`` are linear, at the mean position of static balance."""
-    from scipy.optimize import lsq_linear  # only on use: it takes long to load
-
-    linear = [law for law in laws if law.linear]
-    sizes = [np.size(getattr(law, law.linear)) for law in linear]
-    ways = [law.free[law.linear] for law in linear]
-    least = np.repeat([0.0 if way in (POSITIVE, FROM_ZERO) else -np.inf for way in ways], sizes)
-    bounds = np.append(least, [-np.inf, -np.inf]), np.full(least.size + 2, np.inf)
+    ``element``: its displacement per coordinate of the mode, and its scale.
+    """
+    linear = linear_in(laws)
     left = np.concatenate([part.left for part in parts])
 
     def solved(position: float) -> tuple[Float, float, Float]:
@@ -226,13 +180,9 @@ def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omeg
             for part in parts
         ]
         rows = [np.concatenate([of, part.own])[:, 1:].T for part, of in zip(parts, forces, strict=True)]
-        columns = np.concatenate(rows)
-        both = np.column_stack([columns, left])
+        both = np.column_stack([np.concatenate(rows), left])
         triangle = qr_r(np.concatenate([both.real, both.imag]))  # the same norms, in few rows
-        a, y = triangle[:, :-1], triangle[:, -1]
-        scale = np.maximum(np.linalg.norm(a, axis=0), 1e-300)
-        numbers = lsq_linear(a / scale, y, bounds=bounds, method="bvls").x / scale
-        return numbers, float(np.linalg.norm(a @ numbers - y)), forces[0][:, 0].real
+        return *bounded_regression(laws, triangle[:, :-1], triangle[:, -1]), forces[0][:, 0].real
 
     def unbalanced(position: float) -> float:
         numbers, _, means = solved(position)
@@ -240,6 +190,6 @@ def _regression(parts: Sequence[_Equation], laws: list[Law], places: Float, omeg
 
     still = not any(isinstance(law, Spring) for law in linear)
     numbers, residual, _ = solved(0.0 if still else _root(unbalanced, places))
-    split = iter(np.split(numbers[:-2], np.cumsum(sizes)[:-1]))
-    found = [next(split) if law.linear else np.zeros(0) for law in laws]
-    return _Found(laws, found, float(numbers[-2]), float(numbers[-1]), residual)
+    found, (stiffness, damping) = by_law(laws, numbers)
+    shape, scale = element
+    return Regression(np.array([shape]), scale, laws, found, np.array([stiffness]), np.array([damping]), residual)
