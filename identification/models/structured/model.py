@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import MOTION_ORDER, Channel, find_name
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
+from identification.experiments.simulation import Simulation, first_unbounded, use_of
 from identification.models.structured.elements import NonlinearElement, tables_of
 from identification.models.structured.held_support import held, periods_of, renew
 from identification.models.structured.modal_motion import measured_velocity, prolonged, settling_periods
@@ -25,38 +26,35 @@ LEAD = 0.05
 _WINDOW = ("kaiser", 8.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A simulated run.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion(Simulation):
+    """A simulated run of a structured model; its states are the modal displacements, and then the velocities.
+
+    Of a periodic experiment only the samples that count are in the uses of elements, not the transient that leads to them.
 
     Parameters
     ----------
-    outputs
-        float[n_outputs, n].
-    displacement, velocity, acceleration
-        float[n_modes, n], modal coordinates (kg^1/2 m) and their derivatives by time.
+    acceleration
+        float[n_modes, n], second derivatives of the modal coordinates by time, kg^1/2 m/s^2.
     reach_use
-        float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated. Of a periodic
-        experiment only the samples that count are taken, not the transient that leads to them.
+        float[n_elements], largest displacement of every element over its reach. Above 1 its law is extrapolated.
     unsolved_steps
         Number of steps whose equation Newton's iteration has not solved; above 0 energy balance and bound do not hold.
-    range_use
-        Largest displacement of any element over its largest in the training data, of the same samples; NaN if unknown.
     """
 
-    outputs: Float
-    displacement: Float
-    velocity: Float
     acceleration: Float
     reach_use: Float
     unsolved_steps: int = 0
-    range_use: float = float("nan")
 
     @property
-    def unbounded_at(self) -> int | None:
-        """First sample at which an output is not finite; None if there is none."""
-        wrong = ~np.all(np.isfinite(self.outputs), axis=0)
-        return int(np.argmax(wrong)) if wrong.any() else None
+    def displacement(self) -> Float:
+        """float[n_modes, n]: modal coordinates, kg^1/2 m."""
+        return self.states[: len(self.acceleration)]
+
+    @property
+    def velocity(self) -> Float:
+        """float[n_modes, n]: derivatives of the modal coordinates by time, kg^1/2 m/s."""
+        return self.states[len(self.acceleration) :]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -248,8 +246,8 @@ class StructuredModel(Result):
         ]
         run_of = self.run(stretches, longer.inputs, ends, longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
-        names = ("outputs", "displacement", "velocity", "acceleration")
-        return replace(run_of, **{name: getattr(run_of, name)[:, kept] for name in names})
+        cut = {name: getattr(run_of, name)[:, kept] for name in ("outputs", "states", "acceleration")}
+        return replace(run_of, **cut, unbounded_at=first_unbounded(cut["outputs"]))
 
     def place_of(self, between: Sequence[str]) -> Float:
         """float[n_outputs]: the displacement at an output, or of one relative to another, as a sum of those of all outputs.
@@ -306,18 +304,16 @@ def motion_of(model: StructuredModel, u: Float, states: Float, unsolved: int, co
     """Return the run with inputs and states [n, 3, n_modes]; displacements of elements are taken from ``counted_from`` on."""
     phi = np.array([element.phi for element in model.elements]).reshape(len(model.elements), len(model.omega))
     largest = np.max(np.abs(states[counted_from:, 0] @ phi.T), axis=0, initial=0.0)
-    reach = np.array([element.reach for element in model.elements])
+    reach, trained = (np.array([getattr(e, name) or np.nan for e in model.elements]) for name in ("reach", "largest"))
+    outputs = outputs_of(model, u, states)
     return Motion(
-        outputs=outputs_of(model, u, states),
-        displacement=states[:, 0].T,
-        velocity=states[:, 1].T,
+        outputs=outputs,
+        states=states[:, :2].reshape(len(states), -1).T,
+        state_use=use_of(largest, trained),
+        unbounded_at=first_unbounded(outputs),
         acceleration=states[:, 2].T,
         reach_use=np.asarray(largest / reach),
         unsolved_steps=unsolved,
-        range_use=max(
-            (float(x / e.largest) for x, e in zip(largest, model.elements, strict=True) if e.largest),
-            default=float("nan"),
-        ),
     )
 
 

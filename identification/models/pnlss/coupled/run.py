@@ -7,14 +7,10 @@ passes over the run, exactly above the lowest frequency, until the force no long
 al., IEEE Trans. CAD 1, 1982).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.channels import MOTION_ORDER
-from identification.errors import IdentificationError
-from identification.exciter_coupling.channels import driven_rows
+from identification.exciter_coupling.channels import drive_point
 from identification.exciter_coupling.exciter import Exciter
 from identification.exciter_coupling.passes import Passes
 from identification.exciter_coupling.reaction import Reaction
@@ -23,38 +19,19 @@ from identification.models.pnlss.coupled.kernels import simulate_coupled
 from identification.models.pnlss.kernels import workspace
 from identification.models.pnlss.model import PnlssModel
 from identification.models.pnlss.steady.setting_up import linear_resonance_hz
-from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 
 _LOWEST, _GUESSED = 0.8, 0.5
 """Default lowest frequency: share of the lowest trained frequency, or of the linear resonance if that is unknown."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CoupledRun(Simulation):
-    """A simulated run of a model with its exciter.
-
-    Parameters
-    ----------
-    force_n
-        float[n], force at the model's input; NaN from ``unbounded_at`` on.
-    passes
-        Number of passes over the run.
-    change
-        RMS change of the force in the last pass over the RMS force; NaN for an unbounded run.
-    notes
-        Remarks on this run, one line each.
-    """
-
-    force_n: Float
-    passes: int
-    change: float
-    notes: tuple[str, ...] = ()
+CoupledRun = Simulation
+"""Former name of the type of a run with an exciter."""
 
 
 def pnlss_coupled_run(
     model: PnlssModel, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
-) -> CoupledRun:
+) -> Simulation:
     """Simulate a model with the exciter at its force input, both from rest, under a recorded voltage.
 
     Parameters
@@ -75,13 +52,9 @@ def pnlss_coupled_run(
     IdentificationError
         If values are NaN or infinite, the model lacks these channels, or no stable filter for the reaction is found.
     """
-    v = finite_array("voltage_v", voltage_v, np.float64, 1)
-    row, output = driven_rows(model)
-    low = _lowest(model) if lowest_hz is None else positive("lowest_hz", lowest_hz, "Hz")
-    if low >= 0.45 * model.sample_rate_hz:
-        raise IdentificationError(f"lowest_hz: is {low:g} Hz, must be well below half of {model.sample_rate_hz:g} Hz")
-    reaction = Reaction(exciter, MOTION_ORDER[model.outputs[output].motion], low, model.sample_rate_hz)
-    return _run(model, Passes(reaction, model.linear_part, row, output, v), row, output)
+    at = drive_point(model, model.sample_rate_hz, voltage_v, lowest_hz, lambda: _lowest(model))
+    reaction = Reaction(exciter, at.order, at.lowest_hz, model.sample_rate_hz)
+    return _run(model, Passes(reaction, model.linear_part, at.row, at.output, at.voltage_v), at.row, at.output)
 
 
 def _lowest(model: PnlssModel) -> float:
@@ -90,7 +63,7 @@ def _lowest(model: PnlssModel) -> float:
     return _GUESSED * linear_resonance_hz(model)
 
 
-def _run(model: PnlssModel, passes: Passes, row: int, output: int) -> CoupledRun:
+def _run(model: PnlssModel, passes: Passes, row: int, output: int) -> Simulation:
     m, loop, n = model.matrices, passes.loop, passes.n
     tables = (model.state_features.table, model.output_features.table)
     x, y = np.empty((passes.count, model.states)), np.empty((passes.count, len(model.outputs)))
@@ -107,7 +80,7 @@ def _run(model: PnlssModel, passes: Passes, row: int, output: int) -> CoupledRun
     notes = passes.notes(reached, count, change)
     if np.max(np.abs(np.linalg.eigvals(model.a))) > 1.0:
         notes.append("the model's linear part is unstable")
-    return CoupledRun(
+    return Simulation(
         outputs=y.T,
         states=x.T,
         state_use=use_of(np.max(np.abs(x[:reached]), axis=0, initial=0.0), model.state_range),

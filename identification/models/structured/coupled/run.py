@@ -4,14 +4,13 @@ The scheme is that of `pnlss_coupled_run`, at the rate of the model's steps. The
 there, so that the energy balance of the steps holds with the force that acts.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
-from identification.exciter_coupling.channels import driven_rows
+from identification.exciter_coupling.channels import DrivePoint, drive_point
 from identification.exciter_coupling.exciter import Exciter
 from identification.exciter_coupling.passes import Passes
 from identification.exciter_coupling.reaction import Reaction
@@ -19,7 +18,6 @@ from identification.linear.subspace import StateSpace
 from identification.models.structured.coupled.kernels import run_coupled
 from identification.models.structured.model import Motion, StructuredModel, ends_of_steps, motion_of, room_for
 from identification.models.structured.steady.response import resonance_hz
-from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 
 _COARSER = (6, 4, 3, 2)
@@ -28,31 +26,13 @@ _GUESSED = 0.5
 """Default lowest frequency relative to the resonance of small vibrations."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class CoupledMotion(Motion):
-    """A simulated run of a structured model with its exciter.
-
-    Parameters
-    ----------
-    force_n
-        float[n], force at the model's input; NaN from ``unbounded_at`` on.
-    passes
-        Number of passes over the run.
-    change
-        RMS change of the force in the last pass over the RMS force; NaN for an unbounded run.
-    notes
-        Remarks on this run, one line each.
-    """
-
-    force_n: Float
-    passes: int
-    change: float
-    notes: tuple[str, ...] = ()
+CoupledMotion = Motion
+"""Former name of the type of a run with an exciter."""
 
 
 def structured_coupled_run(
     model: StructuredModel, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
-) -> CoupledMotion:
+) -> Motion:
     """Simulate a structured model with the exciter at its force input, both from rest, under a recorded voltage.
 
     Parameters
@@ -72,25 +52,20 @@ def structured_coupled_run(
     IdentificationError
         If values are NaN or infinite, the model lacks these channels, or no stable filter for the reaction is found.
     """
-    v = finite_array("voltage_v", voltage_v, np.float64, 1)
-    row, output = driven_rows(model)
-    low = _GUESSED * resonance_hz(model) if lowest_hz is None else positive("lowest_hz", lowest_hz, "Hz")
-    if low >= 0.45 * model.sample_rate_hz:
-        raise IdentificationError(f"lowest_hz: is {low:g} Hz, must be well below half of {model.sample_rate_hz:g} Hz")
-    order = MOTION_ORDER[model.outputs[output].motion]
-    model, linear, passes, coarser = _with_filter(model, exciter, v, low, row, output)
+    at = drive_point(model, model.sample_rate_hz, voltage_v, lowest_hz, lambda: _GUESSED * resonance_hz(model))
+    model, linear, passes, coarser = _with_filter(model, exciter, at)
 
     system, count, loop = model.system, passes.count, passes.loop
     system = system._replace(steps=1)
     states, u, motion = np.empty((count, 3, len(model.omega))), np.empty((count, 1)), np.empty(count)
-    shape = np.append(model.output_shapes[output], model.direct[output, row])
+    shape = np.append(model.output_shapes[at.output], model.direct[at.output, at.row])
     xi, after = np.empty(loop.b.size), np.empty(loop.b.size)
     state, before, room = np.empty(system.size), np.empty(system.size), room_for(system)
-    gain = float(linear.d[output, row])
+    gain = float(linear.d[at.output, at.row])
 
     def simulate(given: Float) -> int:
         return int(
-            run_coupled(system, room, loop, gain, order, shape, given, xi, after, state, before, states, u, motion)
+            run_coupled(system, room, loop, gain, at.order, shape, given, xi, after, state, before, states, u, motion)
         )
 
     reached, repeats, change = passes.run(simulate, u[:, 0], motion)
@@ -98,8 +73,8 @@ def structured_coupled_run(
     valid = -(-reached // model.steps)
     states[valid:], force[valid:] = np.nan, np.nan
     found = motion_of(model, force[None], states, int(room.unsolved[0]))
-    return CoupledMotion(
-        **vars(found),
+    return replace(
+        found,
         force_n=force,
         passes=repeats,
         change=change,
@@ -108,21 +83,20 @@ def structured_coupled_run(
 
 
 def _with_filter(
-    model: StructuredModel, exciter: Exciter, voltage_v: Float, lowest_hz: float, row: int, output: int
+    model: StructuredModel, exciter: Exciter, at: DrivePoint
 ) -> tuple[StructuredModel, StateSpace, Passes, tuple[str, ...]]:
     """Return the model, its linear part, and the passes with a filter for the reaction at the rate of the model's steps.
 
     Where there is none, steps are longer. Raises `IdentificationError` if that does not help.
     """
-    order = MOTION_ORDER[model.outputs[output].motion]
     failed: IdentificationError | None = None
     for steps in (model.steps, *(fewer for fewer in _COARSER if fewer < model.steps)):
         coarse = model.with_steps(steps)
         linear = _linear_part(coarse)
-        fine = np.ascontiguousarray(ends_of_steps(voltage_v[None], steps)[:-1, 0])
-        reaction = Reaction(exciter, order, lowest_hz, model.sample_rate_hz * steps)
+        fine = np.ascontiguousarray(ends_of_steps(at.voltage_v[None], steps)[:-1, 0])
+        reaction = Reaction(exciter, at.order, at.lowest_hz, model.sample_rate_hz * steps)
         try:
-            passes = Passes(reaction, linear, row, output, fine)
+            passes = Passes(reaction, linear, at.row, at.output, fine)
         except IdentificationError as error:
             failed = failed or error
         else:
