@@ -20,6 +20,8 @@ DATE = r"^(\d{4}-\d{2}-\d{2})?$"
 """Pattern of a day, or of no day."""
 SAME = 1e-9
 """Relative difference up to which two sensitivities are one; chosen: far above rounding, far below any calibration."""
+NEGLIGIBLE_BITS = 0.1
+"""Amplitude of a harmonic of the force, in steps of the converter, that counts as none. Chosen: below the noise."""
 
 
 def check_day(name: str, text: str) -> None:
@@ -173,3 +175,8 @@ class Channel(Configured):
     def resolution_in_unit(self) -> float:
         """Step of the converter in the physical unit."""
         return self.resolution_v / abs(self.sensitivity_v_per_unit)
+
+    @property
+    def negligible_amplitude(self) -> float:
+        """Amplitude of a harmonic that counts as none, in the physical unit."""
+        return NEGLIGIBLE_BITS * self.resolution_in_unit

@@ -20,7 +20,6 @@ from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
 
 JUDGED_AGAIN = 11.0  # periods
-NEGLIGIBLE_BITS = 0.1  # amplitude of a harmonic, in bits of the converter, that counts as none
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
 
 
@@ -74,7 +73,7 @@ class Tick:
         limits = limits_record(bench)
         if law.harmonics is not None:
             controlled = bench.channels[force if law.harmonics.channel == "force" else drive]
-            law_record["harmonics"]["smallest"] = NEGLIGIBLE_BITS * controlled.resolution_in_unit
+            law_record["harmonics"]["smallest"] = controlled.negligible_amplitude
             law_record["harmonics"]["high_pass_rad_s"] = 2.0 * math.pi * controlled.high_pass_hz
             law_record["harmonics"]["step_v"] = limits["slew_v_per_sample"] / law.harmonics.highest
         loop = np.zeros(1, LOOP)

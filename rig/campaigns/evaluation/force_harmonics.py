@@ -6,7 +6,6 @@ from controller.harmonics import harmonic_ratios
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, Spectrum
 from rig.campaigns.planning.plan import Plan, Target
-from rig.tick.tick import NEGLIGIBLE_BITS
 
 SIGMAS = 3.0  # standard errors beyond which a harmonic counts as off; the usual choice
 
@@ -23,7 +22,7 @@ def with_force_harmonics(
         return point
     channel = bench.index_of(loop.channel)
     facts = bench.channels[channel]
-    negligible = NEGLIGIBLE_BITS * facts.resolution_in_unit
+    negligible = facts.negligible_amplitude
     wanted = harmonic_ratios(loop.wanted if target.harmonics is None else target.harmonics)
     off = _errors(point.spectrum, channel, wanted[: loop.highest + 1], loop.accepted, negligible)
     alone = [order for order in off if left_alone & 1 << order]
