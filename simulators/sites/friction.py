@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import Quantity
+from vibrolock.iwan import iwan_sliders
 
 
 class _Site(Part):
@@ -78,11 +79,8 @@ class IwanSite(_Site):
     def _elements(self) -> np.ndarray:
         """Stiffness (N/m) and slip deflection (m) [2, n_element + 1], the end slider last where there is one."""
         ends = np.geomspace(self.first_bin, 1.0, self.n_element) if self.n_element > 1 else np.ones(1)
-        edges = np.concatenate([[0.0], ends])
-        share = np.diff(edges ** (self.chi + 1.0))
-        slip = (self.chi + 1.0) / (self.chi + 2.0) * np.diff(edges ** (self.chi + 2.0)) / share
-        stiffness = self.stiffness_n_m / (1.0 + self.beta) * np.append(share, self.beta)
-        elements = np.array([stiffness, self.phi_max_m * np.append(slip, 1.0)])
+        stiffness, slip = iwan_sliders(self.stiffness_n_m, self.chi, self.beta, np.concatenate([[0.0], ends]))
+        elements = np.array([stiffness, self.phi_max_m * slip])
         return elements if self.beta > 0.0 else elements[:, :-1]
 
     @property

@@ -17,6 +17,7 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.storage import stored
 from vibrolock.arrays import Float
+from vibrolock.iwan import iwan_sliders
 
 _LARGEST_SLIP = 0.9
 """Largest slip x of a joint's sliders: one that the training data hardly reach is a spring to them, of any stiffness."""
@@ -373,10 +374,8 @@ class Iwan(Joint):
     def sliders(self) -> Float:
         """float[2, count + 1]: stiffness and largest force; exact in stuck stiffness and force at full slip."""
         edges = np.concatenate([[0.0], np.geomspace(self.smallest, 1.0, self.count)])
-        share = np.diff(edges ** (self.chi + 1.0))
-        slip = (self.chi + 1.0) / (self.chi + 2.0) * np.diff(edges ** (self.chi + 2.0)) / share
-        stiffness = self.stiffness_n / (1.0 + self.beta) * np.append(share, self.beta)
-        return np.array([stiffness, stiffness * self.slip * np.append(slip, 1.0)])
+        stiffness, slip = iwan_sliders(self.stiffness_n, self.chi, self.beta, edges)
+        return np.array([stiffness, stiffness * self.slip * slip])
 
 
 LAWS: dict[str, type[Law]] = {

@@ -2,12 +2,17 @@
 
 import numpy as np
 
+from identification.exciter_coupling.kernels import (
+    EXACT,
+    ITERATIONS,
+    advance_filter,
+    free_force,
+    largest_of,
+    secant_step,
+)
 from identification.exciter_coupling.loop import Loop
 from identification.models.pnlss.kernels import Matrices, Table, Workspace, feature_values, outputs_at, state_after
 from vibrolock.compiled import kernel
-
-_ITERATIONS = 20
-_EXACT = 1e-12
 
 
 @kernel
@@ -35,13 +40,11 @@ def simulate_coupled(
     on the force. Returns n, or the first sample at which a state exceeds its ``bound``, an output is not finite or no force
     is found; values from that sample on are not valid.
     """
-    n, count, reacting = m.a.shape[0], given.size, xi.size
-    largest = 0.0
-    for k in range(count):
-        largest = max(largest, abs(given[k]))
+    n, count = m.a.shape[0], given.size
+    largest = largest_of(given)
     for i in range(n):
         work.x[i] = 0.0
-    for i in range(reacting):
+    for i in range(xi.size):
         xi[i] = 0.0
     for i in range(work.v.size):
         work.v[i] = 0.0
@@ -52,24 +55,20 @@ def simulate_coupled(
             if not abs(work.x[i]) <= bound[i]:
                 return int(k)
             work.v[i] = work.x[i]
-        free = given[k]
-        for i in range(reacting):
-            free += loop.c[i] * xi[i]
+        free = free_force(loop, xi, given[k])
         at, short, slope, found = 0.0, 0.0, linear, False
-        for trial in range(_ITERATIONS):
+        for trial in range(ITERATIONS):
             work.v[n + row] = new
             feature_values(output_table, work.v, work.chi)
             outputs_at(m, work.chi, work.v, y[k])
             left = new - free - loop.d * y[k, output]
-            if abs(left) <= _EXACT * (abs(new) + largest):
+            if abs(left) <= EXACT * (abs(new) + largest):
                 found = True
                 break
-            if trial > 0 and new != at:
-                slope = (left - short) / (new - at)
+            following, slope = secant_step(trial, new, left, at, short, slope)
             if slope == 0.0:
                 break
-            at, short = new, left
-            new -= left / slope
+            at, short, new = new, left, following
         for i in range(y.shape[1]):
             found = found and bool(np.isfinite(y[k, i]))
         if not found:
@@ -79,11 +78,5 @@ def simulate_coupled(
             x[k, i] = work.x[i]
         feature_values(state_table, work.v, work.phi)
         state_after(m, work.phi, work.v, work.x)
-        for i in range(reacting):
-            total = loop.b[i] * y[k, output]
-            for j in range(reacting):
-                total += loop.a[i, j] * xi[j]
-            after[i] = total
-        for i in range(reacting):
-            xi[i] = after[i]
+        advance_filter(loop, xi, after, y[k, output])
     return int(count)

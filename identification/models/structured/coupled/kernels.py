@@ -2,12 +2,17 @@
 
 import numpy as np
 
+from identification.exciter_coupling.kernels import (
+    EXACT,
+    ITERATIONS,
+    advance_filter,
+    free_force,
+    largest_of,
+    secant_step,
+)
 from identification.exciter_coupling.loop import Loop
 from identification.models.structured.steps import Room, System, accelerate, along, end_step, take_input, take_step
 from vibrolock.compiled import inner_kernel, unlocked_kernel
-
-ITERATIONS = 20
-EXACT = 1e-12
 
 
 @inner_kernel
@@ -64,18 +69,14 @@ def run_coupled(
     that step and on the output there: it is the solution of a scalar equation, found by the secant method that begins with
     the ``gain`` of the linear part. Returns N, or the first sample at which no force is found.
     """
-    n, count, reacting = system.omega.size, given.size, xi.size
-    largest = 0.0
-    for k in range(count):
-        largest = max(largest, abs(given[k]))
+    n, count = system.omega.size, given.size
+    largest = largest_of(given)
     clear(state)
     clear(xi)
     room.unsolved[0] = 0
     new = 0.0
     for k in range(count):
-        free = given[k]
-        for i in range(reacting):
-            free += loop.c[i] * xi[i]
+        free = free_force(loop, xi, given[k])
         copy(state, before)
         at, short, slope, found = 0.0, 0.0, 1.0 - loop.d * gain, False
         for trial in range(ITERATIONS):
@@ -90,19 +91,11 @@ def run_coupled(
             if abs(left) <= EXACT * (abs(new) + largest):
                 found = True
                 break
-            if trial > 0 and new != at:
-                slope = (left - short) / (new - at)
+            following, slope = secant_step(trial, new, left, at, short, slope)
             if slope == 0.0:
                 break
-            at, short = new, left
-            new -= left / slope
+            at, short, new = new, left, following
         if not found or not np.isfinite(motion[k]):
             return int(k)
-        for i in range(reacting):
-            total = loop.b[i] * motion[k]
-            for j in range(reacting):
-                total += loop.a[i, j] * xi[j]
-            after[i] = total
-        for i in range(reacting):
-            xi[i] = after[i]
+        advance_filter(loop, xi, after, motion[k])
     return int(count)
