@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import RecordingError
 from rig.live.facts import Line, RunFacts, facts_from
@@ -30,7 +31,7 @@ class Frame(NamedTuple):
 
     state: np.void
     """Record of `rig.live.layout.FRAME`."""
-    window: np.ndarray
+    window: NDArray[np.void]
     """The last rows, as they are recorded."""
     age_s: float
     """Time since it was written, s."""
@@ -81,7 +82,7 @@ class View(Protocol):
     def frame(self) -> Frame | None:
         """Return the present state, or None if there is none yet."""
 
-    def bins(self, first: int) -> tuple[int, np.ndarray]:
+    def bins(self, first: int) -> tuple[int, NDArray[np.void]]:
         """Return the bins of the traces from number ``first`` on that are left, and the number of the first of them."""
 
     def lines(self, first: int) -> Sequence[Line]:
@@ -146,7 +147,7 @@ class LiveRun(Closing):
             time.sleep(1e-4)
         return None
 
-    def bins(self, first: int) -> tuple[int, np.ndarray]:
+    def bins(self, first: int) -> tuple[int, NDArray[np.void]]:
         """Return the bins from number ``first`` on, as far as they are kept, and the number of the first of them."""
         count = self._n_bins()
         ring = np.frombuffer(self._traces[HEAD:], self._bin)

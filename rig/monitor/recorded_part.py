@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.bench import Bench
 from rig.campaigns.evaluation.stored_samples import StoredSamples
@@ -18,6 +19,7 @@ from rig.tick.layout import recorded_row
 from rig.tick.safety.layout import GuardMode
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import segment_table
+from vibrolock.arrays import Int
 
 MANY = 100
 """Points whose end is looked for by bisection, each by itself, at most."""
@@ -49,7 +51,7 @@ class RecordedPart:
         self.n_bins = self.n_samples // self.bin_samples
         self.segments = self._segments()
 
-    def rows(self, first: int, stop: int) -> np.ndarray:
+    def rows(self, first: int, stop: int) -> NDArray[np.void]:
         """Return rows as a run publishes them. What an earlier version did not record is NaN, or 0."""
         out = np.zeros(max(stop - first, 0), self._dtype)
         for name in self._dtype.names or ():
@@ -69,7 +71,7 @@ class RecordedPart:
         """Return the first row from which on all samples are stored up to ``row``."""
         return self._samples.unbroken_from(row)
 
-    def bins(self, first: int, stop: int) -> np.ndarray:
+    def bins(self, first: int, stop: int) -> NDArray[np.void]:
         """Return bins of the traces, made as those of a run under way. A bin without a row holds no number."""
         out = np.zeros(stop - first, self._bin_dtype)
         edges = [self.rows_until(n * self.bin_samples) for n in range(first, stop + 1)]
@@ -126,7 +128,7 @@ class RecordedPart:
             out.append(min(latest, self.n_samples))
         return out
 
-    def _end_of_segment(self, segment: int, column: np.ndarray | None) -> int:
+    def _end_of_segment(self, segment: int, column: Int | None) -> int:
         """Return the first row after a segment. The plan goes through its segments from the first to the last, then to -1."""
 
         def reached(row: int) -> int:
@@ -138,7 +140,7 @@ class RecordedPart:
     def _sample_of(self, row: int) -> int:
         return int(self._samples.samples(np.array([max(row - 1, 0)]))[0]) + 1
 
-    def _segments(self) -> np.ndarray | None:
+    def _segments(self) -> NDArray[np.void] | None:
         """Return the table of segments that the part went through, or None if it cannot be rebuilt."""
         if "segment" not in (self.part.row_dtype.names or ()):
             return None
@@ -152,12 +154,12 @@ class RecordedPart:
                 return table
         return None
 
-    def _fits(self, table: np.ndarray) -> bool:
+    def _fits(self, table: NDArray[np.void]) -> bool:
         """Return whether the rows of the first points lie in segments of these points, or of those measured with them."""
         known = [point for point in self.part.points if "end_sample" in point][:5]
         return all(self._lies_in(table, int(point["end_sample"]), int(point["number"])) for point in known)
 
-    def _lies_in(self, table: np.ndarray, end_sample: int, number: int) -> bool:
+    def _lies_in(self, table: NDArray[np.void], end_sample: int, number: int) -> bool:
         at = int(self.part.rows("segment", end_sample - 1, end_sample)[0])
         if not 0 <= at < table.size or number not in self._of.numbers:
             return False

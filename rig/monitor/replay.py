@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
@@ -59,7 +60,7 @@ class Replay:
         self._connected = True
         self._at_s = self.duration_s if at_end else 0.0
         self._since_s: float | None = None if at_end else time.monotonic()
-        self._stretches: dict[tuple[int, int], np.ndarray] = {}
+        self._stretches: dict[tuple[int, int], NDArray[np.void]] = {}
 
     def _prepare(self, path: Path) -> None:
         recording = self._recording
@@ -171,7 +172,7 @@ class Replay:
         state["window"] = window.size
         return Frame(state, window, 0.0)
 
-    def bins(self, first: int) -> tuple[int, np.ndarray]:
+    def bins(self, first: int) -> tuple[int, NDArray[np.void]]:
         """Return the bins up to the present time from number ``first`` on, of which the last `BINS` are kept."""
         part, samples = self._place()
         if part is None:
@@ -219,7 +220,7 @@ class Replay:
         at = int(np.searchsorted(self._begins, over, side="left")) - 1
         return self._parts[at], over - int(self._begins[at])
 
-    def _stretch(self, part: RecordedPart, number: int) -> np.ndarray:
+    def _stretch(self, part: RecordedPart, number: int) -> NDArray[np.void]:
         key = part.number, number
         if key not in self._stretches:
             first = number * STRETCH
@@ -240,7 +241,7 @@ class Replay:
             lines.append((begin + part.n_samples, {**told.end, "is": "end"}))
         return [(max(begin + 1, min(sample, begin + part.n_samples)), line) for sample, line in lines]
 
-    def _state(self, part: RecordedPart, samples: int, window: np.ndarray) -> np.void:
+    def _state(self, part: RecordedPart, samples: int, window: NDArray[np.void]) -> np.void:
         last = window[-1]
         state: np.void = np.zeros(1, FRAME)[0]
         for name in ("value", "target", "late_us", "force_n", "drive_m_s2", "displacement_m", "phase_error_rad"):

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller import LockState
 from rig.live.facts import ChannelFacts, Line, RunFacts, number_in, text_in
@@ -250,7 +251,7 @@ def shown_json(shown: Shown) -> dict[str, JsonValue]:
     return {"state": shown.state, **cause, **{name: as_json(value) for name, value in numbers.items()}}
 
 
-def bins_json(first: int, bins: np.ndarray, facts: RunFacts) -> JsonValue:
+def bins_json(first: int, bins: NDArray[np.void], facts: RunFacts) -> JsonValue:
     """Return bins of the traces as the page takes them.
 
     ``first`` is the number of the first of them. Each has its end in s, part, lock, and [least, greatest] of each quantity.
@@ -299,7 +300,7 @@ def as_json(value: object, digits: int = 6) -> JsonValue:
     raise TypeError(f"{type(value).__name__} is not a JSON value")
 
 
-def _list(values: np.ndarray, digits: int) -> list[JsonValue]:
+def _list(values: Float, digits: int) -> list[JsonValue]:
     """Return an array as a list, rounded to so many digits of its largest value; None for what is not finite."""
     if values.dtype.kind != "f":
         return list(values.tolist())
@@ -310,7 +311,7 @@ def _list(values: np.ndarray, digits: int) -> list[JsonValue]:
     return list(rounded if known.all() else [one if math.isfinite(one) else None for one in rounded])
 
 
-def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
+def _last_periods(window: NDArray[np.void], periods: int) -> NDArray[np.void]:
     """Return the rows of the last ``periods`` whole periods, or of fewer."""
     theta = window["theta_rad"].astype(float)
     begins = np.flatnonzero(np.diff(theta) < -math.pi) + 1
@@ -319,7 +320,7 @@ def _last_periods(window: np.ndarray, periods: int) -> np.ndarray:
     return window[begins[max(begins.size - 1 - periods, 0)] : begins[-1]]
 
 
-def fundamentals_of(window: np.ndarray, facts: RunFacts) -> Complex:
+def fundamentals_of(window: NDArray[np.void], facts: RunFacts) -> Complex:
     """Return mean and harmonics of every channel over the last periods: complex[n_channels, H + 1], or [0, H + 1] for none.
 
     By least squares on the recorded phase of the oscillator.
@@ -336,7 +337,7 @@ def fundamentals_of(window: np.ndarray, facts: RunFacts) -> Complex:
     return np.asarray(np.hstack([found[:, :1].astype(complex), cos - 1j * sin]))
 
 
-def _shares(state: np.void, window: np.ndarray, facts: RunFacts, fundamentals: Complex) -> list[Share]:
+def _shares(state: np.void, window: NDArray[np.void], facts: RunFacts, fundamentals: Complex) -> list[Share]:
     """Return how much of every limit and range the last rows used."""
     rows = _last_periods(window, SCOPE_PERIODS)
     inputs = np.abs((rows if rows.size else window)["inputs"]).astype(float)
@@ -358,7 +359,7 @@ def _force_and_drive(facts: RunFacts) -> list[tuple[int, ChannelFacts]]:
     return [(at, facts.channels[at]) for at in (facts.index("force"), facts.index("drive"))]
 
 
-def _scope(window: np.ndarray, facts: RunFacts) -> Scope:
+def _scope(window: NDArray[np.void], facts: RunFacts) -> Scope:
     rows = _last_periods(window, SCOPE_PERIODS)
     stride = max(1, -(-rows.size // SCOPE_POINTS))
     rows = rows[::stride]
