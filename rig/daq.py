@@ -8,9 +8,9 @@ sample-synchronous hardware.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from enum import Enum
-from types import TracebackType
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -115,46 +115,48 @@ def largest_of(voltages: np.ndarray) -> float:
     return largest
 
 
-class _AsDaqError:
-    """Context that converts any exception of a driver into a `DaqError`; callers need not know a vendor's exceptions."""
-
-    def __enter__(self) -> None:
-        """Do nothing on entry."""
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if isinstance(error, Exception) and not isinstance(error, RigError):
-            raise as_daq_error(error) from error
-
-
-_AS_DAQ_ERROR = _AsDaqError()
+@contextmanager
+def _as_daq_errors() -> Iterator[None]:
+    """Convert any other exception of a driver into a `DaqError`; callers need not know a vendor's exceptions."""
+    try:
+        yield
+    except RigError:
+        raise
+    except Exception as error:
+        raise as_daq_error(error) from error
 
 
 class DAQ(ABC):
     """A data acquisition device with one output and several inputs.
 
-    Call order: ``open -> start -> exchange ... -> stop -> close``. As a context manager the object opens and closes itself. The
-    constructor opens nothing. `close` may be called at any time, any number of times, and leaves the output at 0 V; `stop` also
-    leaves it at 0 V. A driver implements the methods with a leading underscore and overrides no other methods.
+    The order of calls is ``open -> start -> exchange ... -> stop -> close``. The constructor opens nothing; as a context
+    manager the object opens and closes itself. `close` may be called at any time, any number of times. `stop` and `close`
+    leave the output at 0 V. To end a run, call `exchange_zeros` and then `stop`: the first sends 0 V like any other output,
+    the second sets 0 V by the driver's own means, and neither relies on the other.
 
-    To end a run, call `exchange_zeros` and then `stop`. The first sends 0 V like any other output; the second sets 0 V by the
-    driver's own means. Neither relies on the other.
+    A driver implements the methods of the first section below, and overrides those of the second as its device allows. It may
+    call `do_meanwhile`, and fills these arrays, which `start` makes, in `_exchange`:
 
-    ``flags`` (uint16[n]) hold the device's status bits for each sample of the last block. A driver with such bits fills
-    ``flags`` in `_exchange` and names the bits, lowest first, by the keys of `counters`. Lost samples keep their place as rows
-    of NaN with the bit `LOST`, so that the number of rows is the device's number of instants.
+    ``flags``
+        uint16[n]: status bits of the device for each sample of the last block. The keys of `counters` name the bits, lowest
+        first. A lost sample keeps its place as a row of NaN with the bit `LOST`, so that rows count the device's instants.
+    ``put_out``
+        float64[n], V: NaN where the converter put out what was handed over for an instant of the last block, and otherwise what
+        it put out instead. A driver that is not told leaves it alone.
 
     ``continuation`` (`CONTINUATION`, one record) is filled by the caller before `exchange` and says how the outputs that it
-    passes go on; a driver may ignore it. ``put_out`` (float64[n], V) is NaN where the converter put out what was handed over
-    for an instant of the last block, and otherwise what it put out instead; a driver that is not told leaves it alone.
+    passes go on; a driver may ignore it.
 
-    `start` arms the device; whether
-    it may be started is decided by a person at a higher level. A condition that the device has `latched` stays until `clear`,
-    which a run calls.
+    `start` arms the device; a person at a higher level decides whether it may be started. A condition that the device has
+    `latched` stays until `clear`, which a run calls.
 
-    Errors: `DaqRefused` for a request that the device or its present state does not allow; `DaqTimeout`, `DaqDisconnected`,
-    `DaqOverrun` and the others of `rig.errors` for faults during operation. Other exceptions of a driver become `DaqError`.
+    Raises
+    ------
+    DaqRefused
+        For a request that the device or its present state does not allow.
+    DaqError
+        For faults during operation: `DaqTimeout`, `DaqDisconnected`, `DaqOverrun` and the others of `rig.errors`. Any other
+        exception of a driver becomes a `DaqError`.
     """
 
     wall_clock: ClassVar[bool] = True
@@ -174,6 +176,8 @@ class DAQ(ABC):
         self._driven = False
         self._blocks_of_zero = 0
 
+    # What a driver implements
+
     @property
     @abstractmethod
     def capabilities(self) -> Capabilities:
@@ -187,15 +191,32 @@ class DAQ(ABC):
         It includes queue, hold, converter and filter delay.
         """
 
+    @abstractmethod
+    def _open(self) -> None:
+        """Find and open the device, compare its channels with ``self.channels``, and set the output to 0 V."""
+
+    @abstractmethod
+    def _start(self) -> None:
+        """Begin sampling with blocks of ``self.block``."""
+
+    @abstractmethod
+    def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
+        """Exchange one block: send ``voltages`` float64[n] and fill ``inputs`` float64[n, n_channels] (V)."""
+
+    @abstractmethod
+    def _stop(self) -> None:
+        """Set the output to 0 V and end sampling."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Set the output to 0 V and release the device. Must not fail because the device is gone."""
+
+    # What a driver overrides where its device has more to say
+
     @property
     def filter_delay_samples(self) -> float:
         """Mean delay of the filters, as part of the latency; an output begins to show this much before the full latency."""
         return 0.0
-
-    @property
-    def queue_blocks(self) -> int:
-        """q: whole blocks between `exchange` of an output and the converter; known once started."""
-        return self.queue_samples // self.block
 
     @property
     def queue_samples(self) -> int:
@@ -205,6 +226,16 @@ class DAQ(ABC):
     @property
     def counters(self) -> dict[str, int]:
         """Counts of faults so far: lost samples, clipped outputs and inputs, and the like."""
+        return {}
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """Identity of the device for the recording: port, model, firmware, serial number; known once open."""
+        return {}
+
+    @property
+    def statistics(self) -> dict[str, float]:
+        """Transfer statistics so far, for the recording: bus load, round trips and the like, with the unit in the name."""
         return {}
 
     @property
@@ -232,41 +263,18 @@ class DAQ(ABC):
         """
         raise DaqRefused(f"queue_blocks = {queue_blocks}: this driver has no queue that can be set")
 
-    @property
-    def identity(self) -> dict[str, str]:
-        """Identity of the device for the recording: port, model, firmware, serial number; known once open."""
-        return {}
+    # What callers use; no driver overrides it
 
     @property
-    def statistics(self) -> dict[str, float]:
-        """Transfer statistics so far, for the recording: bus load, round trips and the like, with the unit in the name."""
-        return {}
-
-    @abstractmethod
-    def _open(self) -> None:
-        """Find and open the device, compare its channels with ``self.channels``, and set the output to 0 V."""
-
-    @abstractmethod
-    def _start(self) -> None:
-        """Begin sampling with blocks of ``self.block``."""
-
-    @abstractmethod
-    def _exchange(self, voltages: np.ndarray, inputs: np.ndarray) -> None:
-        """Exchange one block: send ``voltages`` float64[n] and fill ``inputs`` float64[n, n_channels] (V)."""
-
-    @abstractmethod
-    def _stop(self) -> None:
-        """Set the output to 0 V and end sampling."""
-
-    @abstractmethod
-    def _close(self) -> None:
-        """Set the output to 0 V and release the device. Must not fail because the device is gone."""
+    def queue_blocks(self) -> int:
+        """q: whole blocks between `exchange` of an output and the converter; known once started."""
+        return self.queue_samples // self.block
 
     def open(self) -> None:
         """Open the device."""
         if self.state is not State.CLOSED:
             raise DaqRefused(f"the device is {self.state.value} already; close it before opening it again")
-        with _AS_DAQ_ERROR:
+        with _as_daq_errors():
             self._open()
         self.state = State.OPEN
 
@@ -285,7 +293,7 @@ class DAQ(ABC):
         self._shape = block, len(self.channels)
         self._largest_of = bound(largest_of, np.zeros(block))
         self._driven = False
-        with _AS_DAQ_ERROR:
+        with _as_daq_errors():
             self._start()
         self.state = State.RUNNING
 
@@ -308,7 +316,7 @@ class DAQ(ABC):
         if largest > 0.0:
             self._driven, self._blocks_of_zero = True, 0
         inputs = np.empty(self._shape)
-        try:  # not `_AS_DAQ_ERROR`, which calls two methods a block
+        try:  # not `_as_daq_errors`, which takes as long as a short block
             self._exchange(voltages, inputs)
         except RigError:
             raise
@@ -352,7 +360,7 @@ class DAQ(ABC):
         if self.state is not State.RUNNING:
             return
         self.state = State.OPEN
-        with _AS_DAQ_ERROR:
+        with _as_daq_errors():
             self._stop()
 
     def close(self) -> None:
@@ -365,14 +373,12 @@ class DAQ(ABC):
             pass  # the device may be gone, which is a reason to close it
         finally:
             self.state = State.CLOSED
-            with _AS_DAQ_ERROR:
+            with _as_daq_errors():
                 self._close()
 
     def __enter__(self) -> Self:
         self.open()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

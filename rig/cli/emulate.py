@@ -20,6 +20,7 @@ SHORTEST_BLOCK_S = 0.002
 
 
 def emulate(
+    context: typer.Context,
     wire: Annotated[str, typer.Argument(help="serial or can.")],
     bench: Annotated[str, typer.Option(help="Virtual bench to put behind it: a name or TOML file.")] = "magnet-beam",
     lockstep: Annotated[bool, typer.Option("--lockstep", help="Wait for the host instead of keeping time.")] = False,
@@ -51,25 +52,9 @@ def emulate(
     from rig.emulator.settings import EmulatorSettings
 
     behind = load_bench(bench)
-    table = {
-        "wire": wire,
-        "bench": behind.model_dump(),
-        "seed": seed,
-        "lockstep": lockstep,
-        "as_hardware": as_hardware,
-        "flip": flip or [],
-        "dead": dead or [],
-        "swap": [_pair(text) for text in swap or []],
-        "link": link,
-        "log_output": log_output,
-        "interface": interface,
-        "channel": channel,
-        "fd": fd,
-        "node": node,
-        "bitrate": bitrate,
-        "data_bitrate": data_bitrate,
-        "firmware": firmware,
-    }
+    given = {name: value for name, value in context.params.items() if name in EmulatorSettings.model_fields}
+    changed = {"bench": behind.model_dump(), "swap": [_pair(text) for text in swap or []]}
+    table = {name: value for name, value in (given | changed).items() if value is not None}
     settings = validated(EmulatorSettings, table, "rig emulate")
     _check_bench_file(bench_file)
 

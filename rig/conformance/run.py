@@ -70,7 +70,7 @@ class _OnBench(DriverContract):
 
 
 def require_arming(bench: Bench, arm: bool) -> None:
-    """Raise `NotArmed` where something physical would move and nobody has said that it may; opens the device to ask it.
+    """Raise `NotArmed` if a physical device is not armed; the device is opened to ask whether it is one.
 
     What it has latched until then is cleared; what latches from then on stays so, but for what `check_driver` makes latch.
     """

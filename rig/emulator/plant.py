@@ -214,9 +214,8 @@ class LoggedPlant:
         self._plant = plant
         try:
             check_log(path)
-            self._descriptor = os.open(
-                path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644
-            )  # open as long as the device lives
+            # open as long as the device lives
+            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         except OSError as error:
             raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
         self._is_full = False

@@ -150,9 +150,8 @@ class Sampling:
         block = self._block
         if self.measured < self._queue * block or self._outputs.is_there(self.measured):
             return True
-        return self._converter.is_closing(
-            self.measured - block
-        )  # during a ramp to 0 V no outputs are needed, nor for one block after it
+        # during a ramp to 0 V no outputs are needed, nor for one block after it
+        return self._converter.is_closing(self.measured - block)
 
     def measure(self) -> Measured:
         """Put out the rest of the block under way, and measure it."""
