@@ -24,8 +24,11 @@ from identification.validation import finite_array, positive
 from vibrolock.arrays import Complex, Float
 
 _MIN_SAMPLES_PER_PERIOD = 8.0
+"""Fewest samples in the shortest period. Chosen: harmonics up to the third stay below half the rate."""
 _FEWEST_INSTANTS = 20
+"""Fewest demodulated instants of a decay. Chosen."""
 _FEWEST_SAMPLES = 64
+"""Fewest samples of a record. Chosen."""
 
 
 def decay_backbone(

@@ -17,6 +17,7 @@ POINTS_PER_WINDOW = 2
 REACH_PERIODS = 2.0
 """Half the length of the window, in units of P periods."""
 _MEDIAN_OF_EXPONENTIAL = np.log(2.0)
+"""Median of an exponential distribution of mean one, that of squared complex noise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,15 @@ FLOOR = 4.0
 """Amplitude over the RMS of the noise in it at which a decay ends; below, its logarithm is no longer unbiased."""
 _WITHIN = 0.05  # of the largest amplitude: there the decay has not begun
 _ENVELOPE_PERIODS = 3.0
+"""Width, in periods, over which an envelope is the largest value. Chosen."""
 _FORCE_NOISE, _FORCE_SHARE = 6.0, 0.02
+"""A force is there above this multiple of its noise, and above this share of its largest value. Chosen."""
 _LATEST_PERIODS = 10.0
+"""Periods after the largest motion within which the force may end. Chosen."""
 _QUIET_SHARE = 10
+"""The last one in so many samples of the force is taken for its noise. Chosen."""
 _SMOOTHING_WINDOWS = 8
+"""Width of the smoothing in windows of the demodulation. Chosen."""
 _NUMERIC = 1e-7  # of the largest amplitude: there digits end
 
 

@@ -16,7 +16,9 @@ from vibrolock.arrays import Complex, Float
 
 _HALF_WIDTHS = (0.12, 0.2, 0.32, 0.5, 0.75, 1.1)  # in ln(amplitude)
 _NEIGHBOURS = 2
+"""Levels on either side over which an error is smoothed. Chosen."""
 _COLUMNS = 11
+"""Columns of the table of fits at all levels."""
 _WINDOW_SHARE = 0.2
 """Share of the correction for the window that counts as its error: the terms of the next order."""
 _WORST = 0.25

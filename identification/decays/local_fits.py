@@ -19,6 +19,7 @@ from identification.decays.demodulation import Demodulated, window_correlation
 from vibrolock.arrays import Complex, Float
 
 DEGREE, HIGHER_DEGREE = 3, 5
+"""Degree of a local polynomial, and of the one whose difference bounds the curvature within the fit. Chosen."""
 _LEAST_SPAN = 3.0  # in units of P periods
 
 

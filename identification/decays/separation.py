@@ -12,11 +12,15 @@ from identification.errors import IdentificationError
 from vibrolock.arrays import Float
 
 _NAMED_WITHIN = 0.25
+"""Relative distance within which a peak counts as the frequency that was named. Chosen."""
 _HIGHEST_HARMONIC, _MOST_MODES = 9, 6
+"""Highest order that is recognised as a harmonic of another mode, and number of modes at most. Chosen."""
 _SMALL_LEAK, _LARGEST_LEAK = 3e-4, 5e-3
+"""Leakage of another mode, relative to the amplitude, that is left as it is, and that is accepted at most. Chosen."""
 _WINDOW_DECAY = 1.0  # largest fall of ln(amplitude) within a window, to keep neighbours out
 _USUAL_DECAY = 0.16  # the same where there are none
 _MOST_PERIODS = 60
+"""Longest window of the demodulation, periods. Chosen."""
 _GROWN = 3.0  # by how much a neighbour that decays more slowly may gain
 _OF_A_HARMONIC = 0.05  # a harmonic over the one before
 

@@ -16,17 +16,24 @@ from vibrolock.arrays import Bool, Float
 
 _WINDOWS = (8, 16, 32, 64)  # periods
 _FEWEST_PERIODS = 4.0
+"""Fewest periods in a segment of the spectrogram. Chosen."""
 _REACH, _STEP = 0.06, 0.015  # share of the frequency within which a ridge begins, and within which it goes on
 _PADDING = 4
+"""Length of a padded segment over that of the segment. Chosen: peaks are found between the lines."""
 _NUMERIC = 1e-6  # of the largest value: below, digits end
 _RIDGE_SHARE = 1e-3  # of the largest value: below, the ridge goes on with its last frequency
 _QUIET = 5.0  # largest values over the median where there is noise alone
 _PASSES = 2
+"""Passes in which the frequency of a track is refined. Chosen."""
 _SMOOTHING_WINDOWS = 4.0
+"""Width of the smoothing in windows of the demodulation. Chosen."""
 _SEGMENT_SHARES, _SHORTEST_SEGMENT = (20, 6), 64
+"""Segments are these parts of the record, and have so many samples at least. Chosen."""
 _LOWEST_LINE = 3.0  # below, an offset and its drift are in the spectrum
 _ABOVE_NOISE, _OF_LARGEST = 30.0, 0.01
+"""A peak counts above this multiple of the noise's power, and this share of the largest amplitude. Chosen."""
 _MARGIN = 0.02
+"""Relative margin of the range of a track's frequency. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,12 +25,16 @@ from vibrolock.arrays import Complex, Float
 
 _HALF_WIDTHS = (0.35, 0.5, 0.8, 1.2)  # in ln(amplitude)
 _DEGREE, _HIGHER_DEGREE = 1, 2
+"""Degree of a local polynomial, and of the one whose difference bounds the curvature within the fit. Chosen."""
 _FEWEST_INSTANTS = 5
+"""Fewest instants of a decay. Chosen."""
 _NEIGHBOURS = 2
+"""Levels on either side over which an error is smoothed. Chosen."""
 _CURVATURE = 2.0  # bound of the error over the difference between fits of two degrees
 _WORST = 0.25
 """Relative standard error of the damping above which a level is left out."""
 _WINDOW_PERIODS = 1.5
+"""Periods after the beginning that the window of the demodulation still mixes with what was before. Chosen."""
 _UNKNOWN, _RISEN = 0.2, 1.2
 """Standard error of the damping at an instant over the rate of decay, and a rise of the amplitude, at which a decay ends."""
 _MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom

@@ -32,9 +32,13 @@ _STIFFNESS = PARAMETERS.index("suspension_stiffness_n_m")
 _DAMPING = PARAMETERS.index("suspension_damping_n_s_m")
 _BACK_EMF = PARAMETERS.index("back_emf_damping_n_s_m")
 _FEWEST_LINES = 20
+"""Fewest lines of an identification. Chosen: more than twice the parameters."""
 _POOLED_LINES = 21
+"""Neighbouring lines over which the noise is pooled. Chosen."""
 _UNSURE = 0.5
+"""Standard error relative to a parameter above which it counts as not identified. Chosen."""
 _MISFIT = 2.0
+"""RMS of residual over expected error above which a note says so. Chosen."""
 
 
 def identify_exciter(

@@ -14,7 +14,9 @@ _FADED = 0.5
 _AFTER_PERIODS = 40
 """Periods of the lowest frequency simulated at zero volts after the end, so that the run does not end with a jump."""
 _TOLERANCE = 1e-6
+"""Relative change of the force in a pass below which the passes end. Chosen."""
 _PASSES = 40
+"""Passes over a run, at most. Chosen."""
 
 
 class Passes:

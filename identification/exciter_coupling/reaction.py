@@ -28,6 +28,7 @@ Response = Callable[[Float], Complex]
 _LEAKS = (0.07, 0.15, 0.3, 0.6, 1.0, 2.0)
 """Poles of the filter that replace the integrators, relative to the lowest frequency."""
 _DELAYS = 4
+"""Delays in the filter, samples. Chosen: they stand for the poles that are too fast for it."""
 _QUIET = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 """Weights that are tried for the filter's gain below the band."""
 _STATIC = 1e3
@@ -39,6 +40,7 @@ _FAST = 2.5
 _TOP = 0.495
 """Highest frequency of the fit over the sample rate."""
 _LINES = 600
+"""Lines to which a filter is fitted. Chosen."""
 _SHIFT = 0.15
 """Assumed relative shift of resonances with amplitude."""
 _EASY, _LEAST = 0.05, 0.8

@@ -15,7 +15,9 @@ from vibrolock.arrays import Float
 _APART_S = 0.25
 """Hits that follow within this time are bounces of one: nobody hits twice on purpose as quickly."""
 _BEFORE = 0.05
+"""Part of a record that lies before its hit, where it is not given. Chosen."""
 _SHORTEST = 64
+"""Fewest samples in the record of a hit. Chosen."""
 _MOVING, _QUIETEST = 0.05, 3.0
 """A structure still moves if its motion before the hit is this share of that after it, and so many times the quietest one."""
 

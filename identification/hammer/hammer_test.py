@@ -25,6 +25,7 @@ _WEAKEST = 0.1
 _HIGHEST = 0.8
 """Highest line relative to half the sample rate; filters are not flat above."""
 _FIRST_LINES = 2
+"""Lines from 0 Hz on that are left out where no band is given: sensors with AC coupling are wrong there. Chosen."""
 
 
 def hammer_test(

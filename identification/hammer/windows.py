@@ -16,6 +16,7 @@ _BEFORE, _AFTER = 1.0, 4.0
 _LEFT = 1e-5
 """Amplitude that is left at the end of a record, relative to the beginning, from which it counts as ended."""
 _PARTS = 20
+"""Parts of a record; the energies of the first and of the last one show its decay. Chosen."""
 
 
 def force_window(samples: int, pulse: Pulse, length: int | None = None) -> Float:

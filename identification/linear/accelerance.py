@@ -20,6 +20,7 @@ Weighting = Literal["auto", "total", "noise", "relative"]
 _NEIGHBOURS = 4
 """Lines on either side that a weight averages: with five realisations, 32 degrees of freedom and a quarter more scatter."""
 _MOST_ALIKE = 50
+"""Neighbouring lines whose errors may be alike, at most. Chosen."""
 _FLOOR = 1e-9
 """Least eigenvalue of a covariance relative to its largest, so that a nearly exact line cannot outweigh all others."""
 _CANCELLED = 1e-13

@@ -21,10 +21,13 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 from vibrolock.arrays import Complex, Float
 
 _LARGEST_ORDER = 80
+"""Highest order of the model. Chosen."""
 _COLUMNS = 160
 """Most coefficients of one output: the time of the factorisation grows with their square."""
 _ROWS_PER_COLUMN = 4
+"""Fewest rows of the regression for each of its columns. Chosen."""
 _BLOCK = 8192
+"""Rows that are decomposed at once. Chosen."""
 _EXCITED = 0.1
 """A frequency counts as excited above this share of the strongest amplitude of the same input: 20 dB below it. Further down the
 flank of a filter, noise of the outputs is as large as the response, and biases a regression beyond its standard errors."""
@@ -33,6 +36,7 @@ _SEGMENTS = 8
 _SMOOTHED = 5
 """Lines over which they are averaged as well."""
 _LINES = 800
+"""Lines of the responses that are computed from the model. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,11 @@ from identification.validation import one_specimen
 from vibrolock.arrays import Float
 
 _SAME_HZ = 0.03
+"""Relative difference of frequencies up to which two modes may be one. Chosen."""
 _SAME_MAC = 0.8
+"""MAC above which two modes may be one. Chosen."""
 _SPREAD = 1.1
+"""Least ratio of successive force levels. Chosen."""
 
 
 def extrapolated_to_zero(

@@ -28,6 +28,7 @@ from vibrolock.results import Result
 _NEEDED = 2.0
 """A pole must be a mode if the misfit without it grows by this factor, whatever number of modes was requested."""
 _ROUNDS = 20
+"""Rounds of weighting and fit, at most. Chosen."""
 _AT_REST_STD = 0.01
 """The iteration ends once no pole moves by more than this share of its standard error."""
 

@@ -10,12 +10,19 @@ from identification.linear.response_matrix import FrequencyResponseMatrix
 from vibrolock.arrays import Complex, Float
 
 _SIGNIFICANT = 3.0
+"""Standard errors below which a residue counts as zero. The usual choice."""
 _LARGEST_DAMPING = 0.25
+"""Largest damping ratio of a mode. Chosen."""
 _LARGEST_DAMPING_ERROR = 0.5
+"""Largest standard error of a damping ratio, relative to it. Chosen."""
 _CLOSE_BANDWIDTHS = 2.0
+"""Distance of two modes in mean bandwidths below which a note says that they are close. Chosen."""
 _LINES_PER_BANDWIDTH = 2.0
+"""Lines within a mode's bandwidth below which a note says that the resolution is coarse. Chosen."""
 _LARGEST_RESIDUAL = 1.3
+"""RMS of residual over expected error above which a note says so. Chosen."""
 _COLLINEAR = 0.95
+"""Modal phase collinearity below which a note calls the mode complex. Chosen."""
 
 
 def phase_collinearity(residues: Complex) -> Float:

@@ -28,6 +28,7 @@ from vibrolock.arrays import Complex, Float
 RESIDUAL_TERMS = 5
 """Number of residual terms per channel, from modes outside the band."""
 _ITERATIONS = 60
+"""Iterations of a fit, at most. Chosen."""
 _STEP_STD = 1e-4
 """The fit has converged if a step moves no parameter by more than this share of its standard error."""
 _NEAREST = 0.9

@@ -16,9 +16,11 @@ from vibrolock.arrays import Bool, Complex, Float
 from vibrolock.results import Result
 
 _ORDERS = tuple(range(2, 41, 2))
+"""Orders of the models in the diagram. Chosen."""
 _LOWEST = 6
 """Orders up to this one are tried however narrow the band is."""
 _LARGEST_DAMPING = 0.1
+"""Largest damping ratio of a physical pole. Chosen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -26,6 +26,7 @@ _DAMPING = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 _CLEARLY = 0.8
 """The second of them is kept unless another reduces the sum of squares to this share."""
 _STEPS = 60
+"""Frequencies at which a further pole is tried. Chosen."""
 _MOST_LINES = 400
 """Most lines that the search looks at, evenly spread."""
 _EXPLAINED = 0.7

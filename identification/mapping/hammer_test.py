@@ -15,6 +15,7 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 _EVEN = 1e-3
+"""Relative difference of steps of time up to which they count as even. Chosen: times are often rounded."""
 
 
 class HammerChannel(ChannelMapping):

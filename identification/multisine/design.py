@@ -18,6 +18,7 @@ from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 
 _ROUNDING = 1e-9
+"""Relative distance of a limit from a line within which it counts as on the line. Chosen: above rounding."""
 _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
 
 

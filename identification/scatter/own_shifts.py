@@ -14,6 +14,7 @@ from vibrolock.arrays import Float
 _STEP = 1e-5
 """Step of the central differences by the shifts."""
 _STEPS, _HALVINGS = 6, 5
+"""Gauss-Newton steps for the shifts of a run, and halvings of a step that does not lower the residual, at most. Chosen."""
 _ENOUGH = 0.02
 """Steps below this share of a standard error end the search."""
 _LOOSE = 0.3

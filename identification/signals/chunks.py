@@ -14,6 +14,7 @@ CHUNK = 65536
 """Samples that are evaluated at once. Sums over a shorter record are those over the whole record, to the last bit."""
 
 _TURN = 2.0 * np.pi
+"""One turn, rad."""
 
 
 class Record(Protocol):

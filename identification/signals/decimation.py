@@ -13,6 +13,7 @@ from identification.validation import finite_array, positive
 EDGE_SAMPLES = 32
 """Number of samples of the slower signal at either end that are affected by values beyond the record."""
 LARGEST_FACTOR = 1000
+"""Largest numerator and denominator of a ratio of rates. Chosen: the filter grows with it."""
 _KAISER_BETA = 8.6  # 87 dB
 _CORNER = 0.91  # of the new Nyquist frequency: middle of the transition band, which ends at that frequency
 

@@ -28,10 +28,15 @@ from identification.validation import finite_array, positive
 from vibrolock.arrays import Complex, Float
 
 _MAX_BATCHES = 20
+"""Batches of periods from which standard errors come, at most. Chosen."""
 _MIN_BATCHES = 4
+"""Fewest batches that give a standard error. Chosen."""
 _MANY = 50
+"""Number of batches where there are too few periods for standard errors. Chosen."""
 _MOST_LOST = 0.05
+"""Largest share of lost samples in a record. Chosen: harmonics of the rest are then right to their noise."""
 _SHAPE_HARMONICS = 30
+"""Harmonics of the mean period that are taken beyond the requested ones. Chosen."""
 _BELOW_HALF = 0.45  # of the samples per period: highest harmonic of a shape
 _THIRD_DIFFERENCES = 20.0  # variance of a third difference of white noise: 1 + 9 + 9 + 1
 _SAMPLES_TO_SPARE = 3  # largest number of samples beyond the last whole period that is left out without a warning

@@ -22,7 +22,9 @@ from vibrolock.arrays import Complex, Float
 JUDGED = 16384
 """Number of samples of a record from which its rounding is judged; a longer record has no more of it."""
 _ORDERS = 6
+"""Orders of the harmonics of rounding that are summed, at most. Chosen."""
 _NEGLIGIBLE = 1e-3
+"""Size of a harmonic of rounding, in steps of the converter, below which the sum ends. Chosen."""
 _SIZES = (-0.25, 0.0, 0.25)
 """Changes of the peak of the vibration in steps."""
 _SPREAD = np.sqrt(0.5)

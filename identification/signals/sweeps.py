@@ -20,6 +20,7 @@ from vibrolock.arrays import Float
 Band = tuple[float, float]
 
 _BEFORE = 0.15
+"""Share of the swept band, at its beginning, where the force is off resonance; at both ends it is not searched. Chosen."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,9 @@ from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
 _MIN_SAMPLES_PER_PERIOD = 8.0
+"""Fewest samples in the shortest period. Chosen: harmonics up to the third stay below half the rate."""
 _POINTS_PER_PERIOD = 16
+"""Values that are returned in the shortest period, where their spacing is not given. Chosen."""
 _STRETCH = 65536  # samples that are demodulated at once
 _MARGIN = 64  # samples beyond a stretch that its splines include
 

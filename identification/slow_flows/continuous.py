@@ -24,11 +24,15 @@ from vibrolock.arrays import Float
 from vibrolock.results import Result
 
 _DEGREE, _NOISY_DEGREE = 2, 1
+"""Degree of a local polynomial over the logarithm of the amplitude, and near the noise. Chosen."""
 _NOISE_SPAN = 1.0  # in the logarithm of the amplitude
 _MEDIAN = 0.839  # median over mean of a chi-square variable with four degrees of freedom
 _FEWEST_INSTANTS = 8
+"""Fewest instants in a local fit. Chosen."""
 _NEIGHBOURS = 2
+"""Levels on either side over which an error is smoothed. Chosen."""
 _WIDEN = 1.25
+"""Factor by which a window with too few instants grows. Chosen."""
 _SLOPE_WIDTH = 0.25  # in the logarithm of the amplitude; derivatives of the stiffness need more instants than itself
 _WIDEST = 1.0  # in the logarithm of the amplitude
 

@@ -11,8 +11,10 @@ from identification.slow_flows.resonance import amplitudes_at, fit_at, resonant_
 from identification.slow_flows.slow_flow import SlowFlow
 
 _FEWEST_PERIODS = 2.0
+"""Fewest periods in a short point. Chosen."""
 _STEADY = 0.02  # relative change of the amplitude below which properties are taken as linear in time
 _LARGEST_CHANGE = 0.5
+"""Largest relative change of the amplitude within a short point. Chosen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -19,8 +19,10 @@ WINDOW_VARIANCE = 0.25 * WINDOW_PERIODS**2 * (0.28 - 1.92 / np.pi**2) / 0.84
 
 _STOP, _PASS = 0.25, 0.6  # edges of the high-pass over the fundamental frequency
 _END_FIT_PERIODS = 3.0
+"""Periods at each end of a record to which harmonics are fitted for its continuation. Chosen."""
 _END_PERIODS = 12.0  # the filter rings for about 1 / (_PASS - _STOP) periods
 _END_HARMONICS = 3
+"""Highest harmonic of these fits. Chosen."""
 
 
 def derivatives(theta: Float, data: Float, rate_hz: float, delay_s: Float, orders: tuple[int, ...]) -> Float:

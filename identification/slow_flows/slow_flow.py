@@ -22,6 +22,7 @@ from identification.validation import finite_array, positive
 from vibrolock.arrays import Complex, Float
 
 _MIN_FIT_PERIODS = 1.0
+"""Shortest window of a fit, periods: below one period harmonics are not told apart."""
 _NOISE_FITS = 2.0  # factor by which the fits that estimate the noise are longer
 _POOLED_PERIODS = 40.0  # over which the noise is taken as constant
 
