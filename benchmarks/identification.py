@@ -64,7 +64,7 @@ def jobs(bench: str) -> dict[str, tuple[Callable[[], Any], Recorded]]:
         sweep = recorded(f"{bench}/{name}", lambda run: next(iter(run.sweeps().values())))
 
         def predicted(sweep: Recorded = sweep) -> Any:
-            return predict_sweep(mode, sweep.measured, exciter=exciter, modes=modes)
+            return predict_sweep(mode, sweep.measured, exciter=exciter, linear_modes=modes)
 
         out[name] = (predicted, sweep)
     return out

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from identification import Channel, Features, PnlssModel, SteadyStates, pnlss_response
+from identification import Channel, Features, PnlssModel, SteadyStates, harmonic_response
 from vibrolock.arrays import Float
 
 HZ, DAMPING, RATE_HZ = 25.0, 0.01, 3200.0
@@ -109,7 +109,7 @@ def jump_hz(model: PnlssModel, force_n: float, begin_hz: float, end_hz: float) -
 def main() -> None:
     rows = {}
     for name, (model, force_n) in models().items():
-        found = pnlss_response(model, force_n, force="pure-sine", harmonics=11)
+        found = harmonic_response(model, force_n, force="pure-sine", harmonics=11, largest_range_use=3.0)
         points = found.points
         chosen = np.union1d(np.arange(0, points.count, EVERY), np.flatnonzero(~points.stable))
         rates = np.array([rate_of(model, points, int(k)) for k in chosen])

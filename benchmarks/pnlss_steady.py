@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification import Channel, Exciter, Features, PnlssModel, PnlssResponse, pnlss_response
+from identification import Channel, Exciter, Features, HarmonicResponse, PnlssModel, harmonic_response
 
 ROUNDS = 5
 HZ, DAMPING, RATE_HZ = 25.0, 0.004, 800.0
@@ -49,7 +49,7 @@ def oscillator(pairs: int) -> PnlssModel:
     )
 
 
-def stepped(model: PnlssModel, response: PnlssResponse, force_n: float) -> None:
+def stepped(model: PnlssModel, response: HarmonicResponse, force_n: float) -> None:
     """Simulate the stepped sine."""
     hz = np.linspace(response.points.frequency_hz.min(), response.points.frequency_hz.max(), response.points.count // 2)
     decay_s = np.log(1e3) / (DAMPING * 2 * np.pi * HZ)
@@ -83,7 +83,7 @@ def main() -> None:
         taken: dict[str, list[float]] = {"balance": [], "simulation": []}
         for _ in range(ROUNDS + 1):
             begin = time.process_time()
-            found = pnlss_response(model, force_n, force=held, exciter=shaker)  # type: ignore[arg-type]
+            found = harmonic_response(model, force_n, force=held, exciter=shaker, largest_range_use=3.0)  # type: ignore[arg-type]
             middle = time.process_time()
             stepped(model, found, force_n)
             taken["balance"].append(middle - begin)

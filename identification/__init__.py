@@ -32,22 +32,22 @@ Free decays
     decay_backbone, DecayBackbone, DecayMode
 Response-controlled tests
     force_surface, ForceSurface, ConstantForceCurve
+Prediction with models of any kind
+    frequency_response, harmonic_response, steady_state, backbone, steady_predictions, coupled_run, response_band,
+    SteadyPrediction, HarmonicResponse, SteadyStates, ResponseBand, DynamicModel, dynamic_model, Predictions
 Prediction with nonlinear modes
-    frequency_response, steady_predictions, SteadyPrediction, Predictions, ModalProperties, ExtrapolationError,
-    response_band, ResponseBand, identify_exciter, Exciter, VoltagePath, predict_sweep, VoltageSweep,
+    ModalProperties, ExtrapolationError, identify_exciter, Exciter, VoltagePath, predict_sweep, VoltageSweep,
     SweepPrediction, compare_sweep, compare, Comparison, PredictionError, error_table, recorded_force_response
 Nonlinear state-space models (PNLSS)
     identify_pnlss, PnlssModel, Experiment, FitSettings, FitProgress, Features, linear_pnlss, best_linear_responses,
     fit_pnlss, PnlssFit, FitHistory, Simulation
 Responses and errors of PNLSS models
-    pnlss_frequency_response, pnlss_response, pnlss_steady_state, PnlssResponse, SteadyStates, pnlss_coupled_run,
     CoupledRun, simulated_run, SimulatedRun, estimated_initial_state, pnlss_errors, PnlssErrors, error_spectra,
     ErrorSpectra, output_stretch, OutputStretch, ErrorTable, identify_many, ModelJob, IdentifiedModel,
     realisation_combinations
 Structured models
     fit_structured, StructuredModel, StructuredFit, NonlinearElement, ElementPlan, ElementTrial,
-    structured_backbone, structured_frequency_response, structured_response, structured_steady_state,
-    structured_coupled_run, CoupledMotion, structured_mode, bound_of, Bound
+    CoupledMotion, structured_mode, bound_of, Bound
 Changes from run to run
     fit_with_scatter, RunScatter, OutputBand
 Measurements of others
@@ -55,6 +55,10 @@ Measurements of others
     HammerTestMapping, map_multisine, MultisineMapping, map_nonlinear_mode, NonlinearModeMapping, map_pnlss,
     PnlssMapping, map_response_matrix, ResponseMatrixMapping, map_time_data, TimeDataMapping, TimeRecords, TimeRecord,
     time_experiments, time_responses, time_spectra
+Former names, which warn
+    pnlss_frequency_response, pnlss_response, pnlss_steady_state, PnlssResponse, pnlss_coupled_run,
+    structured_frequency_response, structured_response, structured_steady_state, structured_backbone,
+    structured_coupled_run
 """
 
 from typing import TYPE_CHECKING
@@ -66,6 +70,18 @@ if TYPE_CHECKING:
     from identification.channels import Channel as Channel
     from identification.decays.backbone import decay_backbone as decay_backbone
     from identification.decays.result import DecayBackbone as DecayBackbone, DecayMode as DecayMode
+    from identification.deprecated import (
+        PnlssResponse as PnlssResponse,
+        pnlss_coupled_run as pnlss_coupled_run,
+        pnlss_frequency_response as pnlss_frequency_response,
+        pnlss_response as pnlss_response,
+        pnlss_steady_state as pnlss_steady_state,
+        structured_backbone as structured_backbone,
+        structured_coupled_run as structured_coupled_run,
+        structured_frequency_response as structured_frequency_response,
+        structured_response as structured_response,
+        structured_steady_state as structured_steady_state,
+    )
     from identification.errors import IdentificationError as IdentificationError
     from identification.exciter_coupling.exciter import Exciter as Exciter, VoltagePath as VoltagePath
     from identification.exciter_coupling.exciter_fit import identify_exciter as identify_exciter
@@ -82,7 +98,10 @@ if TYPE_CHECKING:
     )
     from identification.hammer.hammer_test import hammer_test as hammer_test
     from identification.hammer.result import HammerTest as HammerTest, Hit as Hit
-    from identification.harmonic_balance.states import PnlssResponse as PnlssResponse, SteadyStates as SteadyStates
+    from identification.harmonic_balance.states import (
+        HarmonicResponse as HarmonicResponse,
+        SteadyStates as SteadyStates,
+    )
     from identification.linear.extrapolation import extrapolated_to_zero as extrapolated_to_zero
     from identification.linear.modal_analysis import ModalAnalysis as ModalAnalysis, linear_modes as linear_modes
     from identification.linear.mode_shapes import ModeShapes as ModeShapes, mac as mac
@@ -116,10 +135,8 @@ if TYPE_CHECKING:
     from identification.mapping.time_data import TimeDataMapping as TimeDataMapping
     from identification.mapping.time_records import map_time_data as map_time_data
     from identification.measurements import PeriodicVibration as PeriodicVibration
-    from identification.models.modal.frequency_response import (
-        frequency_response as frequency_response,
-        steady_predictions as steady_predictions,
-    )
+    from identification.models.dynamic_model import DynamicModel as DynamicModel
+    from identification.models.kinds import dynamic_model as dynamic_model
     from identification.models.modal.properties import (
         ExtrapolationError as ExtrapolationError,
         ModalProperties as ModalProperties,
@@ -131,9 +148,8 @@ if TYPE_CHECKING:
         compare_sweep as compare_sweep,
     )
     from identification.models.modal.sweeps import predict_sweep as predict_sweep
-    from identification.models.modal.uncertainty import ResponseBand as ResponseBand, response_band as response_band
     from identification.models.pnlss.best_linear import best_linear_responses as best_linear_responses
-    from identification.models.pnlss.coupled.run import CoupledRun as CoupledRun, pnlss_coupled_run as pnlss_coupled_run
+    from identification.models.pnlss.coupled.run import CoupledRun as CoupledRun
     from identification.models.pnlss.error_table import ErrorTable as ErrorTable
     from identification.models.pnlss.errors import (
         estimated_initial_state as estimated_initial_state,
@@ -152,34 +168,29 @@ if TYPE_CHECKING:
         realisation_combinations as realisation_combinations,
     )
     from identification.models.pnlss.model import PnlssModel as PnlssModel
-    from identification.models.pnlss.steady.response import (
-        pnlss_frequency_response as pnlss_frequency_response,
-        pnlss_response as pnlss_response,
-        pnlss_steady_state as pnlss_steady_state,
-    )
     from identification.models.predictions import Predictions as Predictions
+    from identification.models.responses import (
+        backbone as backbone,
+        coupled_run as coupled_run,
+        frequency_response as frequency_response,
+        harmonic_response as harmonic_response,
+        response_band as response_band,
+        steady_predictions as steady_predictions,
+        steady_state as steady_state,
+    )
     from identification.models.simulated_runs import (
         error_spectra as error_spectra,
         output_stretch as output_stretch,
         simulated_run as simulated_run,
     )
     from identification.models.structured.bound import Bound as Bound, bound_of as bound_of
-    from identification.models.structured.coupled.run import (
-        CoupledMotion as CoupledMotion,
-        structured_coupled_run as structured_coupled_run,
-    )
+    from identification.models.structured.coupled.run import CoupledMotion as CoupledMotion
     from identification.models.structured.element_trials import ElementTrial as ElementTrial
     from identification.models.structured.elements import NonlinearElement as NonlinearElement
     from identification.models.structured.fit import StructuredFit as StructuredFit, fit_structured as fit_structured
     from identification.models.structured.further import ElementPlan as ElementPlan
     from identification.models.structured.model import StructuredModel as StructuredModel
-    from identification.models.structured.steady.backbone import structured_backbone as structured_backbone
     from identification.models.structured.steady.mode import structured_mode as structured_mode
-    from identification.models.structured.steady.response import (
-        structured_frequency_response as structured_frequency_response,
-        structured_response as structured_response,
-        structured_steady_state as structured_steady_state,
-    )
     from identification.multisine.best_linear_approximation import (
         best_linear_approximation as best_linear_approximation,
         coherence as coherence,
@@ -209,6 +220,7 @@ if TYPE_CHECKING:
         compare as compare,
         error_table as error_table,
     )
+    from identification.prediction.response_band import ResponseBand as ResponseBand
     from identification.prediction.simulated_runs import (
         ErrorSpectra as ErrorSpectra,
         OutputStretch as OutputStretch,

@@ -23,6 +23,26 @@ class SimulatedMotion(Protocol):
         """Largest of what the model knows the trained range of over that range; inf if unbounded, NaN if unknown."""
 
 
+class CoupledSimulation(SimulatedMotion, Protocol):
+    """What a simulation with an exciter returns."""
+
+    @property
+    def force_n(self) -> Float:
+        """float[n], force at the model's input."""
+
+    @property
+    def passes(self) -> int:
+        """Number of passes over the run."""
+
+    @property
+    def change(self) -> float:
+        """RMS change of the force in the last pass over the RMS force; NaN for an unbounded run."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the run, one line each."""
+
+
 class Driven(Protocol):
     """A model with inputs and outputs."""
 

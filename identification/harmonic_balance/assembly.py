@@ -9,7 +9,7 @@ from identification.harmonic_balance.driven import DrivenBalance
 from identification.harmonic_balance.notes import edge_notes
 from identification.harmonic_balance.paths import Followed, followed, from_rest, polished, statically_stable
 from identification.harmonic_balance.setting_up import Held, unknowns_near
-from identification.harmonic_balance.states import PnlssResponse, SteadyStates, steady_states
+from identification.harmonic_balance.states import HarmonicResponse, SteadyStates, steady_states
 from identification.validation import positive
 
 _STEP = 0.05
@@ -25,7 +25,7 @@ def response_of(
     largest_range_use: float,
     notes: Callable[[SteadyStates], Sequence[str]],
     more: Sequence[str] = (),
-) -> PnlssResponse:
+) -> HarmonicResponse:
     """Return the response over a band, from below and, where that does not reach the far end, also from above.
 
     ``notes`` gives the notes on all points; ``more`` are further notes. Raises `IdentificationError` if ``points`` or
@@ -52,7 +52,7 @@ def response_of(
     states = [_along(balance, each) for each in found]
     every = states[0] if len(states) == 1 else states[0].joined(states[1])
     folds = [_turns(balance, each) for each in found]
-    return PnlssResponse(
+    return HarmonicResponse(
         force_n=float(force_n),
         force=force,
         points=every,

@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.channels import find_role
 from identification.continuation.path import System
+from identification.errors import IdentificationError
 from identification.experiments.simulators import Driven
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.drives import Drive
@@ -146,3 +148,20 @@ class DrivenBalance(ABC):
         if np.any(self._held):
             states[0] = self.static(self._held[0])
         return np.concatenate([states.ravel(), level * own])
+
+    def in_phase(self, z: Float, frequency_hz: float, level: float) -> tuple[float, Float, float, float]:
+        """Return the displacement of the drive point in phase with the force, which vanishes at phase resonance.
+
+        Up to a factor, with its derivatives with respect to unknowns, frequency (per Hz) and level. Raises
+        `IdentificationError` if the force is not an input, whose phase is then not the reference.
+        """
+        if not any(channel.role == "force" for channel in self.inputs):
+            raise IdentificationError("model: is driven by a voltage; phase resonance needs a model of a force")
+        n, drive = self.n_states, find_role(self.outputs, "drive")
+        row = 2 if self.outputs[drive].motion == "velocity" else 1
+        at = self.along(self.states(z), self.inputs_of(z, level), frequency_hz)
+        by_states, by_inputs = at.outputs_by[row, drive, :, :n], at.outputs_by[row, drive, :, n:]
+        by_own = np.tensordot(by_inputs, self._by_own, axes=2)
+        by_z = np.concatenate([by_states.ravel(), by_own])
+        by_level = float(np.sum(by_inputs * self._given))
+        return float(at.outputs[row, drive]), by_z, float(at.outputs_by_frequency[row, drive]), by_level

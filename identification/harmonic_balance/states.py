@@ -175,7 +175,7 @@ def steady_states(
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PnlssResponse:
+class HarmonicResponse:
     """Frequency response of a nonlinear state-space model at constant force, with all harmonics.
 
     Parameters

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
+    from identification.models.dynamic_model import LARGEST_RANGE_USE as LARGEST_RANGE_USE
     from identification.models.modal.frequency_response import HeldForce as HeldForce
     from identification.models.modal.sweep_prediction import as_recorded as as_recorded
-    from identification.models.modal.uncertainty import band_of_responses as band_of_responses
     from identification.models.pnlss.error_table import SAME_LEVEL as SAME_LEVEL, ModelTest as ModelTest
     from identification.models.pnlss.features import FUNCTIONS as FUNCTIONS
     from identification.models.pnlss.user_functions import is_users as is_users

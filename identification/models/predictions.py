@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.models.modal.sweep_prediction import SweepPrediction
-from identification.models.modal.uncertainty import ResponseBand
 from identification.prediction.comparison import PredictionError
+from identification.prediction.response_band import ResponseBand
 from identification.prediction.simulated_runs import SimulatedRun
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.signals.transients import Transient

@@ -8,8 +8,7 @@ from identification.errors import IdentificationError
 from identification.experiments.checks import check_not_zero
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulators import SimulatedMotion, Simulator, simulated
-from identification.models.pnlss.errors import estimated_initial_state
-from identification.models.pnlss.model import PnlssModel
+from identification.models.kinds import dynamic_model, has_kind
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 from vibrolock.arrays import Float
 
@@ -109,9 +108,8 @@ def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None
     """
     check_channels(model, experiment)
     estimated = initial_state is None and experiment.initial_state == "estimated"
-    if isinstance(model, PnlssModel):
-        state = estimated_initial_state(model, experiment) if estimated else initial_state
-        return model.simulate(experiment.inputs, initial_state=state)
+    if has_kind(model):
+        return dynamic_model(model).simulate_experiment(experiment, initial_state)
     if estimated or initial_state is not None:
         raise IdentificationError(
             f"experiment '{experiment.name}': does not begin at rest, as a {type(model).__name__} does"

@@ -1,4 +1,4 @@
-"""Predictions from nonlinear modes: steady responses and sweeps, and their comparison with measurements."""
+"""What models of any kind predict, and its comparison with measurements."""
 
 from typing import TYPE_CHECKING
 
@@ -6,6 +6,7 @@ from vibrolock.on_use import on_use
 
 if TYPE_CHECKING:
     from identification.prediction.comparison import Over as Over
+    from identification.prediction.response_band import band_of_responses as band_of_responses
     from identification.prediction.steady_prediction import FLAGGED_BEYOND as FLAGGED_BEYOND
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

@@ -16,6 +16,9 @@ from rig.cli.studies import installed_command
 if TYPE_CHECKING:
     from typer._click.core import Command
 
+_OTHER_FIELDS = {"largest_range_use": "allow_extrapolation"}
+"""Fields of the library whose option turns something on, by the name of the parameter."""
+
 
 def flags(app: typer.Typer) -> dict[str, str]:
     """Return the option for each field name, over all commands."""
@@ -28,7 +31,7 @@ def flags(app: typer.Typer) -> dict[str, str]:
             options = [option for option in parameter.opts if option.startswith("--")]
             if options:
                 found[parameter.name.removeprefix("no_").rstrip("_")] = options[0]
-    return found
+    return {**found, **{field: found[option] for field, option in _OTHER_FIELDS.items() if option in found}}
 
 
 def with_flags(message: str, app: typer.Typer) -> str:

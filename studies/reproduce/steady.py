@@ -97,9 +97,7 @@ def _predicted(
     low, high = options.specimen.band_hz
     used = exciter if truth.held == "fundamental" else None
     try:
-        found = frequency_response_at(
-            model, truth.level, force=truth.held, exciter=used, lowest_hz=low, highest_hz=high
-        )
+        found = frequency_response_at(model, truth.level, force=truth.held, exciter=used, band_hz=(low, high))
     except IdentificationError as error:
         return None, str(error)
     return found, ""

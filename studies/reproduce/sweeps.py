@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Exciter, Experiment
+from identification import Exciter, Experiment, coupled_run
 from identification.common import find_role
 from identification.experiments import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
-from rig.results.simulated.driven_models import DrivenModel, coupled_run
+from rig.results.simulated.driven_models import DrivenModel
 from studies.reproduce.exciter import exciter_of
 from studies.reproduce.options import Options
 from studies.reproduce.recordings import recorded, training_data

@@ -16,7 +16,7 @@ from simulators.analysis import phase_resonance_backbone
 whole = rig.run("magnet-beam/backbone-short").backbone()
 small = whole.select(whole.amplitude_m < 1.1e-3)
 mode = identification.nonlinear_mode(small)
-responses = identification.steady_predictions(mode, (0.1, 0.2, 0.3, 0.4), allow_extrapolation=True)
+responses = identification.steady_predictions(mode, (0.1, 0.2, 0.3, 0.4), largest_range_use=float("inf"))
 responses[-1]
 
 # %%

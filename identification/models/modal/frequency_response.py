@@ -1,6 +1,6 @@
 """Predicted frequency responses at constant force, from a nonlinear mode."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import Literal, get_args
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.linear.modes import LinearModes
-from identification.models.modal.properties import HIGHER_LEVELS, ExtrapolationError, ModalProperties
+from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
 from identification.models.modal.steady_states import OneMode, Path, fundamental_motion, range_notes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import SteadyPrediction
@@ -17,17 +17,18 @@ from vibrolock.arrays import Float
 
 HeldForce = Literal["fundamental", "rms", "pure-sine"]
 
-_FARTHEST = 20.0
+FARTHEST = 20.0
+"""Use of the identified range up to which branches are sought where any extrapolation is allowed. Chosen."""
 
 
-def frequency_response(
+def mode_response(
     mode: NonlinearMode,
     force_n: float,
     *,
-    force: HeldForce = "fundamental",
-    modes: LinearModes | None = None,
+    force: str = "fundamental",
+    linear_modes: LinearModes | None = None,
     residuals: bool = True,
-    allow_extrapolation: bool = False,
+    largest_range_use: float = REFUSED_BEYOND,
     points: int = 401,
     lowest_share: float = 0.05,
 ) -> SteadyPrediction:
@@ -44,13 +45,13 @@ def frequency_response(
         when the mode was identified; their power is included in the damping. ``rms``: the RMS of such a force is held; the
         ratio of fundamental to RMS recorded at phase resonance is interpolated over q, and a note states this. ``pure-sine``:
         a force without harmonics, with the damping from the total power.
-    modes
+    linear_modes
         Linear modes. They provide the responses at their other channels (the shape of the tested mode, scaled by the response
         of the drive point) and the contribution of the other modes.
     residuals
-        Whether to add the linear response of the other modes of ``modes`` to the force.
-    allow_extrapolation
-        Whether to predict beyond twice the largest modal amplitude identified.
+        Whether to add the linear response of the other modes of ``linear_modes`` to the force.
+    largest_range_use
+        Largest modal amplitude over the largest identified; ``inf`` allows any.
     points
         Number of points on each branch.
     lowest_share
@@ -61,7 +62,7 @@ def frequency_response(
     IdentificationError
         If the force is not above zero, the mode lacks properties, or ``points`` is below 20.
     ExtrapolationError
-        If the response needs more than twice the largest modal amplitude identified.
+        If the response needs more than ``largest_range_use`` times the largest modal amplitude identified.
     """
     if force not in get_args(HeldForce):
         raise IdentificationError(f"force: is '{force}', allowed are {', '.join(get_args(HeldForce))}")
@@ -73,9 +74,9 @@ def frequency_response(
     properties = ModalProperties.of(
         mode,
         damping="total-power" if force == "pure-sine" else "fundamental",
-        allow_extrapolation=allow_extrapolation,
+        largest_range_use=largest_range_use,
     )
-    one = OneMode(properties, _fundamental(mode, level, force))
+    one = OneMode(properties, fundamental_of(mode, level, force))
     paths, notes = _branches(one, level)
     if not paths:
         raise IdentificationError(f"force_n: is {level:g} N, too small for a response that can be told from rest")
@@ -87,7 +88,7 @@ def frequency_response(
     q, sign = np.concatenate([path.at(each) for path, each in zip(paths, s, strict=True)], axis=1)
     omega = one.omega(q, sign)
     folds = np.concatenate([_folds(one, path, each) for path, each in zip(paths, s, strict=True)], axis=0)
-    channels, motion = fundamental_motion(mode, properties, q, omega, one.fundamental_n(q), modes, residuals)
+    channels, motion = fundamental_motion(mode, properties, q, omega, one.fundamental_n(q), linear_modes, residuals)
     return SteadyPrediction(
         force_n=level,
         force=force,
@@ -106,25 +107,7 @@ def frequency_response(
     )
 
 
-def steady_predictions(
-    mode: NonlinearMode,
-    forces_n: Sequence[float],
-    *,
-    force: HeldForce = "fundamental",
-    modes: LinearModes | None = None,
-    residuals: bool = True,
-    allow_extrapolation: bool = False,
-) -> tuple[SteadyPrediction, ...]:
-    """Predict the `frequency_response` at several forces; the message of an error names the force."""
-    return tuple(
-        frequency_response(
-            mode, force_n, force=force, modes=modes, residuals=residuals, allow_extrapolation=allow_extrapolation
-        )
-        for force_n in forces_n
-    )
-
-
-def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callable[[Float], Float]:
+def fundamental_of(mode: NonlinearMode, level: float, force: str) -> Callable[[Float], Float]:
     """Return the function that gives the amplitude (peak) of the fundamental force at a modal amplitude q."""
     if force != "rms":
         return partial(np.full_like, fill_value=level)
@@ -141,10 +124,10 @@ def _fundamental(mode: NonlinearMode, level: float, force: HeldForce) -> Callabl
 def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
     """Return the branches of solutions; raise `ExtrapolationError` if a branch from the identified range exceeds the limit."""
     largest = one.properties.q_range[1]
-    limit = min(one.properties.highest_q, _FARTHEST * largest)
+    limit = min(one.properties.highest_q, FARTHEST * largest)
     paths, opened = one.paths(limit)
     if opened is not None and (opened <= largest or not paths):
-        advice = "measure higher levels" if one.properties.allow_extrapolation else HIGHER_LEVELS
+        advice = "measure higher levels" if np.isinf(one.properties.highest_q) else HIGHER_LEVELS
         raise ExtrapolationError(
             f"force_n: {level:g} N drives the mode beyond {limit / largest:g} times the largest modal amplitude "
             f"identified ({largest:g} kg^1/2 m); {advice}"

@@ -22,7 +22,8 @@ from vibrolock.arrays import Float
 Damping = Literal["fundamental", "total-power"]
 
 REFUSED_BEYOND = 2.0
-HIGHER_LEVELS = "measure higher levels, or allow extrapolation (`allow_extrapolation`)"
+"""Use of the identified range up to which predictions are made unless more is allowed (decision 24)."""
+HIGHER_LEVELS = "measure higher levels, or allow extrapolation (`largest_range_use`)"
 """Advice of an `ExtrapolationError`, for Python and the command line."""
 _TAIL_FROM = 0.5
 _FEWEST_TAIL_LEVELS = 3
@@ -32,7 +33,7 @@ _DAMPING_FIELD = {"fundamental": "damping_ratio", "total-power": "damping_ratio_
 
 
 class ExtrapolationError(IdentificationError):
-    """A model is evaluated beyond twice its largest identified modal amplitude, and extrapolation was not allowed."""
+    """A nonlinear mode is evaluated beyond the multiple of its largest identified modal amplitude that is allowed."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,8 +55,8 @@ class ModalProperties:
         float[4, max(n - 1, 1)], coefficients of the cubic in each interval, highest power first.
     tail
         float[6], coefficients of the continuation above the last breakpoint.
-    allow_extrapolation
-        Whether values beyond twice the last breakpoint are allowed.
+    largest_range_use
+        Largest q that is allowed, over the last breakpoint; ``inf`` allows any.
     """
 
     modal_amplitude: Float
@@ -66,11 +67,11 @@ class ModalProperties:
     damping_coefficients: Float
     drive_shape_coefficients: Float
     tail: Float
-    allow_extrapolation: bool = False
+    largest_range_use: float = REFUSED_BEYOND
 
     @classmethod
     def of(
-        cls, mode: NonlinearMode, *, damping: Damping = "fundamental", allow_extrapolation: bool = False
+        cls, mode: NonlinearMode, *, damping: Damping = "fundamental", largest_range_use: float = REFUSED_BEYOND
     ) -> "ModalProperties":
         """Compute the properties of an identified mode.
 
@@ -82,8 +83,8 @@ class ModalProperties:
             ``1 / sqrt(m)`` of the measured point, m being interpolated from level to level like w and z.
         damping
             Whether damping is computed from the power of the fundamental alone or of all harmonics.
-        allow_extrapolation
-            Whether values beyond twice the largest identified q are allowed.
+        largest_range_use
+            Largest q that is allowed, over the largest identified; ``inf`` allows any.
 
         Raises
         ------
@@ -103,7 +104,7 @@ class ModalProperties:
                 "identify it with mass-normalised shapes, and harmonics for the total power"
             )
         merged = _merged(table[:, known])
-        return cls.from_levels(*merged, allow_extrapolation=allow_extrapolation)
+        return cls.from_levels(*merged, largest_range_use=largest_range_use)
 
     @classmethod
     def from_levels(
@@ -113,7 +114,7 @@ class ModalProperties:
         damping: ArrayLike,
         drive_shape: ArrayLike,
         *,
-        allow_extrapolation: bool = False,
+        largest_range_use: float = REFUSED_BEYOND,
     ) -> "ModalProperties":
         """Compute properties from values [n] at rising modal amplitudes; the drive shape may be a single number."""
         q = finite_array("modal_amplitude", modal_amplitude, np.float64, 1)
@@ -148,7 +149,7 @@ class ModalProperties:
             damping_coefficients=cubics[1],
             drive_shape_coefficients=cubics[2],
             tail=np.array(tail),
-            allow_extrapolation=allow_extrapolation,
+            largest_range_use=largest_range_use,
         )
 
     @property
@@ -159,7 +160,7 @@ class ModalProperties:
     @property
     def highest_q(self) -> float:
         """Largest allowed modal amplitude; infinite if extrapolation is allowed."""
-        return np.inf if self.allow_extrapolation else REFUSED_BEYOND * self.q_range[1]
+        return self.largest_range_use * self.q_range[1]
 
     def range_use(self, q: ArrayLike) -> Float:
         """Modal amplitude over the largest identified; values above 1 are extrapolations, above 1.25 they are flagged."""
@@ -203,7 +204,7 @@ class ModalProperties:
         if amplitude.size and not np.max(amplitude) <= self.highest_q:
             raise ExtrapolationError(
                 f"modal amplitude: {np.max(amplitude):g} kg^1/2 m is {np.max(self.range_use(amplitude)):.2f} times the "
-                f"largest identified, allowed is up to {REFUSED_BEYOND:g}; {HIGHER_LEVELS}"
+                f"largest identified, allowed is up to {self.largest_range_use:g}; {HIGHER_LEVELS}"
             )
         held = np.clip(amplitude, *self.q_range)
         interval = np.searchsorted(self.modal_amplitude, held, side="right") - 1

@@ -11,24 +11,26 @@ from numpy.typing import NDArray
 
 from identification.frequency_responses import FrequencyResponse
 from identification.linear.modes import LinearModes
+from identification.models.modal.frequency_response import FARTHEST
 from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
 from identification.models.modal.steady_states import OneMode, fundamental_motion, range_notes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import SteadyPrediction
+from identification.renamed import formerly
 from vibrolock.arrays import Complex, Float
 
-_FARTHEST = 20.0
 _SAME_LAG_DEG = 1.0
 _MISSED = 0.02
 
 
+@formerly
 def recorded_force_response(
     mode: NonlinearMode,
     reference: FrequencyResponse,
     *,
-    modes: LinearModes | None = None,
+    linear_modes: LinearModes | None = None,
     residuals: bool = True,
-    allow_extrapolation: bool = False,
+    largest_range_use: float = REFUSED_BEYOND,
 ) -> SteadyPrediction:
     """Predict the steady response at every frequency of a measurement to the fundamental of the force measured there.
 
@@ -46,8 +48,10 @@ def recorded_force_response(
         The identified nonlinear mode.
     reference
         Measured frequencies and forces, the controlled quantity, and phase lags unless the force was controlled.
-    modes, residuals, allow_extrapolation
+    linear_modes, largest_range_use
         As for `frequency_response`.
+    residuals
+        Whether to add the linear response of the other modes of ``linear_modes`` to the force.
 
     Returns
     -------
@@ -58,15 +62,15 @@ def recorded_force_response(
     Raises
     ------
     ExtrapolationError
-        If a point needs more than twice the largest modal amplitude identified.
+        If a point needs more than ``largest_range_use`` times the largest modal amplitude identified.
     """
-    properties = ModalProperties.of(mode, allow_extrapolation=allow_extrapolation)
+    properties = ModalProperties.of(mode, largest_range_use=largest_range_use)
     by_force = reference.controlled == "force"
     states = _states(properties, reference, by_force)
     point = np.repeat(np.arange(len(states)), [each.size for each in states])
     q, forces = np.concatenate(states), reference.force_n[point]
     omegas = 2.0 * np.pi * reference.frequency_hz[point]
-    channels, motion = fundamental_motion(mode, properties, q, omegas, forces, modes, residuals)
+    channels, motion = fundamental_motion(mode, properties, q, omegas, forces, linear_modes, residuals)
     if by_force:
         taken = _chosen(point, q, np.zeros(q.size))
     else:
@@ -100,7 +104,7 @@ def recorded_force_response(
 
 def _states(properties: ModalProperties, reference: FrequencyResponse, stable_only: bool) -> list[Float]:
     """Return the modal amplitudes of the states at each point, rising; raise `ExtrapolationError` if there are none."""
-    limit = min(properties.highest_q, _FARTHEST * properties.q_range[1])
+    limit = min(properties.highest_q, FARTHEST * properties.q_range[1])
     states = []
     for point, (frequency_hz, force) in enumerate(zip(reference.frequency_hz, reference.force_n, strict=True)):
         omega = 2.0 * np.pi * float(frequency_hz)
@@ -113,7 +117,7 @@ def _states(properties: ModalProperties, reference: FrequencyResponse, stable_on
             raise ExtrapolationError(
                 f"force[{point}]: {force:g} N at {frequency_hz:g} Hz has no {'stable ' if stable_only else ''}response up "
                 f"to {limit / properties.q_range[1]:g} times the largest modal amplitude identified, allowed is up to "
-                f"{REFUSED_BEYOND:g}; {HIGHER_LEVELS}"
+                f"{properties.largest_range_use:g}; {HIGHER_LEVELS}"
             )
         states.append(found)
     return states

@@ -34,6 +34,7 @@ from identification.models.modal.sweep_inputs import SweepInput, VoltageSweep, f
 from identification.models.modal.sweep_prediction import SweepPrediction
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import FLAGGED_BEYOND
+from identification.renamed import formerly
 from identification.signals.half_periods import HalfPeriods
 from identification.signals.transients import Transient
 from identification.validation import one_specimen
@@ -42,22 +43,25 @@ from vibrolock.arrays import Complex, Float
 _Tables = tuple[Float, Float, Float, Float, Float]
 
 _TABLE_SIZE = 1024
-_UNBOUNDED = 1e3  # times the identified range: the integration ends there if extrapolation is allowed
+_UNBOUNDED = 1e3
+"""Use of the identified range at which the integration ends if any extrapolation is allowed. Chosen."""
 _AT_REST = 1e-3
-_SETTLED = 12.0  # time constants
+_SETTLED = 12.0
+"""Time constants after which a motion counts as settled. Chosen: e^-12 is 6e-6."""
 _STEP_RAD = 0.4  # rotation of the amplitude relative to its steady state within one Runge-Kutta step
 _LEAST_DECAY = 1e-4
 
 
+@formerly
 def predict_sweep(
     mode: NonlinearMode | ModalProperties,
     sweep: Transient | HalfPeriods | VoltageSweep,
     *,
     exciter: Exciter | None = None,
-    modes: LinearModes | None = None,
+    linear_modes: LinearModes | None = None,
     voltage: str = "voltage",
     damping: Literal["fundamental", "total-power"] = "fundamental",
-    allow_extrapolation: bool = False,
+    largest_range_use: float = REFUSED_BEYOND,
 ) -> SweepPrediction:
     """Predict the response of one nonlinear mode to a sweep.
 
@@ -65,21 +69,21 @@ def predict_sweep(
     ----------
     mode
         Identified mode, or its properties over the modal amplitude, which then determine ``damping`` and
-        ``allow_extrapolation``.
+        ``largest_range_use``.
     sweep
         Without ``exciter``, the recorded force is imposed: its fundamentals (`Transient`) or its (half) periods. With
         ``exciter``, the voltage is imposed: that of a recording (`Transient`) or of a planned `VoltageSweep`.
     exciter
         Exciter identified on the same rig.
-    modes
+    linear_modes
         Linear modes of the structure; all but the tested one contribute by their receptance. For a suspended or otherwise
         soft structure their contribution is several percent.
     voltage
         Name of the voltage channel.
     damping
         Damping ratio to use, see `ModalProperties.of`.
-    allow_extrapolation
-        Whether to continue beyond twice the largest identified modal amplitude.
+    largest_range_use
+        Largest modal amplitude over the largest identified; ``inf`` allows any.
 
     Returns
     -------
@@ -89,14 +93,14 @@ def predict_sweep(
     Raises
     ------
     ExtrapolationError
-        If the modal amplitude exceeds twice the largest identified one and extrapolation is not allowed.
+        If the modal amplitude exceeds ``largest_range_use`` times the largest identified one.
     IdentificationError
         If input and exciter do not match.
     """
     properties = mode
     if isinstance(mode, NonlinearMode):
-        one_specimen(mode=mode.specimen, modes="" if modes is None else modes.specimen)
-        properties = ModalProperties.of(mode, damping=damping, allow_extrapolation=allow_extrapolation)
+        one_specimen(mode=mode.specimen, modes="" if linear_modes is None else linear_modes.specimen)
+        properties = ModalProperties.of(mode, damping=damping, largest_range_use=largest_range_use)
     assert isinstance(properties, ModalProperties)
     if exciter is None:
         if isinstance(sweep, VoltageSweep):
@@ -108,8 +112,8 @@ def predict_sweep(
     given = voltage_input(sweep, voltage)
     detuning = np.max(np.abs(2.0 * np.pi * given.frequency_hz - properties.omega_rad_s[0]))
     given = given.thinned(0.5 * _STEP_RAD / float(max(detuning, 1e-9)))
-    notes = _coupling_notes(exciter, modes, given)
-    return _integrate(properties, given, *_coupled(given, exciter, modes, properties), notes)
+    notes = _coupling_notes(exciter, linear_modes, given)
+    return _integrate(properties, given, *_coupled(given, exciter, linear_modes, properties), notes)
 
 
 def _imposed(given: SweepInput) -> tuple[Complex, Complex, Complex]:
@@ -162,7 +166,7 @@ def _integrate(
     kept = slice(0, 2 * ((given.time_s.size - 1) // 2) + 1)
     s = 2j * np.pi * given.frequency_hz[kept]
     out, rate = np.empty(((s.size + 1) // 2,), np.complex128), np.empty(((s.size + 1) // 2,), np.complex128)
-    largest = p.q_range[1] * (_UNBOUNDED if p.allow_extrapolation else REFUSED_BEYOND)
+    largest = p.q_range[1] * min(p.largest_range_use, _UNBOUNDED)
     tables: _Tables = (
         p.modal_amplitude,
         p.omega_coefficients,
@@ -178,9 +182,9 @@ def _integrate(
     every = slice(0, 2 * count - 1, 2)
     if code == DIVERGED:
         where = f"at {given.time_s[every][-1]:.4g} s, {given.frequency_hz[every][-1]:.4g} Hz"
-        if not p.allow_extrapolation:
+        if p.largest_range_use < _UNBOUNDED:
             raise ExtrapolationError(
-                f"modal amplitude: exceeds {REFUSED_BEYOND:g} times the largest identified ({p.q_range[1]:.4g} kg^1/2 m) "
+                f"modal amplitude: exceeds {p.largest_range_use:g} times the largest identified ({p.q_range[1]:.4g} kg^1/2 m) "
                 f"{where}; {HIGHER_LEVELS}"
             )
         notes += (f"the amplitude is unbounded: the prediction ends {where}",)

@@ -39,8 +39,8 @@ class SweepModels:
     """Exciter model; without it, the recorded force is imposed."""
     zero_crossings: str | None
     """Zero crossings between which the imposed force is read: ``half-periods`` or ``periods``; None: it is demodulated."""
-    allow_extrapolation: bool
-    """Whether to predict beyond twice the largest identified modal amplitude."""
+    largest_range_use: float
+    """Largest modal amplitude over the largest identified."""
 
     def predict(self, given: Transient | HalfPeriods | VoltageSweep) -> SweepPrediction:
         """Call `identification.predict_sweep` with these models."""
@@ -48,8 +48,8 @@ class SweepModels:
             self.mode,
             given,
             exciter=self.exciter,
-            modes=self.modes,
-            allow_extrapolation=self.allow_extrapolation,
+            linear_modes=self.modes,
+            largest_range_use=self.largest_range_use,
         )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from identification import Exciter, PnlssModel, SimulatedRun
+from identification import Exciter, PnlssModel, SimulatedRun, coupled_run
 from identification.experiments import SimulatedMotion
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
@@ -13,7 +13,7 @@ from rig.errors import ConfigurationError
 from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD
 from rig.results.predictions.sweeps import strangers
 from rig.results.simulated.constants import all_inputs
-from rig.results.simulated.driven_models import DrivenModel, coupled_run
+from rig.results.simulated.driven_models import DrivenModel
 from vibrolock.arrays import Float
 
 _LOWEST = 0.8

@@ -1,10 +1,10 @@
 """Predictions by PNLSS and structured models: steady vibrations, recorded sweeps, recorded multisines."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from identification import (
     Exciter,
@@ -15,17 +15,18 @@ from identification import (
     ResponseBand,
     SteadyPrediction,
 )
-from identification.models import band_of_responses
+from identification.harmonic_balance import Held
+from identification.prediction import band_of_responses
 from rig.errors import ConfigurationError
 from rig.results.files import load, load_as
 from rig.results.predictions.references import references_in
 from rig.results.simulated.constants import constants_of
-from rig.results.simulated.driven_models import DrivenModel, frequency_response_at
+from rig.results.simulated.driven_models import DrivenModel, Fixed, frequency_response_at
 from rig.results.simulated.model import SimulatedModel
 from rig.results.simulated.multisines import simulated_multisines
 from rig.results.simulated.planned_multisines import planned_multisines
 from rig.results.simulated.prediction_options import SimulatedPrediction
-from rig.results.simulated.steady import Held, compared, default_held
+from rig.results.simulated.steady import compared, default_held
 from rig.results.simulated.sweep_models import SimulatedSweepModels
 from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simulated_sweeps
 
@@ -47,7 +48,7 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     bands_asked = getattr(request, "bands", False)
     exciter = None if request.exciter is None else load_as(Exciter, request.exciter)
     constants = constants_of(model, request.constants, path)
-    fixed: dict[str, Any] = {"exciter": exciter, **({"held_inputs": constants} if constants else {})}
+    fixed: Fixed = {"exciter": exciter, "held_inputs": constants} if constants else {"exciter": exciter}
     held: Held = request.held or default_held(model, exciter)
     references_held = default_held(model, exciter)
     alone = request.forces_without_reference([one.measured for one in references], references_held)
@@ -112,7 +113,7 @@ def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenMo
     return cast(Sequence[DrivenModel], models)
 
 
-def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Mapping[str, Any]) -> ResponseBand | None:
+def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Fixed) -> ResponseBand | None:
     """Return the band of a response over other models; None if there are none, or if most have no such response."""
     responses: list[SteadyPrediction] = []
     for model in others:

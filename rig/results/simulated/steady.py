@@ -1,8 +1,6 @@
 """Steady vibrations of PNLSS and structured models, compared with stepped sines."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal
 
 import numpy as np
 
@@ -15,10 +13,10 @@ from identification import (
     SteadyStates,
     compare,
 )
+from identification.harmonic_balance import Held
 from rig.results.predictions.references import Reference
-from rig.results.simulated.driven_models import DrivenModel, frequency_response_at, steady_state_at
+from rig.results.simulated.driven_models import DrivenModel, Fixed, frequency_response_at, steady_state_at
 
-Held = Literal["fundamental", "rms", "pure-sine", "voltage"]
 _MARGIN = 0.02
 """Relative margin by which a response is followed beyond the frequencies of a reference."""
 _STEPS = 5
@@ -36,7 +34,7 @@ def default_held(model: DrivenModel, exciter: Exciter | None) -> Held:
 
 
 def compared(
-    model: DrivenModel, fixed: Mapping[str, Any], reference: Reference, *, whole: bool = False
+    model: DrivenModel, fixed: Fixed, reference: Reference, *, whole: bool = False
 ) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
     """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare.
 
@@ -45,14 +43,18 @@ def compared(
     """
     measured, over = reference.measured, reference.over
     held, notes = default_held(model, fixed["exciter"]), []
-    low: float | None = None if whole else (1.0 - _MARGIN) * float(measured.frequency_hz.min())
-    high: float | None = None if whole else (1.0 + _MARGIN) * float(measured.frequency_hz.max())
-    if measured.controlled == "force":
-        predicted = frequency_response_at(model, measured.level, force=held, lowest_hz=low, highest_hz=high, **fixed)
-    elif measured.controlled == "voltage" and held == "fundamental":
-        predicted = frequency_response_at(
-            model, measured.level, force="voltage", lowest_hz=low, highest_hz=high, **fixed
+    band_hz = (
+        None
+        if whole
+        else (
+            (1.0 - _MARGIN) * float(measured.frequency_hz.min()),
+            (1.0 + _MARGIN) * float(measured.frequency_hz.max()),
         )
+    )
+    if measured.controlled == "force":
+        predicted = frequency_response_at(model, measured.level, force=held, band_hz=band_hz, **fixed)
+    elif measured.controlled == "voltage" and held == "fundamental":
+        predicted = frequency_response_at(model, measured.level, force="voltage", band_hz=band_hz, **fixed)
     else:
         predicted = _point_by_point(model, fixed, held, measured)
         over = "frequency"
@@ -67,9 +69,7 @@ def compared(
     return predicted, measured, compare(predicted, measured, over=over).error
 
 
-def _point_by_point(
-    model: DrivenModel, fixed: Mapping[str, Any], held: Held, measured: FrequencyResponse
-) -> SteadyPrediction:
+def _point_by_point(model: DrivenModel, fixed: Fixed, held: Held, measured: FrequencyResponse) -> SteadyPrediction:
     """Predict the vibration at the force of each point.
 
     If several vibrations are found, the one whose amplitude is nearest to the measured one is taken. The search starts from

@@ -12,13 +12,14 @@ from identification import (
     PnlssModel,
     SweepPrediction,
     Transient,
+    coupled_run,
     demodulate,
 )
 from identification.common import MOTION_ORDER, find_role
 from identification.experiments import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.results.simulated.constants import all_inputs, driving
-from rig.results.simulated.driven_models import DrivenModel, coupled_run
+from rig.results.simulated.driven_models import DrivenModel
 from vibrolock.arrays import Float
 
 _SHOWN = 10.0

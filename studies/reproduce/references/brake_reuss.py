@@ -35,7 +35,7 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
     lines, panels = [], [_backbone(mode)]
     for reference in (one for one in measured if one.controlled == "force"):
         force_n = float(np.median(reference.force_n))
-        held = frequency_response(mode, force_n)
+        held = frequency_response(mode, force_n, points=401)
         point_by_point = recorded_force_response(mode, reference)
         both = (
             compare(held, reference).error,

@@ -1,4 +1,4 @@
-"""Set up the harmonic balance of a PNLSS model: equations, band, number of harmonics, linear resonance."""
+"""Set up the harmonic balance of a PNLSS model: equations, number of harmonics, linear resonance."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
 from identification.harmonic_balance.basis import Basis
-from identification.harmonic_balance.setting_up import Held, band_around, drive_of, held_values
+from identification.harmonic_balance.setting_up import Held, drive_of, held_values
 from identification.harmonic_balance.states import motion_rows
 from identification.models.pnlss.model import PnlssModel
 from identification.models.pnlss.steady.balance import Balance, samples_for
@@ -17,8 +17,8 @@ _LIGHT = 0.3
 """Largest damping ratio at which a pole counts as a resonance."""
 
 
-def linear_resonance_hz(model: PnlssModel) -> float:
-    """Natural frequency of the lightly damped mode of the linear part with the largest drive-point displacement.
+def linear_resonance_hz(model: PnlssModel, near_hz: float | None = None) -> float:
+    """Natural frequency of the lightly damped mode of the linear part that is nearest, or that moves the drive point most.
 
     If the excited band of the training data is known and contains such modes, only these are considered, because modes
     outside the band are uncertain. Raises `IdentificationError` if there is no lightly damped mode.
@@ -33,6 +33,9 @@ def linear_resonance_hz(model: PnlssModel) -> float:
     low, high = (2.0 * np.pi * f for f in model.excited_hz or (0.0, np.inf))
     inside = (np.abs(s) >= low) & (np.abs(s) <= high)
     s = s[inside] if inside.any() else s
+    if near_hz is not None:
+        natural_hz = np.abs(s) / (2.0 * np.pi)
+        return float(natural_hz[np.argmin(np.abs(natural_hz - near_hz))])
     output = motion_rows(model.outputs)[0]
     order = MOTION_ORDER[model.outputs[output].motion]
     forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"] or slice(None)
@@ -58,11 +61,6 @@ def balance_of(
     basis = Basis(harmonics, count)
     row, values = held_values(model, held_inputs)
     return Balance(model, drive_of(model, level, force, exciter, basis.size, row), basis, values)
-
-
-def band_of(model: PnlssModel, lowest_hz: float | None, highest_hz: float | None) -> tuple[float, float]:
-    """Return the band in Hz, by default around the linear resonance; raise `IdentificationError` if the limits do not rise."""
-    return band_around(lambda: linear_resonance_hz(model), lowest_hz, highest_hz, 0.5 * model.sample_rate_hz)
 
 
 def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> tuple[int, list[str]]:

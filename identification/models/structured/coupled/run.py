@@ -17,7 +17,7 @@ from identification.exciter_coupling.reaction import Reaction
 from identification.linear.subspace import StateSpace
 from identification.models.structured.coupled.kernels import run_coupled
 from identification.models.structured.model import Motion, StructuredModel, ends_of_steps, motion_of, room_for
-from identification.models.structured.steady.response import resonance_hz
+from identification.models.structured.steady.setting_up import resonance_hz
 from vibrolock.arrays import Float
 
 _COARSER = (6, 4, 3, 2)

@@ -46,6 +46,21 @@ class StructuredBalance(DrivenBalance):
         """Return the same equations of another model."""
         return StructuredBalance(model, self.drive, self.basis, self._mean_supported > 0.0)
 
+    def in_phase(self, z: Float, frequency_hz: float, level: float) -> tuple[float, Float, float, float]:
+        """Return the displacement at the first input in phase with the force, with its derivatives."""
+        row = self._displacement_row(1)
+        return float(row @ z), row, 0.0, 0.0
+
+    @property
+    def amplitude_row(self) -> Float:
+        """Displacement at the first input that lags the force by 90 degrees, per unit of the unknowns."""
+        return self._displacement_row(2)
+
+    def _displacement_row(self, coefficient: int) -> Float:
+        row = np.zeros((self.basis.size, self.n_states))
+        row[coefficient] = self.model.input_shapes[:, 0]
+        return np.concatenate([row.ravel(), np.zeros(self.drive.size)])
+
     def angle(self, frequency_hz: float) -> float:
         """Phase advance of a period, rad."""
         return 2.0 * np.pi

@@ -8,12 +8,13 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
+from identification.harmonic_balance.backbone import Resonances, resonances
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import motion_rows
 from identification.models.structured.fit import StructuredFit
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.steady.backbone import Resonances, resonances
-from identification.models.structured.steady.response import balance_of, resonance_hz
+from identification.models.structured.steady.balance import StructuredBalance
+from identification.models.structured.steady.setting_up import balance_of, resonance_hz
 from identification.models.structured.uncertainty import std_of
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
@@ -41,8 +42,8 @@ def structured_mode(
 ) -> NonlinearMode:
     """Compute modal frequency and damping ratio of a structured model over the amplitude, as `nonlinear_mode` measures them.
 
-    The points are those of `structured_backbone`. The damping ratio is that of the active power of the force's fundamental; the
-    modal amplitude refers to the small vibrations (`StructuredModel.linearised`).
+    The points are those of `identification.backbone`. The damping ratio is that of the active power of the force's
+    fundamental; the modal amplitude refers to the small vibrations (`StructuredModel.linearised`).
 
     Standard errors are those of frequency and damping at the same amplitude, from the covariance of the fit, to first order
     (`uncertainty`). They are NaN for a model without its fit, and contain neither the misfit of the
@@ -55,21 +56,21 @@ def structured_mode(
     force_n
         Largest force, N; by default that at which an element moves as far as in the training data.
     force, exciter, near_hz, harmonics, samples
-        As in `structured_backbone`.
+        As in `identification.backbone`.
     support
         Whether the model's static support acts, as it does in a measured backbone.
 
     Raises
     ------
     IdentificationError
-        If ``force_n`` is needed because the model does not know its training data, and as `structured_backbone` does.
+        If ``force_n`` is needed because the model does not know its training data, and as `identification.backbone` does.
     """
     model = found.model if isinstance(found, StructuredFit) else found
     row = find_role(model.outputs, "drive")
 
     def backbone(force_n: float, largest_use: float) -> Resonances:
         balance = balance_of(model, force_n, force, exciter, support, harmonics, samples)
-        return resonances(model, balance, near_hz, largest_use)
+        return resonances(balance, resonance_hz(model, near_hz), largest_use)
 
     path = _within_training(model, backbone, row, near_hz) if force_n is None else backbone(force_n, np.inf)
     if force_n is not None and path.reason:
@@ -150,19 +151,22 @@ def _within_training(
 
 def _at_amplitudes(path: Resonances, model: StructuredModel, row: int, near_hz: float | None) -> Float:
     """float[2, n]: logarithms of frequency and damping ratio of another model, near a path, at the same amplitudes."""
-    balance = path.like(model)
+    own = path.balance
+    assert isinstance(own, StructuredBalance)
+    balance, amplitude_row = path.like(own.like(model)), np.append(own.like(model).amplitude_row, 0.0)
+    own_row = np.append(own.amplitude_row, 0.0)
     shape, out = _tested(model, row, near_hz)[0], np.empty((2, len(path.level)))
     resonance = balance.equations
     for k in range(len(path.level)):
         v = np.append(path.unknowns[k], path.level[k])
-        target = float(path.equations.amplitude_row @ path.unknowns[k])
+        target = float(own_row @ path.unknowns[k])
         scale = np.maximum(np.abs(v), 1e-3 * np.max(np.abs(v)))
         for _ in range(_CORRECTIONS):
             residual, by_z, by_level = resonance(v[:-1], float(v[-1]))
             matrix = np.zeros((v.size, v.size))
             matrix[:-1, :-1], matrix[:-1, -1] = by_z, by_level
-            matrix[-1, :-1] = resonance.amplitude_row
-            change = np.linalg.solve(matrix, -np.append(residual, resonance.amplitude_row @ v[:-1] - target))
+            matrix[-1, :-1] = amplitude_row
+            change = np.linalg.solve(matrix, -np.append(residual, amplitude_row @ v[:-1] - target))
             v = v + change
             if np.max(np.abs(change / scale)) < _EXACT:
                 break

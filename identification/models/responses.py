@@ -1,0 +1,347 @@
+"""Steady responses of models of any kind: one function for each question, with one set of defaults."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from identification.errors import IdentificationError
+from identification.exciter_coupling.exciter import Exciter
+from identification.experiments.simulators import CoupledSimulation
+from identification.harmonic_balance.setting_up import Held
+from identification.harmonic_balance.states import HarmonicResponse, SteadyStates
+from identification.linear.modes import LinearModes
+from identification.models.dynamic_model import HARMONICS, LARGEST_RANGE_USE, POINTS, DynamicModel, SteadyRequest
+from identification.models.kinds import dynamic_model
+from identification.prediction.response_band import ResponseBand, band_of_responses
+from identification.prediction.steady_prediction import SteadyPrediction
+from identification.renamed import formerly
+
+_COMMON = {"harmonics", "points", "largest_range_use"}
+"""Options that every kind of model has."""
+
+
+@formerly
+def frequency_response(
+    model: object,
+    force_n: float | None = None,
+    *,
+    voltage_v: float | None = None,
+    force: Held | None = None,
+    exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
+    support: bool | None = None,
+    linear_modes: LinearModes | None = None,
+    residuals: bool | None = None,
+    lowest_share: float | None = None,
+    band_hz: tuple[float | None, float | None] | None = None,
+    harmonics: int = HARMONICS,
+    samples: int | None = None,
+    points: int = POINTS,
+    largest_range_use: float = LARGEST_RANGE_USE,
+) -> SteadyPrediction:
+    """Predict the steady response of a model to a constant force or voltage, on all branches.
+
+    Parameters
+    ----------
+    model
+        A `NonlinearMode`, `PnlssModel`, `StructuredModel` or `StructuredFit`.
+    force_n
+        Held force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``.
+    voltage_v
+        In place of ``force_n``: the held amplitude of a sine of voltage, V, at the exciter.
+    force
+        Quantity of the force that is constant. ``pure-sine``: a force without harmonics. ``fundamental`` or ``rms``: that of
+        a force with the harmonics that the exciter causes, or that were recorded with a nonlinear mode. The default is
+        ``pure-sine`` for a PNLSS or structured model of a force without ``exciter``, else ``fundamental``.
+    exciter
+        For PNLSS and structured models of a force: the exciter that applies it and moves with the drive point.
+    held_inputs
+        For PNLSS models: constant value of every input other than the driven one, by name, such as ``{"constant": 1.0}``
+        after `Experiment.with_constant_input`.
+    support
+        For structured models: whether the support holds the mean position. By default it does with an ``exciter``.
+    linear_modes
+        For nonlinear modes: linear modes that give the other channels (the shape of the tested mode, scaled by the response of
+        the drive point) and the contribution of the other modes.
+    residuals
+        For nonlinear modes: whether to add the linear response of the other modes of ``linear_modes``; true by default.
+    lowest_share
+        For nonlinear modes: modal amplitude at both ends of the main branch over its largest; 0.05 by default.
+    band_hz
+        Lowest and highest frequency for PNLSS and structured models; in place of either, None is 15 % from the resonance of
+        small vibrations that moves the drive point most. A nonlinear mode answers around its own resonance.
+    harmonics, samples
+        For PNLSS and structured models: number of harmonics without the static one, reduced with a note if the sample rate
+        has no room for them; and of samples of a period, by default enough that harmonics do not alias.
+    points
+        Largest number of points on a branch.
+    largest_range_use
+        Largest amplitude, state or displacement over the largest in the data of the identification. A path that exceeds it
+        ends there, with a note; a nonlinear mode refuses. ``inf`` allows any extrapolation.
+
+    Raises
+    ------
+    IdentificationError
+        If options do not fit the model, a number is not allowed, or no vibration is found.
+    ExtrapolationError
+        If the response of a nonlinear mode needs more than ``largest_range_use`` times the largest identified amplitude.
+    """
+    found = dynamic_model(model)
+    request = _request(
+        found,
+        force_n,
+        voltage_v,
+        force,
+        band_hz=band_hz,
+        exciter=exciter,
+        held_inputs=held_inputs,
+        support=support,
+        linear_modes=linear_modes,
+        residuals=residuals,
+        lowest_share=lowest_share,
+        harmonics=harmonics,
+        samples=samples,
+        points=points,
+        largest_range_use=largest_range_use,
+    )
+    return found.frequency_response(request, band_hz or (None, None))
+
+
+@formerly
+def steady_predictions(
+    model: object,
+    forces_n: Sequence[float],
+    *,
+    force: Held | None = None,
+    exciter: Exciter | None = None,
+    linear_modes: LinearModes | None = None,
+    residuals: bool | None = None,
+    largest_range_use: float = LARGEST_RANGE_USE,
+) -> tuple[SteadyPrediction, ...]:
+    """Predict the `frequency_response` at several forces; the message of an error names the force."""
+    return tuple(
+        frequency_response(
+            model,
+            force_n,
+            force=force,
+            exciter=exciter,
+            linear_modes=linear_modes,
+            residuals=residuals,
+            largest_range_use=largest_range_use,
+        )
+        for force_n in forces_n
+    )
+
+
+@formerly
+def response_band(
+    model: object,
+    force_n: float,
+    *,
+    force: Held | None = None,
+    exciter: Exciter | None = None,
+    draws: int = 200,
+    seed: int = 0,
+    largest_range_use: float = LARGEST_RANGE_USE,
+) -> ResponseBand:
+    """Propagate the errors of a model to a predicted response, by Monte Carlo.
+
+    Parameters
+    ----------
+    model
+        A `NonlinearMode` with standard errors of frequency and damping, or a `StructuredFit`.
+    force_n, force, exciter, largest_range_use
+        As for `frequency_response`.
+    draws
+        Number of draws, at least 20.
+    seed
+        Seed of the random numbers.
+
+    Raises
+    ------
+    IdentificationError
+        If the model has no standard errors, or ``draws`` is below 20.
+    """
+    if draws < 20:
+        raise IdentificationError(f"draws: is {draws}, needs at least 20")
+    found = dynamic_model(model)
+    return band_of_responses(
+        frequency_response(
+            one, force_n, force=force, exciter=exciter, points=found.band_points, largest_range_use=largest_range_use
+        )
+        for one in found.draws(draws, seed)
+    )
+
+
+def harmonic_response(
+    model: object,
+    force_n: float | None = None,
+    *,
+    voltage_v: float | None = None,
+    force: Held | None = None,
+    exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
+    support: bool | None = None,
+    band_hz: tuple[float | None, float | None] | None = None,
+    harmonics: int = HARMONICS,
+    samples: int | None = None,
+    points: int = POINTS,
+    largest_range_use: float = LARGEST_RANGE_USE,
+) -> HarmonicResponse:
+    """Predict the steady response with all harmonics; parameters and errors are those of `frequency_response`.
+
+    PNLSS and structured models answer, by harmonic balance and arc-length continuation through folds. ``states`` of a
+    structured model are its modal coordinates, ``state_use`` is the largest displacement of each element over its largest in
+    the training data, and the multipliers are those over a period; its stability does not consider the memory of the
+    support's filter.
+    """
+    found = dynamic_model(model)
+    request = _request(
+        found,
+        force_n,
+        voltage_v,
+        force,
+        band_hz=band_hz,
+        exciter=exciter,
+        held_inputs=held_inputs,
+        support=support,
+        harmonics=harmonics,
+        samples=samples,
+        points=points,
+        largest_range_use=largest_range_use,
+    )
+    return found.harmonic_response(request, band_hz or (None, None))
+
+
+def steady_state(
+    model: object,
+    frequency_hz: float,
+    force_n: float | None = None,
+    *,
+    voltage_v: float | None = None,
+    force: Held | None = None,
+    exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
+    support: bool | None = None,
+    harmonics: int = HARMONICS,
+    samples: int | None = None,
+    near: SteadyStates | None = None,
+    largest_range_use: float = LARGEST_RANGE_USE,
+) -> SteadyStates:
+    """Compute the periodic vibration at one frequency and level: reached from rest as the level rises, or ``near`` another.
+
+    Other parameters and errors are those of `frequency_response`. The search begins at the first point of ``near`` and may
+    then exceed ``largest_range_use``.
+    """
+    found = dynamic_model(model)
+    request = _request(
+        found,
+        force_n,
+        voltage_v,
+        force,
+        exciter=exciter,
+        held_inputs=held_inputs,
+        support=support,
+        harmonics=harmonics,
+        samples=samples,
+        largest_range_use=largest_range_use,
+    )
+    return found.steady_state(request, frequency_hz, near)
+
+
+def backbone(
+    model: object,
+    force_n: float,
+    *,
+    force: Held | None = None,
+    exciter: Exciter | None = None,
+    held_inputs: Mapping[str, float] | None = None,
+    support: bool | None = None,
+    near_hz: float | None = None,
+    harmonics: int = HARMONICS,
+    samples: int | None = None,
+    points: int = POINTS,
+    largest_range_use: float = LARGEST_RANGE_USE,
+) -> SteadyStates:
+    """Compute the vibrations at phase resonance from 2 % of a force up to this force, as a backbone test measures them.
+
+    Other parameters are those of `frequency_response`. ``near_hz``: the backbone begins at the mode of small vibrations that
+    is nearest, by default at that which moves the drive point most.
+
+    Raises
+    ------
+    IdentificationError
+        If options do not fit the model, the mode has no phase resonance, or the backbone ends before the force.
+    """
+    found = dynamic_model(model)
+    request = _request(
+        found,
+        force_n,
+        None,
+        force,
+        exciter=exciter,
+        held_inputs=held_inputs,
+        support=support,
+        harmonics=harmonics,
+        samples=samples,
+        points=points,
+        largest_range_use=largest_range_use,
+    )
+    return found.backbone(request, near_hz)
+
+
+def coupled_run(
+    model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
+) -> CoupledSimulation:
+    """Simulate a model with the exciter at its force input, both from rest, under a recorded voltage.
+
+    Parameters
+    ----------
+    model
+        PNLSS or structured model with one force as its only input, and the drive-point motion among its outputs.
+    exciter
+        Exciter identified on the same rig. It applies no static force; that of its suspension is a structured model's support.
+    voltage_v
+        float[n], recorded voltage at the model's sample rate. Do not correct it for the voltage path, which the exciter's
+        ``path`` models.
+    lowest_hz
+        Frequency above which the exciter's reaction is exact; below it the reaction fades. Default: 0.8 times the lowest
+        frequency of a PNLSS model's training; if that is unknown, and for structured models, half the resonance of small
+        vibrations.
+
+    Raises
+    ------
+    IdentificationError
+        If values are NaN or infinite, the model lacks these channels, or no stable filter for the reaction is found.
+    """
+    return dynamic_model(model).coupled_run(exciter, voltage_v, lowest_hz)
+
+
+def _request(
+    model: DynamicModel,
+    force_n: float | None,
+    voltage_v: float | None,
+    force: Held | None,
+    *,
+    band_hz: tuple[float | None, float | None] | None = None,
+    **options: Any,
+) -> SteadyRequest:
+    """Return what is asked; raise `IdentificationError` for an option that the kind of model does not have."""
+    given = {name: value for name, value in options.items() if value is not None}
+    asked = {
+        **given,
+        **({} if voltage_v is None else {"voltage_v": voltage_v}),
+        **({"band_hz": band_hz} if band_hz else {}),
+    }
+    for name in asked:
+        if name not in model.options | _COMMON:
+            raise IdentificationError(f"means nothing to a {model.kind}; leave it out", field=name)
+    if (force_n is None) == (voltage_v is None) or force == "voltage":
+        raise IdentificationError("force_n, voltage_v: give one of them; `force` says what of a force is constant")
+    if voltage_v is not None and force is not None:
+        raise IdentificationError(f"is '{force}', which says nothing of a voltage; leave it out", field="force")
+    if voltage_v is not None:
+        return SteadyRequest(level=voltage_v, held="voltage", **given)
+    assert force_n is not None
+    return SteadyRequest(level=force_n, held=force or model.default_held(given.get("exciter")), **given)

@@ -1,0 +1,86 @@
+"""Answers of a structured model to what is asked of any dynamic model."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from identification.channels import MOTION_ORDER
+from identification.errors import IdentificationError
+from identification.exciter_coupling.exciter import Exciter
+from identification.experiments.experiment import Experiment
+from identification.harmonic_balance.driven import DrivenBalance
+from identification.harmonic_balance.states import SteadyStates, largest_use, motion_rows
+from identification.models.balanced_model import BalancedModel
+from identification.models.dynamic_model import Limit, SteadyRequest
+from identification.models.structured.coupled.run import CoupledMotion, structured_coupled_run
+from identification.models.structured.fit import StructuredFit
+from identification.models.structured.model import Motion, StructuredModel
+from identification.models.structured.steady.setting_up import balance_of, resonance_hz
+from identification.models.structured.uncertainty import drawn
+from vibrolock.arrays import Complex, Float
+
+
+class StructuredDynamics(BalancedModel):
+    """A structured model, or a fit of one, which gives its covariance as well."""
+
+    kind = "structured model"
+    options = frozenset({"exciter", "support", "samples", "voltage_v", "band_hz"})
+    highest_hz = np.inf
+
+    def __init__(self, found: StructuredModel | StructuredFit) -> None:
+        self.fit = found if isinstance(found, StructuredFit) else None
+        self.driven = self.model = found.model if isinstance(found, StructuredFit) else found
+
+    def balance(self, request: SteadyRequest, highest_hz: float) -> tuple[DrivenBalance, list[str]]:
+        """Return the balance of the continuous equation of motion."""
+        given = request.level, request.held, request.exciter, request.support
+        return balance_of(self.model, *given, request.harmonics, request.samples), []
+
+    def resonance_hz(self, near_hz: float | None = None) -> float:
+        """Return the frequency of a mode of small vibrations."""
+        return resonance_hz(self.model, near_hz)
+
+    def range_notes(self, points: SteadyStates) -> list[str]:
+        """Return a note on elements that move further than in the training data."""
+        largest = float(np.max(largest_use(points.state_use), initial=0.0))
+        known = all(element.largest for element in self.model.elements)
+        of = "the training data" if known else "the reach of their laws"
+        return [f"elements reach {largest:.2f} times {of}: extrapolated"] if largest > 1.0 else []
+
+    def linear_response(self, frequency_hz: Float) -> Complex:
+        """Return the sum over the modes of small vibrations, and the residual of the modes above."""
+        at_rest, rows = self.model.linearised(), motion_rows(self.model.outputs)
+        omega = 2.0 * np.pi * np.asarray(frequency_hz)[:, None]
+        stiffness = at_rest.omega**2 - omega**2 + 2j * omega * at_rest.damping_ratio * at_rest.omega
+        order = np.array([MOTION_ORDER[at_rest.outputs[row].motion] for row in rows])
+        through = at_rest.direct[rows, 0] / (1j * omega) ** order
+        return np.asarray((at_rest.input_shapes[:, 0] / stiffness) @ at_rest.output_shapes[rows].T + through)
+
+    def validity(self) -> tuple[Limit, ...]:
+        """Return the largest displacement of each element, or the reach of its laws."""
+        elements = enumerate(self.model.elements)
+        return tuple(Limit(f"element {k + 1}", float(e.largest or e.reach) * e.scale_m, "m") for k, e in elements)
+
+    def simulate(self, inputs: ArrayLike) -> Motion:
+        """Return the run from rest."""
+        return self.model.simulate(inputs)
+
+    def simulate_experiment(self, experiment: Experiment, initial_state: Float | None = None) -> Motion:
+        """Return the run of `StructuredModel.simulate_experiment`."""
+        if initial_state is not None or experiment.initial_state == "estimated":
+            raise IdentificationError(
+                f"experiment '{experiment.name}': does not begin at rest, as a {type(self.model).__name__} does"
+            )
+        return self.model.simulate_experiment(experiment)
+
+    def coupled_run(self, exciter: Exciter, voltage_v: ArrayLike, lowest_hz: float | None) -> CoupledMotion:
+        """Return the run with the exciter."""
+        return structured_coupled_run(self.model, exciter, voltage_v, lowest_hz=lowest_hz)
+
+    def draws(self, count: int, seed: int) -> Iterator["StructuredDynamics"]:
+        """Yield models about that of the fit."""
+        if self.fit is None:
+            raise self.cannot("be drawn without its fit", "give the StructuredFit")
+        for model in drawn(self.fit, count, seed):
+            yield StructuredDynamics(model)
