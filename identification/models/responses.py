@@ -337,8 +337,12 @@ def _request(
     for name in asked:
         if name not in model.options | _COMMON:
             raise IdentificationError(f"means nothing to a {model.kind}; leave it out", field=name)
-    if (force_n is None) == (voltage_v is None) or force == "voltage":
-        raise IdentificationError("force_n, voltage_v: give one of them; `force` says what of a force is constant")
+    if force == "voltage":
+        raise IdentificationError(
+            "force: is 'voltage', allowed are pure-sine, fundamental, rms; the amplitude of a voltage is `voltage_v`"
+        )
+    if (force_n is None) == (voltage_v is None):
+        raise IdentificationError("force_n, voltage_v: give one of them")
     if voltage_v is not None and force is not None:
         raise IdentificationError(f"is '{force}', which says nothing of a voltage; leave it out", field="force")
     if voltage_v is not None:

@@ -113,7 +113,7 @@ def test_with_the_exciter_coupled_the_peak_is_right_even_with_a_wrong_frequency(
         p = ModalProperties.from_levels(
             right.modal_amplitude, (1.0 + change) * right.omega_rad_s, right.damping, right.drive_shape_at
         )
-        prediction = predict_sweep(p, sweep, exciter=exciter_of(bench), modes=modes_of(bench))
+        prediction = predict_sweep(p, sweep, exciter=exciter_of(bench), linear_modes=modes_of(bench))
         error = compare_sweep(prediction, sweep)
         assert abs(error.peak_error) < peak
         assert abs(error.peak_frequency_error) < 0.004
@@ -123,9 +123,9 @@ def test_with_the_exciter_coupled_the_peak_is_right_even_with_a_wrong_frequency(
 def test_with_the_force_imposed_a_frequency_error_captures_the_slow_sweep() -> None:
     """Founding paper, magnet beam's second sweep: unbounded, or many times too large."""
     sweep = sweep_of("magnet-beam/sweep-2")
-    p = replace(properties_of("magnet-beam"), allow_extrapolation=True)
+    p = replace(properties_of("magnet-beam"), largest_range_use=np.inf)
     wrong = ModalProperties.from_levels(
-        p.modal_amplitude, 1.002 * p.omega_rad_s, p.damping, p.drive_shape_at, allow_extrapolation=True
+        p.modal_amplitude, 1.002 * p.omega_rad_s, p.damping, p.drive_shape_at, largest_range_use=np.inf
     )
     assert abs(compare_sweep(predict_sweep(p, sweep), sweep).peak_error) < 0.06
     captured = compare_sweep(predict_sweep(wrong, sweep), sweep)
@@ -138,7 +138,7 @@ def test_with_the_force_by_whole_periods_the_slow_sweep_is_captured_outright() -
     with rig.run("magnet-beam/sweep-2") as run:
         ((number, sweep),) = run.sweeps().items()
         force = point_rows(run.recording, number)["inputs"][:, 0].astype(float)
-    p = replace(properties_of("magnet-beam"), allow_extrapolation=True)
+    p = replace(properties_of("magnet-beam"), largest_range_use=np.inf)
     errors = {}
     for whole in (False, True):
         periods = zero_crossings(force, sample_rate_hz=5000.0, whole_periods=whole)
@@ -153,7 +153,7 @@ def test_a_constant_voltage_between_the_folds_is_predicted_on_the_states_it_held
     plan = {"kind": "stepped-sine", "bench": "magnet-beam", "start_hz": 24.3, "stop_hz": 25.2, "steps": 10}
     with rig.run(plan_from(plan | {"levels_v": [1.5], "record_periods": 10}, "plan")) as run:
         (reference,) = run.frequency_responses()
-    predicted = recorded_force_response(mode_of("magnet-beam"), reference, modes=modes_of("magnet-beam"))
+    predicted = recorded_force_response(mode_of("magnet-beam"), reference, linear_modes=modes_of("magnet-beam"))
     assert np.count_nonzero(~predicted.stable) >= 3
     error = compare(predicted, reference).error
     assert abs(error.peak_error) < 0.02

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification import FrequencyResponse, pnlss_frequency_response
+from identification import FrequencyResponse, frequency_response
 from rig.results.simulated.steady import Reference, compared
 from tests.identification.models.pnlss.steady.oscillators import oscillator
 
@@ -14,7 +14,7 @@ CHOSEN = "several vibrations were found: the one nearest to the measured amplitu
 @pytest.fixture(scope="module")
 def curve():
     """The response through its folds, and their frequencies, the higher one first."""
-    found = pnlss_frequency_response(oscillator(), FORCE_N, force="pure-sine")
+    found = frequency_response(oscillator(), FORCE_N, force="pure-sine", largest_range_use=3.0)
     assert found.fold_frequency_hz[0] > found.fold_frequency_hz[1]
     return found
 

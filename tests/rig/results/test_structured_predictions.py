@@ -60,15 +60,15 @@ def test_peaks_at_a_constant_force_are_those_of_the_rig(told):
 @pytest.mark.slow
 def test_bands_hold_the_peaks_of_other_models_that_the_fit_allows(told, model):
     """Against first-order errors along the numbers of the fit, of amplitude and frequency at phase resonance."""
-    from identification import structured_backbone
+    from identification import backbone
     from identification.models import std_of
     from rig.results.files import load
 
     (sine,) = told("--frequency-response 0.05 --bands")["frequency_responses"]
 
     def peak_of(one):
-        backbone = structured_backbone(one, 0.05)
-        return np.array([abs(backbone.displacement_m[-1, 1, 0]), backbone.frequency_hz[-1]])
+        curve = backbone(one, 0.05, largest_range_use=3.0)
+        return np.array([abs(curve.displacement_m[-1, 1, 0]), curve.frequency_hz[-1]])
 
     fit = load(model).fit
     expected = std_of(fit, peak_of)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, structured_backbone
+from identification import Exciter, IdentificationError, NonlinearElement, StructuredModel, backbone
 from identification.models import Jenkins, Masing, PolynomialDamper, PolynomialSpring, UserSpring
 from rig.authoring.new_files import new_file
 from rig.bench import load_bench
@@ -95,7 +95,7 @@ def test_phase_resonance_of_rig_and_model_agree_by_harmonic_balance():
     rig, forces = rig_of(model), [0.1, 0.6]
     found = phase_resonance_backbone(rig, forces_n=forces, excitation="pure-sine", harmonics=9, near_hz=25.0)
     for force_n, hz, amplitude_m in zip(forces, found.frequency_hz, found.amplitude_m, strict=True):
-        own = structured_backbone(model, force_n, harmonics=9)
+        own = backbone(model, force_n, harmonics=9, largest_range_use=3.0)
         assert hz == pytest.approx(own.frequency_hz[-1], rel=1e-5)
         assert amplitude_m == pytest.approx(abs(own.displacement_m[-1][1, 0]), rel=1e-3)
 
@@ -131,7 +131,7 @@ def test_a_backbone_measured_on_the_rig_is_that_of_the_model_behind_its_exciter(
         model, support_n_m=shaker.suspension_stiffness_n_m, support_corner_hz=1e-3, support_largest_n=1e6
     )  # the suspension itself
     for k in range(3):
-        own = structured_backbone(held, float(points.force_n[k]), force="fundamental", exciter=exciter)
+        own = backbone(held, float(points.force_n[k]), force="fundamental", exciter=exciter, largest_range_use=3.0)
         assert points.frequency_hz[k] == pytest.approx(own.frequency_hz[-1], rel=2e-5)
         assert points.amplitude_m[k] == pytest.approx(abs(own.displacement_m[-1][1, 0]), rel=2e-3)
 

@@ -28,7 +28,7 @@ def linear_resonance_hz(model: PnlssModel, near_hz: float | None = None) -> floa
     s = s[-s.real <= _LIGHT * np.abs(s)]
     if not s.size:
         raise IdentificationError(
-            "lowest_hz, highest_hz: not given, and the model's linear part has no lightly damped mode to set them by"
+            "band_hz: not given, and the model's linear part has no lightly damped mode to set them by"
         )
     low, high = (2.0 * np.pi * f for f in model.excited_hz or (0.0, np.inf))
     inside = (np.abs(s) >= low) & (np.abs(s) <= high)

@@ -88,7 +88,7 @@ def test_stability_is_what_the_integrated_slow_flow_does() -> None:
         int(found.modal_amplitude.argmax()),
     ]
 
-    properties = ModalProperties.of(duffing(Q), allow_extrapolation=True)
+    properties = ModalProperties.of(duffing(Q), largest_range_use=np.inf)
     for point in picked:
         omega, q = 2 * np.pi * found.frequency_hz[point], found.modal_amplitude[point]
         w, z = properties.frequency_rad_s(q), properties.damping_ratio(q)
@@ -170,12 +170,12 @@ def linear_modes() -> LinearModes:
 
 
 def test_with_linear_modes_a_linear_mode_gives_the_whole_receptance_at_every_channel() -> None:
-    found = frequency_response(mode_with(Q), 0.5, modes=linear_modes())
+    found = frequency_response(mode_with(Q), 0.5, linear_modes=linear_modes())
     assert found.channels == ("here", "tip")
     for name in found.channels:
         expected = 0.5 * linear_modes().receptance(found.frequency_hz, name)
         np.testing.assert_allclose(found.motion_m(name), expected, rtol=1e-9)
-    alone = frequency_response(mode_with(Q), 0.5, modes=linear_modes(), residuals=False)
+    alone = frequency_response(mode_with(Q), 0.5, linear_modes=linear_modes(), residuals=False)
     np.testing.assert_allclose(alone.motion_m("tip") / alone.motion_m(), 3.0 / SHAPE, rtol=1e-12)
     with pytest.raises(IdentificationError, match="no channel 'top' was predicted; there are here, tip"):
         found.motion_m("top")
@@ -234,7 +234,7 @@ def test_extrapolation_is_flagged_and_refused() -> None:
     assert any("times the largest modal amplitude identified: extrapolated" in note for note in flagged.notes)
     with pytest.raises(ExtrapolationError, match="drives the mode beyond 2 times the largest modal amplitude"):
         frequency_response(mode, 5.0 * top)
-    allowed = frequency_response(mode, 5.0 * top, allow_extrapolation=True)
+    allowed = frequency_response(mode, 5.0 * top, largest_range_use=np.inf)
     assert "not to be trusted" in allowed.notes[0]
     assert any("below the lowest level" in note for note in frequency_response(mode, 0.5 * mode.force_n[0]).notes)
 
@@ -286,7 +286,7 @@ def test_branches_that_only_a_softening_extrapolation_has_are_left_out() -> None
     """``w^2`` linear in ``q^2`` falls to its floor far beyond the levels: what closes there is no branch of the structure."""
     q = np.linspace(1e-3, 12e-3, 12)
     mode = mode_with(q, F0_HZ * np.sqrt(1.0 - 900.0 * q**2), ZETA)
-    found = frequency_response(mode, 0.5 * float(mode.force_n[-1]), allow_extrapolation=True)
+    found = frequency_response(mode, 0.5 * float(mode.force_n[-1]), largest_range_use=np.inf)
     assert set(found.branch) == {0}
     assert found.range_use.max() < 1.0
     assert any("extrapolation alone" in note for note in found.notes)

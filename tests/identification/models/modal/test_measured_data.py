@@ -9,7 +9,7 @@ import pytest
 from identification import FrequencyResponse, compare, frequency_response, recorded_force_response, stepped_sine_mode
 from rig.exchange.reading import read_frequency_responses
 
-EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "brake-reuss-mapping.toml"
+EXAMPLE = Path(__file__).parents[4] / "docs" / "examples" / "brake-reuss-mapping.toml"
 
 
 @pytest.fixture(scope="module")

@@ -118,7 +118,7 @@ def test_the_imposed_force_reproduces_the_sweep_and_a_frequency_error_does_not(r
     """The founding paper's finding: sensitive to errors of the modal frequency, which the coupled prediction is not."""
     right, wrong = duffing(4e-3), duffing(4e-3)
     wrong = ModalProperties.from_levels(
-        wrong.modal_amplitude, 1.005 * wrong.omega_rad_s, wrong.damping, PHI, allow_extrapolation=True
+        wrong.modal_amplitude, 1.005 * wrong.omega_rad_s, wrong.damping, PHI, largest_range_use=np.inf
     )
     assert abs(compare_sweep(predict_sweep(right, recorded), recorded).peak_error) < 0.03
     imposed = compare_sweep(predict_sweep(wrong, recorded), recorded)
@@ -194,7 +194,7 @@ def test_a_force_by_zero_crossings_is_compared_by_its_displacement(recorded: Tra
 def test_beyond_twice_the_identified_amplitude_nothing_is_predicted_unless_allowed(recorded: Transient) -> None:
     with pytest.raises(ExtrapolationError, match="exceeds 2 times the largest identified"):
         predict_sweep(duffing(5e-4), recorded, exciter=EXCITER)
-    allowed = predict_sweep(duffing(5e-4, allow_extrapolation=True), recorded, exciter=EXCITER)
+    allowed = predict_sweep(duffing(5e-4, largest_range_use=np.inf), recorded, exciter=EXCITER)
     assert allowed.range_use > 2.0
     assert any("largest modal amplitude identified" in note for note in allowed.notes)
 
@@ -202,7 +202,7 @@ def test_beyond_twice_the_identified_amplitude_nothing_is_predicted_unless_allow
 def test_an_unbounded_response_ends_and_says_where() -> None:
     """A mode that is driven at its own frequency, with hardly any damping, from a range a million times smaller."""
     q = np.array([1e-9, 2e-9])
-    mode = ModalProperties.from_levels(q, [W0, W0], [1e-3, 1e-3], PHI, allow_extrapolation=True)
+    mode = ModalProperties.from_levels(q, [W0, W0], [1e-3, 1e-3], PHI, largest_range_use=np.inf)
     time_s = np.arange(0.0, 4.0, 0.02)
     prediction = predict_sweep(
         mode, HalfPeriods(time_s, np.linspace(20.0, 28.0, time_s.size), np.full(time_s.size, 1.0))

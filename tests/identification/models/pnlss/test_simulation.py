@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import Channel, Features, pnlss_coupled_run
+from identification import Channel, Features, coupled_run
 from tests.identification.models.pnlss.steady.oscillators import oscillator, shaker
 from tests.identification.models.pnlss.systems import linear_system
 
@@ -42,13 +42,13 @@ def test_a_run_with_an_exciter_ends_there_too() -> None:
         state_range=np.array([0.0, 1.0]),
     )
     voltage = 2.0 * np.cos(2 * np.pi * 25.0 / 800.0 * np.arange(2000))
-    bounded = pnlss_coupled_run(model, shaker(), voltage, lowest_hz=10.0)
+    bounded = coupled_run(model, shaker(), voltage, lowest_hz=10.0)
     assert bounded.bounded
     assert np.isnan(bounded.state_use[0])
     assert np.isfinite(bounded.range_use)
     reached = 0.5 * np.abs(bounded.force_n).max()
     strain = np.array(model.d)
     strain[3] = np.finfo(float).max / reached  # beyond all numbers at a larger force
-    found = pnlss_coupled_run(replace(model, d=strain), shaker(), voltage, lowest_hz=10.0)
+    found = coupled_run(replace(model, d=strain), shaker(), voltage, lowest_hz=10.0)
     assert found.unbounded_at == int(np.argmax(np.abs(bounded.force_n) > reached))
     assert np.isnan(found.force_n[found.unbounded_at :]).all()

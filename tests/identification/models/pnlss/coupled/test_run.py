@@ -10,9 +10,9 @@ from identification import (
     IdentificationError,
     PnlssModel,
     SteadyStates,
-    pnlss_coupled_run,
-    pnlss_response,
-    pnlss_steady_state,
+    coupled_run,
+    harmonic_response,
+    steady_state,
 )
 from identification.exciter_coupling.exciter import VoltagePath
 from tests.identification.models.pnlss.steady.oscillators import driven_by_voltage, oscillator, shaker
@@ -32,7 +32,7 @@ def stairs(model: PnlssModel, frequency_hz: list[float]) -> Float:
     """Fundamentals of the drive point and the force, float[2, n], at frequencies held one after the other."""
     counts = [round(PERIODS * RATE_HZ / hz) for hz in frequency_hz]
     theta = 2 * np.pi / RATE_HZ * np.cumsum(np.repeat(frequency_hz, counts))
-    run = pnlss_coupled_run(model, light_shaker(), VOLTAGE_V * np.cos(theta), lowest_hz=LOWEST_HZ)
+    run = coupled_run(model, light_shaker(), VOLTAGE_V * np.cos(theta), lowest_hz=LOWEST_HZ)
     assert run.bounded
     assert run.change < 1e-6
     found = []
@@ -57,14 +57,14 @@ def balanced(model: PnlssModel, curve: SteadyStates, frequency_hz: list[float], 
         crossed = np.diff(curve.frequency_hz > hz)
         beside = np.flatnonzero(crossed & curve.stable[1:] & curve.stable[:-1])
         chosen = beside[np.argmax(size[beside]) if k < upper else np.argmin(size[beside])]
-        at = pnlss_steady_state(
+        at = steady_state(
             model,
-            VOLTAGE_V,
             hz,
-            force="voltage",
+            voltage_v=VOLTAGE_V,
             exciter=light_shaker(),
             harmonics=HARMONICS,
             near=one_of(curve, int(chosen)),
+            largest_range_use=3.0,
         )
         assert at.stable[0]
         found.append(np.abs([at.outputs[0, 1, 0], at.force_n[0, 1]]))
@@ -73,7 +73,9 @@ def balanced(model: PnlssModel, curve: SteadyStates, frequency_hz: list[float], 
 
 def test_a_run_settles_on_the_harmonic_balance_of_the_pair_up_to_its_folds() -> None:
     model = oscillator(6e8, 1e6, rate_hz=RATE_HZ, parametric=200.0)
-    curve = pnlss_response(model, VOLTAGE_V, force="voltage", exciter=light_shaker(), harmonics=HARMONICS)
+    curve = harmonic_response(
+        model, voltage_v=VOLTAGE_V, exciter=light_shaker(), harmonics=HARMONICS, largest_range_use=3.0
+    )
     lower_hz, upper_hz = np.sort(curve.folds.frequency_hz)
     rising = [25.0, 26.0, 27.0, 27.6, 28.0, 28.1, upper_hz - 0.02, upper_hz + 0.05]
     falling = [28.7, 28.3, 27.8, 27.4, lower_hz + 0.02, lower_hz - 0.05, 26.5]
@@ -115,7 +117,7 @@ def test_any_voltage_makes_the_force_of_a_model_with_the_exciter_inside() -> Non
         back_emf_damping_n_s_m=0.0,
     )
     voltage = 0.5 * noise(16000)
-    found = pnlss_coupled_run(model, massless, voltage, lowest_hz=10.0)
+    found = coupled_run(model, massless, voltage, lowest_hz=10.0)
     inside = driven_by_voltage(inner).simulate(voltage[None])
     assert_near(np.vstack([found.force_n, found.outputs]), inside.outputs, 1e-3)
 
@@ -123,15 +125,15 @@ def test_any_voltage_makes_the_force_of_a_model_with_the_exciter_inside() -> Non
 def test_the_path_of_the_voltage_delays_it() -> None:
     model, voltage = oscillator(6e8, rate_hz=RATE_HZ), 0.2 * noise(8000)
     late = replace(light_shaker(), path=VoltagePath(delay_s=3.0 / RATE_HZ))
-    found = pnlss_coupled_run(model, late, voltage, lowest_hz=LOWEST_HZ)
-    shifted = pnlss_coupled_run(model, light_shaker(), np.roll(voltage, 3), lowest_hz=LOWEST_HZ)
+    found = coupled_run(model, late, voltage, lowest_hz=LOWEST_HZ)
+    shifted = coupled_run(model, light_shaker(), np.roll(voltage, 3), lowest_hz=LOWEST_HZ)
     assert_near(found.outputs, shifted.outputs, 1e-4)
 
 
 def test_an_unbounded_run_ends_and_says_where() -> None:
     escaping = oscillator(-6e8, rate_hz=RATE_HZ)
     theta = 2 * np.pi * 24.0 / RATE_HZ * np.arange(8000)
-    found = pnlss_coupled_run(escaping, light_shaker(), 40.0 * np.cos(theta), lowest_hz=LOWEST_HZ)
+    found = coupled_run(escaping, light_shaker(), 40.0 * np.cos(theta), lowest_hz=LOWEST_HZ)
     assert found.unbounded_at is not None
     assert 0 < found.unbounded_at < 8000
     for values in (found.outputs[0], found.force_n, found.states[0]):
@@ -142,7 +144,7 @@ def test_an_unbounded_run_ends_and_says_where() -> None:
 
 def test_range_use_counts_the_force_and_the_states() -> None:
     model = oscillator(6e8, rate_hz=RATE_HZ, largest_m=1e-4)
-    found = pnlss_coupled_run(model, light_shaker(), 0.2 * noise(8000), lowest_hz=LOWEST_HZ)
+    found = coupled_run(model, light_shaker(), 0.2 * noise(8000), lowest_hz=LOWEST_HZ)
     assert found.input_use[0] == pytest.approx(np.abs(found.force_n).max() / 10.0)
     np.testing.assert_allclose(found.state_use, np.abs(found.states).max(axis=1) / model.state_range)
 
@@ -150,11 +152,11 @@ def test_range_use_counts_the_force_and_the_states() -> None:
 def test_what_cannot_be_coupled_is_named() -> None:
     model, voltage = oscillator(rate_hz=RATE_HZ), np.zeros(100)
     with pytest.raises(IdentificationError, match="model: has 0 forces among its inputs"):
-        pnlss_coupled_run(driven_by_voltage(model), shaker(), voltage)
+        coupled_run(driven_by_voltage(model), shaker(), voltage)
     with pytest.raises(IdentificationError, match="voltage_v"):
-        pnlss_coupled_run(model, shaker(), [0.0, np.nan])
+        coupled_run(model, shaker(), [0.0, np.nan])
     with pytest.raises(IdentificationError, match="lowest_hz: is 390 Hz"):
-        pnlss_coupled_run(model, shaker(), voltage, lowest_hz=390.0)
+        coupled_run(model, shaker(), voltage, lowest_hz=390.0)
     without = replace(model, outputs=tuple(replace(channel, role="response") for channel in model.outputs))
     with pytest.raises(IdentificationError, match="drive"):
-        pnlss_coupled_run(without, shaker(), voltage)
+        coupled_run(without, shaker(), voltage)

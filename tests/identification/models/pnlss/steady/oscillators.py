@@ -1,6 +1,7 @@
 """Discrete-time oscillators made by hand, and their simulation over whole periods."""
 
 from math import comb
+from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
@@ -12,6 +13,11 @@ HZ, DAMPING, RATE_HZ = 25.0, 0.01, 3200.0
 FORCE, VOLTAGE = Channel("force", "force", "N"), Channel("voltage", "monitor", "V")
 ACCELERATION, VELOCITY = Channel("acc", "drive", "m/s2"), Channel("vel", "response", "m/s")
 DISPLACEMENT = Channel("tip", "response", "m")
+
+
+def level(value: float, held: str) -> dict[str, Any]:
+    """Keywords that hold a level of the force, or of the voltage."""
+    return {"voltage_v": value} if held == "voltage" else {"force_n": value, "force": held}
 
 
 def oscillator(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification import IdentificationError, PnlssModel, pnlss_response, pnlss_steady_state
+from identification import IdentificationError, PnlssModel, harmonic_response, steady_state
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.drives import Coupled, Drive, HeldOutput, Sine
 from identification.models.pnlss.steady.balance import Balance, samples_for
@@ -63,7 +63,7 @@ def test_the_jacobian_agrees_with_finite_differences(name: str) -> None:
 
 def test_a_linear_model_answers_with_its_frequency_response() -> None:
     model = oscillator(0.0)
-    found = pnlss_response(model, 0.7, force="pure-sine", lowest_hz=20.0, highest_hz=30.0)
+    found = harmonic_response(model, 0.7, force="pure-sine", band_hz=(20.0, 30.0), largest_range_use=3.0)
     z = np.exp(2j * np.pi * found.points.frequency_hz / RATE_HZ)
     exact = 0.7 * model.linear_part.response(z)[:, :, 0]
     np.testing.assert_allclose(found.points.outputs[:, 1], exact, rtol=1e-11)
@@ -78,7 +78,7 @@ def test_a_linear_model_answers_with_its_frequency_response() -> None:
 @pytest.mark.parametrize("samples", WHOLE)
 def test_a_settled_simulation_has_the_harmonics_of_the_balance(samples: int) -> None:
     model = oscillator(5e7, 1e6, parametric=200.0)
-    found = pnlss_steady_state(model, 1.0, RATE_HZ / samples, force="pure-sine", harmonics=9)
+    found = steady_state(model, RATE_HZ / samples, 1.0, force="pure-sine", harmonics=9, largest_range_use=3.0)
     simulated, remains = settled(model, found, 400, waveform(found.states[0], np.zeros(1))[:, 0])
     assert np.all(remains < 1e-7)
     size = np.abs(simulated).max(axis=0)
@@ -88,7 +88,7 @@ def test_a_settled_simulation_has_the_harmonics_of_the_balance(samples: int) -> 
 
 def test_from_rest_a_simulation_settles_on_the_vibration_that_rising_force_leads_to() -> None:
     model = oscillator(5e7)
-    found = pnlss_steady_state(model, 1.0, RATE_HZ / 122, force="pure-sine")
+    found = steady_state(model, RATE_HZ / 122, 1.0, force="pure-sine", largest_range_use=3.0)
     simulated, remains = settled(model, found, 600)
     assert np.all(remains < 1e-9)
     np.testing.assert_allclose(found.outputs[0, 1], simulated[1], rtol=1e-6)
@@ -97,7 +97,7 @@ def test_from_rest_a_simulation_settles_on_the_vibration_that_rising_force_leads
 @pytest.mark.parametrize("samples", WHOLE[::2])
 def test_saturating_features_go_through_the_same_balance(samples: int) -> None:
     model = saturating_oscillator()
-    found = pnlss_steady_state(model, 1.5, RATE_HZ / samples, force="pure-sine", harmonics=11)
+    found = steady_state(model, RATE_HZ / samples, 1.5, force="pure-sine", harmonics=11, largest_range_use=3.0)
     simulated, remains = settled(model, found, 400)
     assert np.all(remains < 1e-9)
     size = np.abs(simulated).max(axis=0)
@@ -108,18 +108,18 @@ def test_saturating_features_go_through_the_same_balance(samples: int) -> None:
 def test_samples_suffice_for_the_products_of_harmonics() -> None:
     model = oscillator(5e7, 3e5)
     few, many = (
-        pnlss_steady_state(model, 2.0, 25.3, force="pure-sine", harmonics=5, samples=n)
+        steady_state(model, 25.3, 2.0, force="pure-sine", harmonics=5, samples=n, largest_range_use=3.0)
         for n in (samples_for(model, 5), 400)
     )
     np.testing.assert_allclose(few.states, many.states, atol=1e-12 * np.abs(many.states).max())
-    fewer = pnlss_steady_state(model, 2.0, 25.3, force="pure-sine", harmonics=5, samples=12)
+    fewer = steady_state(model, 25.3, 2.0, force="pure-sine", harmonics=5, samples=12, largest_range_use=3.0)
     assert np.abs(fewer.states - many.states).max() > 1e-9 * np.abs(many.states).max()
 
 
 def test_harmonics_beyond_half_the_sample_rate_are_left_out() -> None:
     model = oscillator(5e7, rate_hz=200.0)
-    found = pnlss_response(model, 0.1, force="pure-sine", lowest_hz=20.0, highest_hz=28.0)
+    found = harmonic_response(model, 0.1, force="pure-sine", band_hz=(20.0, 28.0), largest_range_use=3.0)
     assert found.points.states.shape[1] == 4
     assert "3 harmonics, for which the model's 200 Hz has room at 28 Hz" in found.notes
     with pytest.raises(IdentificationError, match="120 Hz is not below half the model's 200 Hz"):
-        pnlss_steady_state(model, 0.1, 120.0, force="pure-sine")
+        steady_state(model, 120.0, 0.1, force="pure-sine", largest_range_use=3.0)

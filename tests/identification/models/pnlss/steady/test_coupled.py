@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from identification import Exciter, IdentificationError, pnlss_frequency_response, pnlss_response, pnlss_steady_state
+from identification import Exciter, IdentificationError, frequency_response, harmonic_response, steady_state
 from tests.identification.models.pnlss.steady.oscillators import (
     RATE_HZ,
     after_disturbance,
     driven_by_voltage,
+    level,
     oscillator,
     saturating_oscillator,
     settled,
@@ -19,7 +20,7 @@ from tests.identification.models.pnlss.steady.oscillators import (
 def test_a_simulation_under_the_force_moves_so_that_the_exciter_makes_that_force(held: str) -> None:
     model = oscillator(6e8, 1e6)
     hz = RATE_HZ / 132
-    found = pnlss_steady_state(model, 1.0, hz, force=held, exciter=shaker(), harmonics=9)  # type: ignore[arg-type]
+    found = steady_state(model, hz, **level(1.0, held), exciter=shaker(), harmonics=9, largest_range_use=3.0)
     simulated, remains = settled(model, found, 400)
     assert np.all(remains < 1e-9)
     h = np.arange(1, 10)
@@ -40,7 +41,7 @@ def test_a_voltage_driven_model_is_the_model_with_its_exciter() -> None:
     inner = oscillator(6e8, 1e6)
     model = driven_by_voltage(inner)
     for held in ("fundamental", "rms"):
-        found = pnlss_response(model, 1.0, force=held, lowest_hz=23.0, highest_hz=28.0, harmonics=9)  # type: ignore[arg-type]
+        found = harmonic_response(model, 1.0, force=held, harmonics=9, band_hz=(23.0, 28.0), largest_range_use=3.0)  # type: ignore[arg-type]
         force = found.points.force_n
         square = np.abs(force[:, 1]) ** 2 if held == "fundamental" else 0.5 * np.sum(np.abs(force[:, 1:]) ** 2, axis=1)
         np.testing.assert_allclose(square, 1.0, atol=1e-8)
@@ -62,7 +63,7 @@ def test_an_exciter_beside_a_model_and_one_inside_it_give_the_same_response(held
         back_emf_damping_n_s_m=0.0,
     )
     both = [
-        pnlss_response(model, 1.2, force=held, exciter=exciter, lowest_hz=23.0, highest_hz=28.0)  # type: ignore[arg-type]
+        harmonic_response(model, **level(1.2, held), exciter=exciter, band_hz=(23.0, 28.0), largest_range_use=3.0)
         for model, exciter in ((inner, beside), (driven_by_voltage(inner), None))
     ]
     assert both[0].folds.count == both[1].folds.count == (0 if held == "voltage" else 2)
@@ -79,7 +80,7 @@ def test_an_exciter_beside_a_model_and_one_inside_it_give_the_same_response(held
 
 def test_constant_voltage_is_the_pure_sine_of_a_voltage_driven_model() -> None:
     model = driven_by_voltage(oscillator(6e8))
-    found = pnlss_frequency_response(model, 0.5, force="voltage", lowest_hz=23.0, highest_hz=28.0)
+    found = frequency_response(model, voltage_v=0.5, band_hz=(23.0, 28.0), largest_range_use=3.0)
     assert found.name == "0.5 V"
     z = np.exp(2j * np.pi * found.frequency_hz[0] / RATE_HZ)
     linear = 0.5 * model.linear_part.response(np.array([z]))[0, :, 0]
@@ -89,7 +90,7 @@ def test_constant_voltage_is_the_pure_sine_of_a_voltage_driven_model() -> None:
 
 def test_a_held_force_is_unstable_where_frequency_turns_back_though_a_constant_voltage_is_not() -> None:
     model = driven_by_voltage(oscillator(6e8), backwards=60.0)
-    found = pnlss_response(model, 1.2, force="fundamental", lowest_hz=23.0, highest_hz=29.0)
+    found = harmonic_response(model, 1.2, force="fundamental", band_hz=(23.0, 29.0), largest_range_use=3.0)
     backwards = np.gradient(found.points.frequency_hz) < 0.0
     inner = np.flatnonzero(backwards)[2:-2]
     assert not found.points.stable[inner].any()
@@ -101,10 +102,12 @@ def test_a_held_force_is_unstable_where_frequency_turns_back_though_a_constant_v
     at = found.points.frequency_hz[point]
     for k, expected in ((point, False), (5, True)):
         near = _point(found, k)
-        again = pnlss_steady_state(model, 1.2, near.frequency_hz[0], near=near)
+        again = steady_state(model, near.frequency_hz[0], 1.2, force="fundamental", near=near, largest_range_use=3.0)
         np.testing.assert_allclose(again.states, near.states, atol=1e-9 * np.abs(near.states).max())
         assert bool(again.stable[0]) is expected
-    assert pnlss_steady_state(model, 1.2, at).stable[0]  # that which rest leads to
+    assert steady_state(model, at, 1.2, force="fundamental", largest_range_use=3.0).stable[
+        0
+    ]  # that which rest leads to
 
 
 def _point(found, k):  # type: ignore[no-untyped-def]
@@ -127,7 +130,9 @@ def _point(found, k):  # type: ignore[no-untyped-def]
 
 def test_saturating_features_couple_to_an_exciter_too() -> None:
     model = saturating_oscillator()
-    found = pnlss_steady_state(model, 1.0, RATE_HZ / 127, exciter=shaker(), harmonics=11)
+    found = steady_state(
+        model, RATE_HZ / 127, 1.0, force="fundamental", exciter=shaker(), harmonics=11, largest_range_use=3.0
+    )
     simulated, _ = settled(model, found, 400)
     np.testing.assert_allclose(found.outputs[0, :, 0], simulated[:12, 0], atol=1e-5 * np.abs(simulated).max())
     h = np.arange(1, 12)
@@ -141,20 +146,20 @@ def test_saturating_features_couple_to_an_exciter_too() -> None:
 def test_what_does_not_go_together_is_refused() -> None:
     force, voltage = oscillator(), driven_by_voltage(oscillator())
     with pytest.raises(IdentificationError, match="'fundamental' of a model driven by a force needs an exciter"):
-        pnlss_frequency_response(force, 1.0)
+        frequency_response(force, 1.0, force="fundamental", largest_range_use=3.0)
     with pytest.raises(
         IdentificationError, match="exciter: makes harmonics of the force; leave it out for 'pure-sine'"
     ):
-        pnlss_frequency_response(force, 1.0, force="pure-sine", exciter=shaker())
+        frequency_response(force, 1.0, force="pure-sine", exciter=shaker(), largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="exciter: is inside a model that is driven by a voltage"):
-        pnlss_frequency_response(voltage, 1.0, exciter=shaker())
+        frequency_response(voltage, 1.0, force="fundamental", exciter=shaker(), largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="answers 'fundamental', 'rms' or 'voltage'"):
-        pnlss_frequency_response(voltage, 1.0, force="pure-sine")
+        frequency_response(voltage, 1.0, force="pure-sine", largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="force: is 'loud', allowed are fundamental, rms, pure-sine, voltage"):
-        pnlss_frequency_response(force, 1.0, force="loud")  # type: ignore[arg-type]
+        frequency_response(force, 1.0, force="loud", largest_range_use=3.0)  # type: ignore[arg-type]
     with pytest.raises(IdentificationError, match="force_n: is -1 N, must be finite and above zero"):
-        pnlss_frequency_response(force, -1.0, force="pure-sine")
+        frequency_response(force, -1.0, force="pure-sine", largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="are 30 and 20 Hz, need to rise between 0 and 1600 Hz"):
-        pnlss_frequency_response(force, 1.0, force="pure-sine", lowest_hz=30.0, highest_hz=20.0)
+        frequency_response(force, 1.0, force="pure-sine", band_hz=(30.0, 20.0), largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="samples: is 10, needs at least 15 for 7 harmonics"):
-        pnlss_frequency_response(force, 1.0, force="pure-sine", samples=10)
+        frequency_response(force, 1.0, force="pure-sine", samples=10, largest_range_use=3.0)

@@ -10,11 +10,18 @@ from identification import (
     Features,
     IdentificationError,
     PnlssModel,
-    pnlss_coupled_run,
-    pnlss_response,
-    pnlss_steady_state,
+    coupled_run,
+    harmonic_response,
+    steady_state,
 )
-from tests.identification.models.pnlss.steady.oscillators import RATE_HZ, driven_by_voltage, oscillator, settled, shaker
+from tests.identification.models.pnlss.steady.oscillators import (
+    RATE_HZ,
+    driven_by_voltage,
+    level,
+    oscillator,
+    settled,
+    shaker,
+)
 
 SHIFT_N = 15.0
 
@@ -42,31 +49,38 @@ def test_a_constant_input_is_there_at_every_level_as_in_a_simulation(by_voltage:
     plain = oscillator(5e7, 2e6, damping=0.05)
     model = offset(driven_by_voltage(plain) if by_voltage else plain)
     force = "voltage" if by_voltage else "pure-sine"
-    found = pnlss_steady_state(model, 2.0, RATE_HZ / 128, force=force, held_inputs={"constant": 1.0}, harmonics=9)  # type: ignore[arg-type]
+    found = steady_state(
+        model, RATE_HZ / 128, **level(2.0, force), held_inputs={"constant": 1.0}, harmonics=9, largest_range_use=3.0
+    )
     assert found.inputs[0, 0].tolist() == [0.0, 1.0]
     assert found.input_use[0, 1] == pytest.approx(1.0)
     simulated, left = settled(model, found, 200)
     assert left.max() < 1e-6
     size = np.abs(simulated).max(axis=0)
     np.testing.assert_allclose(found.outputs[0] / size, simulated[:10] / size, atol=2e-5)
-    without = pnlss_steady_state(model, 2.0, RATE_HZ / 128, force=force, held_inputs={"constant": 0.0}, harmonics=9)  # type: ignore[arg-type]
+    without = steady_state(
+        model, RATE_HZ / 128, **level(2.0, force), held_inputs={"constant": 0.0}, harmonics=9, largest_range_use=3.0
+    )
     tip, other = found.outputs[0, 1, -1], without.outputs[0, 1, -1]
     assert abs(tip - other) > 0.05 * abs(other)
 
 
 def test_a_response_with_a_constant_input_goes_through_its_band_and_says_what_was_held() -> None:
-    found = pnlss_response(
+    found = harmonic_response(
         offset(oscillator(5e7, 2e6)),
         1.0,
+        force="fundamental",
         exciter=shaker(),
         held_inputs={"constant": 1.0},
-        lowest_hz=22.0,
-        highest_hz=34.0,
+        band_hz=(22.0, 34.0),
+        largest_range_use=3.0,
     )
     assert found.complete
     assert "input 'constant' is held at 1" in found.notes
     np.testing.assert_allclose(np.abs(found.points.force_n[:, 1]), 1.0, rtol=1e-9)
-    stiffer = pnlss_response(oscillator(5e7, 2e6), 1.0, exciter=shaker(), lowest_hz=22.0, highest_hz=34.0)
+    stiffer = harmonic_response(
+        oscillator(5e7, 2e6), 1.0, force="fundamental", exciter=shaker(), band_hz=(22.0, 34.0), largest_range_use=3.0
+    )
     assert found.prediction.peak().frequency_hz > 1.02 * stiffer.prediction.peak().frequency_hz
 
 
@@ -74,7 +88,7 @@ def test_inputs_without_a_value_are_named() -> None:
     model = offset(oscillator())
 
     def asked(one: PnlssModel, held: dict[str, float] | None) -> None:
-        pnlss_steady_state(one, 1.0, 25.0, force="pure-sine", held_inputs=held)
+        steady_state(one, 25.0, 1.0, force="pure-sine", held_inputs=held, largest_range_use=3.0)
 
     with pytest.raises(
         IdentificationError, match="held_inputs: has no value for constant, which the model has beside force"
@@ -89,4 +103,4 @@ def test_inputs_without_a_value_are_named() -> None:
     with pytest.raises(IdentificationError, match="model: has 2 inputs, 0 of them forces and 0 held constant"):
         asked(offset(driven_by_voltage(oscillator())), None)
     with pytest.raises(IdentificationError, match=r"model: has inputs beside its force \(constant\)"):
-        pnlss_coupled_run(model, shaker(), np.zeros(100))
+        coupled_run(model, shaker(), np.zeros(100))

@@ -13,9 +13,9 @@ from identification import (
     Predictions,
     compare,
     error_table,
-    pnlss_frequency_response,
-    pnlss_response,
-    pnlss_steady_state,
+    frequency_response,
+    harmonic_response,
+    steady_state,
 )
 from identification.storage import decode, encode
 from rig.results.predictions.figure import draw_predictions
@@ -26,7 +26,7 @@ CUBIC, FORCE_N = 6e8, 1.2
 
 
 def test_every_motion_gives_the_same_displacement() -> None:
-    found = pnlss_frequency_response(oscillator(CUBIC, rate_hz=12800.0), FORCE_N, force="pure-sine")
+    found = frequency_response(oscillator(CUBIC, rate_hz=12800.0), FORCE_N, force="pure-sine", largest_range_use=3.0)
     assert found.channels == ("acc", "vel", "tip")
     np.testing.assert_allclose(found.motion_m("acc"), found.motion_m("tip"), rtol=3e-3)
     np.testing.assert_allclose(found.motion_m("vel"), found.motion_m("tip"), rtol=3e-3)
@@ -37,8 +37,10 @@ def test_every_motion_gives_the_same_displacement() -> None:
 
 def test_phases_refer_to_the_force_that_the_exciter_makes() -> None:
     model = oscillator(0.0)
-    found = pnlss_frequency_response(model, 1.0, exciter=shaker(), lowest_hz=23.0, highest_hz=27.0)
-    pure = pnlss_frequency_response(model, 1.0, force="pure-sine", lowest_hz=23.0, highest_hz=27.0)
+    found = frequency_response(
+        model, 1.0, force="fundamental", exciter=shaker(), band_hz=(23.0, 27.0), largest_range_use=3.0
+    )
+    pure = frequency_response(model, 1.0, force="pure-sine", band_hz=(23.0, 27.0), largest_range_use=3.0)
     np.testing.assert_allclose(found.fundamental_n, 1.0, rtol=1e-9)
     z = np.exp(2j * np.pi * found.frequency_hz / model.sample_rate_hz)
     linear = model.linear_part.response(z)[:, 0, 0]
@@ -47,7 +49,7 @@ def test_phases_refer_to_the_force_that_the_exciter_makes() -> None:
 
 
 def test_predictions_are_compared_packed_shown_and_drawn_like_any_other(capsys: pytest.CaptureFixture[str]) -> None:
-    found = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine")
+    found = frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", largest_range_use=3.0)
     reference = FrequencyResponse(
         frequency_hz=found.frequency_hz,
         force=np.full(found.frequency_hz.size, FORCE_N + 0j),
@@ -76,7 +78,7 @@ def test_predictions_are_compared_packed_shown_and_drawn_like_any_other(capsys: 
 
 def test_an_unknown_range_is_said_to_be_unknown() -> None:
     unknown = replace(oscillator(CUBIC), state_range=np.full(2, np.nan), input_range=np.full(1, np.nan))
-    found = pnlss_frequency_response(unknown, FORCE_N, force="pure-sine")
+    found = frequency_response(unknown, FORCE_N, force="pure-sine", largest_range_use=3.0)
     assert np.isnan(found.range_use).all()
     assert "the range of the states in the training data is unknown" in found.notes
     reference = FrequencyResponse(
@@ -91,7 +93,7 @@ def test_an_unknown_range_is_said_to_be_unknown() -> None:
 
 def test_range_use_is_that_of_a_simulation() -> None:
     model = oscillator(CUBIC, largest_m=2e-3)
-    state = pnlss_steady_state(model, FORCE_N, 25.0, force="pure-sine")
+    state = steady_state(model, 25.0, FORCE_N, force="pure-sine", largest_range_use=3.0)
     run = model.simulate(FORCE_N * np.cos(2 * np.pi / 128 * np.arange(128 * 400))[None])
     last = np.abs(run.states[:, -128:]).max(axis=1) / model.state_range
     np.testing.assert_allclose(state.state_use[0], last, rtol=2e-3)
@@ -100,7 +102,7 @@ def test_range_use_is_that_of_a_simulation() -> None:
 
 def test_a_path_that_leaves_the_trained_range_ends_there_and_is_met_from_above() -> None:
     model = oscillator(CUBIC, largest_m=5e-4)
-    found = pnlss_response(model, FORCE_N, force="pure-sine")
+    found = harmonic_response(model, FORCE_N, force="pure-sine", largest_range_use=3.0)
     assert set(found.branch.tolist()) == {0, 1}
     assert found.points.frequency_hz[found.branch == 1][0] == pytest.approx(1.15 * HZ, rel=1e-4)
     assert np.max(found.points.range_use) < 3.5
@@ -109,7 +111,7 @@ def test_a_path_that_leaves_the_trained_range_ends_there_and_is_met_from_above()
     assert any("extrapolated" in note for note in found.notes)
     assert not found.complete
     assert not found.prediction.complete
-    farther = pnlss_response(model, FORCE_N, force="pure-sine", largest_range_use=20.0)
+    farther = harmonic_response(model, FORCE_N, force="pure-sine", largest_range_use=20.0)
     assert set(farther.branch.tolist()) == {0}
     assert np.max(farther.points.range_use) > 3.5
     assert farther.complete
@@ -117,8 +119,8 @@ def test_a_path_that_leaves_the_trained_range_ends_there_and_is_met_from_above()
 
 
 def test_a_peak_where_the_curve_was_cut_off_has_no_error() -> None:
-    whole = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine")
-    cut = pnlss_frequency_response(oscillator(CUBIC, largest_m=5e-4), FORCE_N, force="pure-sine")
+    whole = frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", largest_range_use=3.0)
+    cut = frequency_response(oscillator(CUBIC, largest_m=5e-4), FORCE_N, force="pure-sine", largest_range_use=3.0)
     alone = replace(
         cut,
         **{
@@ -152,36 +154,36 @@ def test_a_peak_where_the_curve_was_cut_off_has_no_error() -> None:
 
 def test_a_vibration_beyond_the_range_is_found_nowhere_along_the_way() -> None:
     model = oscillator(CUBIC)
-    use = pnlss_steady_state(model, FORCE_N, 25.0, force="pure-sine").range_use[0]  # type: ignore[index]
+    use = steady_state(model, 25.0, FORCE_N, force="pure-sine", largest_range_use=3.0).range_use[0]  # type: ignore[index]
     with pytest.raises(IdentificationError, match="no periodic vibration was found at 25 Hz"):
-        pnlss_steady_state(model, FORCE_N, 25.0, force="pure-sine", largest_range_use=0.99 * use)
+        steady_state(model, 25.0, FORCE_N, force="pure-sine", largest_range_use=0.99 * use)
 
 
 def test_a_model_without_a_periodic_vibration_is_reported_in_one_line() -> None:
     escaping = oscillator(-6e8)
     with pytest.raises(IdentificationError, match=r"at 400 N the model has no periodic vibration at 24 or 25 Hz"):
-        pnlss_frequency_response(escaping, 400.0, force="pure-sine", lowest_hz=24.0, highest_hz=25.0)
+        frequency_response(escaping, 400.0, force="pure-sine", band_hz=(24.0, 25.0), largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="no periodic vibration was found at 25 Hz and 400"):
-        pnlss_steady_state(escaping, 400.0, 25.0, force="pure-sine")
-    softening = pnlss_response(escaping, 0.9, force="pure-sine")
+        steady_state(escaping, 25.0, 400.0, force="pure-sine", largest_range_use=3.0)
+    softening = harmonic_response(escaping, 0.9, force="pure-sine", largest_range_use=3.0)
     assert softening.folds.count == 2
     assert softening.points.frequency_hz[-1] == pytest.approx(1.15 * HZ)
 
 
 def test_a_band_beside_the_resonance_is_said_to_miss_it() -> None:
-    missed = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", lowest_hz=20.0, highest_hz=23.0)
+    missed = frequency_response(
+        oscillator(CUBIC), FORCE_N, force="pure-sine", band_hz=(20.0, 23.0), largest_range_use=3.0
+    )
     assert "the largest amplitude is at an end of the band: widen it" in missed.notes
-    hit = pnlss_frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", lowest_hz=20.0, highest_hz=28.0)
+    hit = frequency_response(oscillator(CUBIC), FORCE_N, force="pure-sine", band_hz=(20.0, 28.0), largest_range_use=3.0)
     assert not any("widen" in note for note in hit.notes)
 
 
 def test_without_a_lightly_damped_mode_a_band_is_asked_for() -> None:
     damped = oscillator(0.0, damping=0.6)
-    with pytest.raises(
-        IdentificationError, match="lowest_hz, highest_hz: not given, and the model's linear part has no"
-    ):
-        pnlss_frequency_response(damped, 1.0, force="pure-sine")
-    found = pnlss_frequency_response(damped, 1.0, force="pure-sine", lowest_hz=5.0, highest_hz=50.0)
+    with pytest.raises(IdentificationError, match="band_hz: not given, and the model's linear part has no"):
+        frequency_response(damped, 1.0, force="pure-sine", largest_range_use=3.0)
+    found = frequency_response(damped, 1.0, force="pure-sine", band_hz=(5.0, 50.0), largest_range_use=3.0)
     assert (found.frequency_hz[0], found.frequency_hz[-1]) == (5.0, 50.0)
 
 
@@ -206,4 +208,4 @@ def test_a_model_without_motion_has_no_amplitude_to_predict() -> None:
         outputs=(replace(model.outputs[0], role="monitor"),),
     )
     with pytest.raises(IdentificationError, match="no output is a motion"):
-        pnlss_frequency_response(blind, 1.0, force="pure-sine", lowest_hz=20.0, highest_hz=30.0)
+        frequency_response(blind, 1.0, force="pure-sine", band_hz=(20.0, 30.0), largest_range_use=3.0)

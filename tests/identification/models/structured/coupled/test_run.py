@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import Channel, Exciter, IdentificationError
-from identification.models.structured.coupled.run import structured_coupled_run
+from identification import Channel, Exciter, IdentificationError, steady_state
+from identification.models.structured.coupled.run import coupled_run
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.laws import PolynomialDamper
-from identification.models.structured.steady.response import structured_steady_state
 from tests.identification.models.pnlss.steady.oscillators import shaker
 from tests.identification.models.structured.steady.beams import beam, friction, smooth
 
@@ -27,11 +26,11 @@ def test_a_run_settles_on_the_harmonic_balance_of_the_pair(make, voltage_v):
     samples, periods = 80, 400
     model = make(rate_hz=RATE_HZ, steps=4)
     voltage = voltage_v * np.cos(2.0 * np.pi * np.arange(samples * periods) / samples)
-    run = structured_coupled_run(model, shaker(), voltage, lowest_hz=LOWEST_HZ)
+    run = coupled_run(model, shaker(), voltage, lowest_hz=LOWEST_HZ)
     assert run.change < 1e-6
     assert run.unsolved_steps == 0
-    exact = structured_steady_state(
-        model, voltage_v, RATE_HZ / samples, force="voltage", exciter=shaker(), harmonics=11
+    exact = steady_state(
+        model, RATE_HZ / samples, voltage_v=voltage_v, exciter=shaker(), harmonics=11, largest_range_use=3.0
     )
     assert exact.stable[0]
     outputs = last_harmonics(run.outputs, samples)
@@ -55,7 +54,7 @@ def test_a_massless_exciter_on_a_velocity_is_a_damper_at_the_drive_point():
     lines = np.zeros(2001, dtype=complex)
     lines[40:300] = np.exp(2j * np.pi * np.random.default_rng(1).random(260))  # 20 to 150 Hz
     voltage = 100.0 * np.fft.irfft(lines, 4000) * np.hanning(4000)
-    found = structured_coupled_run(model, massless, voltage, lowest_hz=LOWEST_HZ)
+    found = coupled_run(model, massless, voltage, lowest_hz=LOWEST_HZ)
 
     class Constant(PolynomialDamper):
         def damping(self, x):
@@ -71,6 +70,6 @@ def test_a_massless_exciter_on_a_velocity_is_a_damper_at_the_drive_point():
 def test_what_cannot_be_coupled_is_named():
     model, voltage = smooth(), np.zeros(100)
     with pytest.raises(IdentificationError, match="voltage_v"):
-        structured_coupled_run(model, shaker(), [0.0, np.nan])
+        coupled_run(model, shaker(), [0.0, np.nan])
     with pytest.raises(IdentificationError, match="lowest_hz: is 490 Hz"):
-        structured_coupled_run(model, shaker(), voltage, lowest_hz=490.0)
+        coupled_run(model, shaker(), voltage, lowest_hz=490.0)

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import IdentificationError
+from identification import IdentificationError, backbone, frequency_response, steady_state
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.laws import Jenkins
-from identification.models.structured.steady.backbone import structured_backbone
-from identification.models.structured.steady.response import structured_frequency_response, structured_steady_state
 from tests.identification.models.pnlss.steady.oscillators import shaker
 from tests.identification.models.structured.steady.beams import beam, friction, smooth
 
@@ -17,21 +15,21 @@ from tests.identification.models.structured.steady.beams import beam, friction, 
 @pytest.mark.parametrize("make", [smooth, friction])
 @pytest.mark.parametrize("options", [{}, {"force": "fundamental", "exciter": shaker()}], ids=["sine", "coupled"])
 def test_the_backbone_goes_through_the_peak_of_the_frequency_response(make, options):
-    found = structured_backbone(make(), 2.0, **options)
+    found = backbone(make(), 2.0, largest_range_use=3.0, **options)
     np.testing.assert_allclose(np.abs(found.force_n[[0, -1], 1]), [0.04, 2.0], rtol=1e-8)
     motion = found.displacement_m[:, 1, 0]
     np.testing.assert_allclose(np.degrees(np.angle(motion)), -90.0, atol=0.05)  # the residual below the band adds 0.02
-    peak = structured_frequency_response(make(), 2.0, lowest_hz=22.0, highest_hz=33.0, **options).peak()
+    peak = frequency_response(make(), 2.0, band_hz=(22.0, 33.0), largest_range_use=3.0, **options).peak()
     assert np.abs(motion[-1]) == pytest.approx(peak.amplitude_m, rel=5e-4)
     assert found.frequency_hz[-1] == pytest.approx(peak.frequency_hz, rel=5e-4)
 
 
 def test_a_point_of_the_backbone_is_a_vibration_under_its_force():
-    found = structured_backbone(smooth(), 0.5)
+    found = backbone(smooth(), 0.5, largest_range_use=3.0)
     for k in range(1, found.count, 4):
         force_n, at_hz = float(np.abs(found.force_n[k, 1])), float(found.frequency_hz[k])
         here = replace(found, states=found.states[k:], inputs=found.inputs[k:], voltage_v=found.voltage_v[k:])
-        alone = structured_steady_state(smooth(), force_n, at_hz, near=here)
+        alone = steady_state(smooth(), at_hz, force_n, near=here, largest_range_use=3.0)
         np.testing.assert_allclose(alone.outputs[0], found.outputs[k], atol=1e-5 * np.abs(found.outputs[k]).max())
         np.testing.assert_allclose(alone.multipliers[0], found.multipliers[k], rtol=1e-5)
 
@@ -42,7 +40,7 @@ def test_damping_of_a_slider_is_that_of_its_loop():
         direction=[direction, 0.0], scale_m=scale, laws=(Jenkins(stiffness_n=stiffness, slip=slip),)
     )
     model = beam(slider)
-    found = structured_backbone(model, 1.0)
+    found = backbone(model, 1.0, largest_range_use=3.0)
     z = np.abs(found.displacement_m[:, 1, 0])  # the element moves as the drive point but for the second mode
     slipping = z > 1.5 * slip * scale
     assert slipping.sum() > 3
@@ -55,7 +53,7 @@ def test_damping_of_a_slider_is_that_of_its_loop():
 
 
 def test_a_backbone_begins_at_the_mode_that_is_asked_for():
-    found = structured_backbone(friction(), 2.0, near_hz=110.0)
+    found = backbone(friction(), 2.0, near_hz=110.0, largest_range_use=3.0)
     assert 138.0 < found.frequency_hz[-1] < found.frequency_hz[0] < 150.0
 
 
@@ -68,4 +66,4 @@ def test_a_backbone_begins_at_the_mode_that_is_asked_for():
 )
 def test_what_has_no_backbone_is_refused(options, message):
     with pytest.raises(IdentificationError, match=message):
-        structured_backbone(smooth(), 2.0, **options)
+        backbone(smooth(), 2.0, **options)

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from identification import IdentificationError
+from identification import IdentificationError, harmonic_response, steady_state
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.drives import Coupled, Sine
 from identification.models.structured.model import room_for
 from identification.models.structured.steady.balance import StructuredBalance
 from identification.models.structured.steady.kernels import along_period
-from identification.models.structured.steady.response import structured_response, structured_steady_state
 from identification.models.structured.steps import run
 from tests.identification.models.pnlss.steady.oscillators import shaker
 from tests.identification.models.structured.steady.beams import beam, friction, settled, smooth
@@ -43,7 +42,7 @@ def test_the_jacobian_agrees_with_finite_differences(model, held):
 
 def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
     model = beam(support_n_m=800.0)
-    found = structured_response(model, 0.01, support=True, lowest_hz=20.0, highest_hz=30.0, harmonics=1)
+    found = harmonic_response(model, 0.01, support=True, harmonics=1, band_hz=(20.0, 30.0), largest_range_use=3.0)
     s = 2j * np.pi * found.points.frequency_hz[:, None]
     b = model.input_shapes[:, 0]
     modes = 1.0 / (model.omega**2 + 2.0 * model.damping_ratio * model.omega * s + s**2)
@@ -54,7 +53,7 @@ def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
     np.testing.assert_allclose(found.points.outputs[:, 1], exact, rtol=1e-6)
     assert found.points.stable.all()
     poles = model.omega * (-model.damping_ratio + 1j * np.sqrt(1.0 - model.damping_ratio**2))
-    bare = structured_response(beam(), 0.01, lowest_hz=20.0, highest_hz=30.0, harmonics=3)
+    bare = harmonic_response(beam(), 0.01, harmonics=3, band_hz=(20.0, 30.0), largest_range_use=3.0)
     for at_hz, each in zip(bare.points.frequency_hz[::20], bare.points.multipliers[::20], strict=True):
         exact = np.exp(poles / at_hz)
         np.testing.assert_allclose(np.sort_complex(each), np.sort_complex([*exact, *exact.conj()]), rtol=1e-9)
@@ -64,7 +63,7 @@ def test_without_elements_the_response_is_that_of_the_modes_and_the_support():
 @pytest.mark.parametrize("make", [smooth, friction])
 def test_a_settled_simulation_has_the_harmonics_of_the_balance(make, samples):
     simulated, change = settled(make(rate_hz=RATE_HZ, steps=1), 1.0, samples, 300)
-    found = structured_steady_state(make(), 1.0, RATE_HZ / samples, support=True, harmonics=13)
+    found = steady_state(make(), RATE_HZ / samples, 1.0, support=True, harmonics=13, largest_range_use=3.0)
     assert change < 1e-8
     size = np.abs(simulated).max(axis=0)
     np.testing.assert_allclose(found.outputs[0] / size, simulated[:14] / size, atol=1e-4)
@@ -92,7 +91,7 @@ def test_a_slider_loses_the_energy_of_its_loop():
 def test_the_work_of_the_force_is_what_dampers_and_sliders_lose(make):
     model = make()
     force_n = 8.0
-    found = structured_steady_state(model, force_n, 25.3, support=True, harmonics=13)
+    found = steady_state(model, 25.3, force_n, support=True, harmonics=13, largest_range_use=3.0)
     w, at = 2.0 * np.pi * 25.3, found.states[0]
     h, phase = np.arange(14)[:, None], 2.0 * np.pi * np.arange(4000) / 4000
     turning = np.exp(1j * h * phase)
@@ -120,7 +119,7 @@ def test_the_work_of_the_force_is_what_dampers_and_sliders_lose(make):
 
 def test_multipliers_are_those_of_a_simulated_period():
     model, samples = smooth(rate_hz=RATE_HZ, steps=1, support_n_m=0.0), 560
-    found = structured_steady_state(model, 1.5, RATE_HZ / samples, harmonics=15)
+    found = steady_state(model, RATE_HZ / samples, 1.5, harmonics=15, largest_range_use=3.0)
     h = np.arange(16)[:, None]
     w = 2.0 * np.pi * RATE_HZ / samples
     begin = np.concatenate([np.sum(found.states[0], axis=0).real, np.sum(1j * h * w * found.states[0], axis=0).real])
@@ -146,12 +145,12 @@ def test_unknown_settings_are_refused_in_a_line():
         ({"samples": 10}, "samples: is 10, needs at least 15 for 7 harmonics"),
         ({"force": "fundamental"}, "'fundamental' of a model driven by a force needs an exciter"),
         ({"exciter": shaker()}, "exciter: makes harmonics of the force; leave it out for 'pure-sine'"),
-        ({"lowest_hz": 30.0, "highest_hz": 20.0}, "lowest_hz, highest_hz: are 30 and 20 Hz"),
+        ({"band_hz": (30.0, 20.0)}, "band_hz: is 30 to 20 Hz"),
     ):
         with pytest.raises(IdentificationError, match=message):
-            structured_response(smooth(), 1.0, **options)
+            harmonic_response(smooth(), 1.0, **options)
 
 
 def test_harmonics_are_not_limited_by_the_sample_rate():
-    slow, fast = (structured_steady_state(smooth(rate_hz=rate), 1.0, 24.0) for rate in (300.0, 3000.0))
+    slow, fast = (steady_state(smooth(rate_hz=rate), 24.0, 1.0, largest_range_use=3.0) for rate in (300.0, 3000.0))
     np.testing.assert_allclose(slow.outputs, fast.outputs, rtol=1e-6, atol=1e-6)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import IdentificationError, NonlinearElement, StructuredFit, structured_backbone, structured_mode
+from identification import IdentificationError, NonlinearElement, StructuredFit, backbone, structured_mode
 from identification.fitting.result import FitStatus
 from identification.models.structured.laws import Jenkins, PolynomialSpring
 from identification.models.structured.parameters import Parameters
@@ -58,10 +58,10 @@ def test_frequency_and_damping_are_those_of_the_closed_form_up_to_the_training_r
 def test_points_are_those_of_the_backbone():
     model = duffing()
     found = structured_mode(model, 1.5)
-    backbone = structured_backbone(model, 1.5, support=True)
-    sizes = np.abs(backbone.displacement_m[:, 1, 0])
+    curve = backbone(model, 1.5, support=True, largest_range_use=3.0)
+    sizes = np.abs(curve.displacement_m[:, 1, 0])
     np.testing.assert_allclose(found.amplitude_m[-1], sizes[-1], rtol=0.01)
-    np.testing.assert_allclose(found.frequency_hz[-1], backbone.frequency_hz[-1], rtol=1e-9)
+    np.testing.assert_allclose(found.frequency_hz[-1], curve.frequency_hz[-1], rtol=1e-9)
 
 
 def test_errors_of_frequency_and_damping_are_those_of_their_numbers():
@@ -85,7 +85,8 @@ def test_errors_are_how_far_the_curves_of_models_apart_by_them_lie_apart(joint):
     moved = np.where(np.array(fit.names) == name, std, 0.0)
     found = structured_mode(fit)
     ends = [
-        structured_backbone(parameters.model(fit.values + sign * moved), 1.3 * found.force_n[-1]) for sign in (1, -1)
+        backbone(parameters.model(fit.values + sign * moved), 1.3 * found.force_n[-1], largest_range_use=3.0)
+        for sign in (1, -1)
     ]
     curves = [np.interp(found.amplitude_m, np.abs(end.displacement_m[:, 1, 0]), end.frequency_hz) for end in ends]
     half = 0.5 * np.abs(curves[0] - curves[1])
