@@ -56,7 +56,7 @@ Measurements of others
     PnlssMapping, map_response_matrix, ResponseMatrixMapping, map_time_data, TimeDataMapping, TimeRecords, TimeRecord,
     time_experiments, time_responses, time_spectra
 Former names, which warn
-    pnlss_frequency_response, pnlss_response, pnlss_steady_state, PnlssResponse, pnlss_coupled_run,
+    pnlss_frequency_response, pnlss_response, pnlss_steady_state, pnlss_coupled_run,
     structured_frequency_response, structured_response, structured_steady_state, structured_backbone,
     structured_coupled_run
 """
@@ -71,7 +71,6 @@ if TYPE_CHECKING:
     from identification.decays.backbone import decay_backbone as decay_backbone
     from identification.decays.result import DecayBackbone as DecayBackbone, DecayMode as DecayMode
     from identification.deprecated import (
-        PnlssResponse as PnlssResponse,
         pnlss_coupled_run as pnlss_coupled_run,
         pnlss_frequency_response as pnlss_frequency_response,
         pnlss_response as pnlss_response,

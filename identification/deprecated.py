@@ -86,10 +86,3 @@ def structured_backbone(model: object, force_n: float, **how: Any) -> SteadyStat
         force_n,
         **{"largest_range_use": _LARGEST_RANGE_USE, "points": _BACKBONE_POINTS, "force": "pure-sine", **how},
     )
-
-
-def __getattr__(name: str) -> Any:
-    if name == "PnlssResponse":
-        _warn(name, "HarmonicResponse")
-        return HarmonicResponse
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
