@@ -29,6 +29,8 @@ _Compared = tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | 
 
 
 _DRAWS = 40
+_POINTS = 401
+"""Points of a branch of a response. Chosen."""
 
 
 def predict(model: Path, request: NonlinearModePrediction) -> Predictions:
@@ -44,7 +46,7 @@ def predict(model: Path, request: NonlinearModePrediction) -> Predictions:
     alone = request.forces_without_reference(references, "fundamental")
     steady: list[_Compared] = [_alone(mode, force, modes, request) for force in alone]
     steady += [_compared(mode, measured, modes, request) for measured in references]
-    models = SweepModels(mode, modes, exciter, request.zero_crossings, request.allow_extrapolation)
+    models = SweepModels(mode, modes, exciter, request.zero_crossings, request.largest_range_use)
     swept: list[Swept] = [found for path in request.sweeps for found in recorded_sweeps(path, models)]
     swept += [found for plan in request.planned for found in planned_sweeps(plan, models)]
     return Predictions(
@@ -78,7 +80,9 @@ def _steady(
     mode: NonlinearMode, force_n: float, modes: LinearModes | None, request: NonlinearModePrediction
 ) -> SteadyPrediction:
     held = request.held or "fundamental"
-    return frequency_response(mode, force_n, force=held, modes=modes, allow_extrapolation=request.allow_extrapolation)
+    return frequency_response(
+        mode, force_n, force=held, linear_modes=modes, points=_POINTS, largest_range_use=request.largest_range_use
+    )
 
 
 def _band(mode: NonlinearMode, force_n: float, request: NonlinearModePrediction) -> ResponseBand | None:
@@ -87,7 +91,7 @@ def _band(mode: NonlinearMode, force_n: float, request: NonlinearModePrediction)
     try:
         if _steady(mode, force_n, None, request).range_use.max() > FLAGGED_BEYOND:
             return None  # the standard errors do not include the error of extrapolation
-        return response_band(mode, force_n, force=held, draws=_DRAWS, allow_extrapolation=request.allow_extrapolation)
+        return response_band(mode, force_n, force=held, draws=_DRAWS, largest_range_use=request.largest_range_use)
     except IdentificationError:
         return None
 
@@ -101,7 +105,7 @@ def _compared(
         predicted, band = _steady(mode, measured.level, modes, wanted), _band(mode, measured.level, wanted)
     else:
         predicted, band = (
-            recorded_force_response(mode, measured, modes=modes, allow_extrapolation=request.allow_extrapolation),
+            recorded_force_response(mode, measured, linear_modes=modes, largest_range_use=request.largest_range_use),
             None,
         )
     return predicted, measured, compare(predicted, measured, over=over_of(measured, request.over)).error, band

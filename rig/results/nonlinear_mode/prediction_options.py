@@ -1,10 +1,12 @@
 """Options of predictions by a nonlinear mode."""
 
+import math
 from pathlib import Path
 from typing import ClassVar, Self
 
 from pydantic import model_validator
 
+from identification.models import LARGEST_RANGE_USE
 from rig.errors import ConfigurationError
 from rig.results.predictions.options import Crossings, Planned, PredictionOptions, Sweeps
 
@@ -27,6 +29,11 @@ class NonlinearModePrediction(PredictionOptions):
     """Linear model: other modes and other sensors."""
     allow_extrapolation: bool = False
     """Answer beyond twice the largest amplitude identified."""
+
+    @property
+    def largest_range_use(self) -> float:
+        """Largest modal amplitude over the largest identified."""
+        return math.inf if self.allow_extrapolation else LARGEST_RANGE_USE
 
     @model_validator(mode="after")
     def _check(self) -> Self:
