@@ -13,7 +13,7 @@ PRODUCT = ("vibrolock", "rig", "controller", "simulators", "identification")
 PACKAGES = (*PRODUCT, "benchmarks", "studies", "tests")
 
 _OF_RESULTS = ("rig.figures", "rig.show")
-"""What `vibrolock.results` imports when a result is drawn or shown."""
+"""What draws and shows results, registered for `vibrolock.results`."""
 _SHOWN = (".plot(", "_repr_")
 _MODULE = rf"((?:{'|'.join(PACKAGES)})(?:\.\w+)+)"
 _NAMED = re.compile(rf"\b{_MODULE}(\.\{{)?")
