@@ -8,14 +8,49 @@ from collections.abc import Callable
 
 import numpy as np
 
+from identification.fitting.levenberg_marquardt import DampingRule, Minimum, Step, minimise
+from identification.fitting.result import Ending, FitStatus
 from vibrolock.arrays import Float
 
 Bounds = tuple[Float, Float]
+
+_RULE = DampingRule(first=1e-3, factor=3.0, smallest=1e-12, largest=1e6, worth=0.1)
+"""Choice of the damping, relative to derivatives of unit norm. Chosen: a cost takes a third of the time of derivatives."""
 
 
 def qr_r(matrix: Float) -> Float:
     """Return the triangle R of the QR decomposition: columns with the same norms and scalar products."""
     return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
+
+
+def bounded_minimum(
+    triangle: Callable[[Float], Float],
+    cost: Callable[[Float], float],
+    vector: Float,
+    bounds: Bounds,
+    tolerance: float,
+    iterations: int,
+) -> Minimum:
+    """Minimise a sum of squares within bounds (`BoundedLeastSquares`).
+
+    Parameters
+    ----------
+    triangle, cost, bounds
+        Those of `BoundedLeastSquares`.
+    vector
+        float[P], initial numbers.
+    tolerance
+        Relative gain, achieved and predicted, below which the iterations end.
+    iterations
+        Iterations at most.
+    """
+
+    def ending(count: int, step: Step | None) -> Ending | None:
+        if step is not None and max(step.before - step.cost, step.predicted) <= tolerance * step.before:
+            return Ending(FitStatus.CONVERGED, f"the last iteration gained less than {tolerance:g}")
+        return Ending.of(FitStatus.ITERATION_LIMIT, limit=iterations) if count == iterations else None
+
+    return minimise(BoundedLeastSquares(triangle, cost, bounds), np.clip(vector, *bounds), _RULE, ending)
 
 
 class BoundedLeastSquares:

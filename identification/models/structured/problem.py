@@ -9,9 +9,9 @@ import numpy as np
 
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
-from identification.fitting.bounded_steps import BoundedLeastSquares, qr_r
-from identification.fitting.levenberg_marquardt import DampingRule, Minimum, Step, minimise
-from identification.fitting.result import Ending, FitStatus
+from identification.fitting.bounded_steps import bounded_minimum, qr_r
+from identification.fitting.levenberg_marquardt import Minimum
+from identification.fitting.result import FitStatus
 from identification.fitting.threads import threads
 from identification.models.structured.leading import Lead
 from identification.models.structured.modal_test import ModalTest
@@ -21,8 +21,6 @@ from vibrolock.arrays import Float
 
 _EVALUATIONS = 100
 """Simulations with derivatives at most. Chosen: fits of the benchmarks end after some ten."""
-_RULE = DampingRule(first=1e-3, factor=3.0, smallest=1e-12, largest=1e6, worth=0.1)
-"""Choice of the damping, relative to derivatives of unit norm. Chosen: a cost takes a third of the time of derivatives."""
 
 
 class Problem:
@@ -127,15 +125,8 @@ class Problem:
 
     def solve(self, vector: Float, tolerance: float) -> Minimum:
         """Return the minimum; iterations end when one gains and promises less than ``tolerance`` of the cost."""
-
-        def ending(iterations: int, step: Step | None) -> Ending | None:
-            if step is not None and max(step.before - step.cost, step.predicted) <= tolerance * step.before:
-                return Ending(FitStatus.CONVERGED, f"the last iteration gained less than {tolerance:g}")
-            return Ending.of(FitStatus.ITERATION_LIMIT, limit=_EVALUATIONS) if iterations == _EVALUATIONS else None
-
         bounds = self.parameters.bounds(vector)
-        problem = BoundedLeastSquares(self.triangle, self._cost, bounds)
-        found = minimise(problem, np.clip(vector, *bounds), _RULE, ending)
+        found = bounded_minimum(self.triangle, self._cost, vector, bounds, tolerance, _EVALUATIONS)
         if found.ending.status is FitStatus.INTERRUPTED:
             raise KeyboardInterrupt
         return found

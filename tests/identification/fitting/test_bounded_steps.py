@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from identification.fitting.levenberg_marquardt import minimum
+from identification.fitting.bounded_steps import bounded_minimum
 
 
 def found(residual, jacobian, begin, bounds, tolerance=1e-10, evaluations=50):
     def triangle(x):
         return np.linalg.qr(np.column_stack([jacobian(x), residual(x)]), mode="r")
 
-    return minimum(triangle, lambda x: float(np.sum(residual(x) ** 2)), np.array(begin), bounds, tolerance, evaluations)
+    return bounded_minimum(
+        triangle, lambda x: float(np.sum(residual(x) ** 2)), np.array(begin), bounds, tolerance, evaluations
+    )
 
 
 def rosenbrock(x):
@@ -40,15 +42,15 @@ def test_numbers_that_belong_at_zero_arrive_there_at_once():
     np.testing.assert_allclose(result.vector, exact, atol=1e-4)
     assert np.all(result.vector[exact == 0.0] < 1e-12)
     assert result.evaluations < 10
-    assert result.stopped == "the last iteration gained less than 1e-09"
+    assert result.ending.message == "the last iteration gained less than 1e-09"
 
 
 def test_a_fit_says_that_it_was_stopped():
     result = found(rosenbrock, of_rosenbrock, (-1.2, 1.0), (np.full(2, -2.0), np.full(2, 2.0)), evaluations=2)
-    assert (result.evaluations, result.stopped) == (2, "stopped at its limit of 2 iterations")
+    assert (result.evaluations, result.ending.message) == (2, "stopped at its limit of 2 iterations")
 
 
 def test_a_minimum_to_rounding_takes_no_step():
     result = found(rosenbrock, of_rosenbrock, (1.0, 1.0), (np.full(2, -2.0), np.full(2, 2.0)))
-    assert result.stopped == "no step of any damping fits better"
+    assert result.ending.message == "no step of any damping fits better"
     assert result.vector == pytest.approx((1.0, 1.0))
