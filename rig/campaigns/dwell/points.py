@@ -171,9 +171,9 @@ def _cycles(point: Point[object]) -> float:
 
 def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> Iterator[str]:
     """Yield a sentence for each change beyond its limit in the plan's table ``name``."""
-    limits = getattr(plan, name)
+    limits = vars(plan.alarm if name == "alarm" else plan.abort)
     for quantity, change in changes.items():
-        limit = getattr(limits, quantity)
+        limit = limits[quantity]
         if limit is not None and change is not None and abs(change) > limit:
             said = "force" if quantity == "amplitude" and plan.level_unit == "m" else quantity
             yield (
