@@ -11,10 +11,10 @@ from vibrolock.arrays import Float
 
 MAINS_HZ = (50.0, 60.0)  # frequencies of the mains, Hz
 HUM_HARMONICS = 3  # harmonics of the mains that are examined; chosen
-NOISY = 3.0  # times the expected floor
-CALM = 0.3
-FAR_OFF = 0.1  # of the range: an offset that eats into it
-SIGNIFICANT = 5.0  # standard deviations of a line of noise
+MAX_NOISE = 3.0  # largest noise over the expected one; chosen
+MIN_NOISE = 0.3  # least noise over the expected one, below which a sensor may be dead; chosen
+MAX_OFFSET = 0.1  # largest offset over the range without a warning; chosen
+MIN_SIGNIFICANCE = 5.0  # amplitude of a hum over the standard deviation of a line of noise; chosen
 
 
 def silent_findings(bench: Bench, readings: Float) -> list[Finding]:
@@ -39,14 +39,14 @@ def _of_channel(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
     offset_v = float(values.mean()) * scale
     highest_v = bench.limits.overload_fraction * channel.range_v
     at_range = float(np.abs(values).max()) * scale >= highest_v
-    verdict = "fail" if at_range else graded(abs(offset_v), (0.0, FAR_OFF * channel.range_v), (0.0, highest_v))
+    verdict = "fail" if at_range else graded(abs(offset_v), (0.0, MAX_OFFSET * channel.range_v), (0.0, highest_v))
     offset = Finding(
         "offset",
         channel.name,
         verdict,
         offset_v,
         "V",
-        f"+-{FAR_OFF * channel.range_v:g}",
+        f"+-{MAX_OFFSET * channel.range_v:g}",
         {"ok": "", "warn": "see the sensor's supply and its warm-up"}.get(
             verdict, "at the end of its range: short or open?"
         ),
@@ -66,19 +66,19 @@ def _noise(channel: Channel, values: Float) -> Finding:
     if np.ptp(values) < 0.5 * bit:
         if channel.noise_rms < 0.5 * bit:
             text = "below one bit, as the bench expects; whether it lives is told under drive"
-            return Finding("noise", channel.name, "ok", found, channel.unit, f"up to {NOISY * expected:.3g}", text)
+            return Finding("noise", channel.name, "ok", found, channel.unit, f"up to {MAX_NOISE * expected:.3g}", text)
         text = "does not change at all: cable, supply or sensor may be dead"
-        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {CALM * expected:.3g}", text)
-    if channel.noise_rms == 0.0 and found > NOISY * expected:
+        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {MIN_NOISE * expected:.3g}", text)
+    if channel.noise_rms == 0.0 and found > MAX_NOISE * expected:
         text = "the bench declares no noise_rms to compare with"
         return Finding("noise", channel.name, "not tested", found, channel.unit, "", text)
-    if found < CALM * channel.noise_rms and channel.noise_rms > bit:
+    if found < MIN_NOISE * channel.noise_rms and channel.noise_rms > bit:
         text = "much quieter than the sensor can be: is it connected?"
-        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {CALM * expected:.3g}", text)
-    noisy = found > NOISY * expected
+        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {MIN_NOISE * expected:.3g}", text)
+    noisy = found > MAX_NOISE * expected
     text = "more than sensor and converter make: ambient vibration, cable or earth loop" if noisy else ""
     return Finding(
-        "noise", channel.name, "warn" if noisy else "ok", found, channel.unit, f"up to {NOISY * expected:.3g}", text
+        "noise", channel.name, "warn" if noisy else "ok", found, channel.unit, f"up to {MAX_NOISE * expected:.3g}", text
     )
 
 
@@ -105,5 +105,5 @@ def hum(values: Float, mains_hz: float, sample_rate_hz: float) -> float:
     found, *_ = np.linalg.lstsq(matrix, values, rcond=None)
     left = float(np.std(values - matrix @ found))
     amplitudes = np.hypot(found[2::2], found[3::2])
-    loud = amplitudes > SIGNIFICANT * left * math.sqrt(2.0 / values.size)
+    loud = amplitudes > MIN_SIGNIFICANCE * left * math.sqrt(2.0 / values.size)
     return float(np.sqrt(0.5 * np.sum(amplitudes[loud] ** 2)))

@@ -1,4 +1,4 @@
-"""What a trial's points should have measured: phase resonance of its own rig by harmonic balance."""
+"""True modal properties of a trial's points: phase resonance of its own rig by harmonic balance."""
 
 from dataclasses import dataclass
 
