@@ -85,7 +85,7 @@ def _say_of(thing: object) -> Callable[[], None] | None:
         return lambda: _say_recording(recording)
     kind = kind_of_result(thing)
     if kind is None:
-        say: Callable[[], None] | None = getattr(thing, "say", None)  # of an analysis
+        say: Callable[[], None] | None = getattr(thing, "print_summary", None)  # of an analysis
         return say
     return None if isinstance(thing, tuple) else lambda: _say_kept(kind, thing)
 

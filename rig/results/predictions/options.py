@@ -42,7 +42,7 @@ class PredictionOptions(Options):
     def _check_what_is_asked(self) -> Self:
         asks = [name for name in _ASKED if name in type(self).model_fields]
         if not any(getattr(self, name) for name in asks):
-            *some, last = (f"`{name}`" for name in asks)
+            *some, last = (f"`{name}`" for name in _ASKED)
             raise ConfigurationError(f"nothing to predict: give {', '.join(some)} or {last}")
         for name in (name for name in _FILES if name in asks):
             for one, other in combinations(getattr(self, name), 2):
