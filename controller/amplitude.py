@@ -18,6 +18,7 @@ from controller.through_response import (
     wanted_displacement,
 )
 from vibrolock.compiled import Record, inner_kernel, kernel
+from vibrolock.errors import InputError
 
 SMALLEST_PART = 1e-5  # of the largest voltage: where a logarithmic law begins from rest
 HELD_BACK = 1e-3  # an output further than this part from what the law demands is not at its level
@@ -79,12 +80,16 @@ class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings
         through = self.force_loop == "through-response"
         if amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
             if self.force_loop == "linear" and self.k4 == 0.0:
-                raise ValueError("k4 = 0: levels in newtons need the force loop's integral gain, allowed is above 0")
+                raise InputError(
+                    "levels in newtons need the force loop's integral gain", field="k4", value=0, allowed="above 0"
+                )
             if through and self.reference_integral_per_s == 0.0:
-                raise ValueError("reference_integral_per_s = 0: a force held through the response needs it above 0")
+                raise InputError(
+                    "a force held through the response needs it above 0", field="reference_integral_per_s", value=0
+                )
         held = amplitude_law is AmplitudeLaw.RESPONSE or (through and amplitude_law is not AmplitudeLaw.VOLTAGE)
         if held and self.response_integral_per_s == 0.0:
-            raise ValueError("response_integral_per_s = 0: a response is held with a gain above 0")
+            raise InputError("a response is held with a gain above 0", field="response_integral_per_s", value=0)
         smallest_v = SMALLEST_PART * largest_v
         out = np.zeros(1, AMPLITUDE)
         out["largest_v"] = largest_v

@@ -11,6 +11,7 @@ from controller.adaptive_filter import MOST_HARMONICS, adapt, root_mean_square, 
 from controller.primitives import size, track, wrap
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel, kernel
+from vibrolock.errors import InputError
 
 
 class Detector(IntEnum):
@@ -85,9 +86,11 @@ class DetectorSettings(Settings):
         gain = -math.expm1(-self.low_pass_rad_s * dt)
         if self.detector == "adaptive" and gain * (2 * self.harmonics_followed + 1) > 1.0:
             largest = -math.log1p(-1.0 / (2 * self.harmonics_followed + 1)) / dt
-            raise ValueError(
-                f"low_pass_rad_s = {self.low_pass_rad_s:g}: an adaptive filter with {self.harmonics_followed} harmonics at "
-                f"{sample_rate_hz:g} samples/s allows up to {largest:.4g}"
+            raise InputError(
+                f"an adaptive filter with {self.harmonics_followed} harmonics at {sample_rate_hz:g} samples/s "
+                f"allows up to {largest:.4g}",
+                field="low_pass_rad_s",
+                value=self.low_pass_rad_s,
             )
         out = np.zeros(1, DETECTOR)
         out["kind"] = KINDS[self.detector]

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from controller.primitives import proportional_integral
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel, kernel
+from vibrolock.errors import InputError
 
 LARGEST_FREQUENCY_ERROR = 0.05  # of the frequency
 
@@ -100,15 +101,16 @@ class FrequencySettings(Settings):
         if self.frequency_law == "phase":
             for name in ("k1", "k2"):
                 if name not in self.model_fields_set:
-                    raise ValueError(f"{name}: is missing, and the phase law needs it")
+                    raise InputError("is missing, and the phase law needs it", field=name)
             return self
         if self.frequency_integral_per_s == 0.0:
-            raise ValueError("frequency_integral_per_s = 0: the frequency-error law needs it above 0")
-        if self.period_mean:
-            raise ValueError("period_mean = true: allowed with the phase law only")
+            raise InputError("the frequency-error law needs it above 0", field="frequency_integral_per_s", value=0)
+        InputError.raise_if(self.period_mean, "allowed with the phase law only", field="period_mean", value=True)
         if abs(math.sin(math.radians(self.phase_lag_deg))) < math.sin(math.radians(5.0)):
-            raise ValueError(
-                f"phase_lag_deg = {self.phase_lag_deg:g}: the frequency-error law allows -175 to -5 and 5 to 175"
+            raise InputError(
+                "the frequency-error law allows -175 to -5 and 5 to 175",
+                field="phase_lag_deg",
+                value=self.phase_lag_deg,
             )
         return self
 
@@ -126,8 +128,9 @@ class FrequencySettings(Settings):
                 f"it may reach {sample_rate_hz / 4.0:g} Hz"
             )
         if drive_mode_shape is None and self.frequency_law == "frequency-error":
-            raise ValueError(
-                "drive_mode_shape: the frequency-error law needs it, here or as specimen.drive_mode_shape of the bench"
+            raise InputError(
+                "the frequency-error law needs it, here or as specimen.drive_mode_shape of the bench",
+                field="drive_mode_shape",
             )
         out = np.zeros(1, FREQUENCY)
         out["law"] = LAWS[self.frequency_law]

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from controller.settings import Settings
 from vibrolock.compiled import Record, kernel
+from vibrolock.errors import InputError
 
 
 class LockState(IntEnum):
@@ -73,7 +74,7 @@ class LockRule(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.lost_deg <= self.locked_deg:
-            raise ValueError(f"lost_deg = {self.lost_deg:g}: allowed is above locked_deg = {self.locked_deg:g}")
+            raise InputError(field="lost_deg", value=self.lost_deg, allowed=f"above locked_deg = {self.locked_deg:g}")
         return self
 
     def build(self, smallest_force_n: float = 0.0, smallest_response: float = 0.0) -> np.ndarray:

@@ -13,6 +13,7 @@ from controller.frequency import GAINS, FrequencySettings
 from controller.law import LAW, HarmonicsTable
 from controller.lock import LockRule
 from controller.rest import RestSettings
+from vibrolock.errors import InputError
 
 
 class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorSettings, AmplitudeSettings):
@@ -24,12 +25,18 @@ class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorS
     @model_validator(mode="after")
     def _detector_suffices(self) -> Self:
         if self.detector == "sign" and self.phase_lag_deg != -90.0:
-            raise ValueError(
-                f"phase_lag_deg = {self.phase_lag_deg:g}: the sign detector knows phase resonance only, allowed is -90"
+            raise InputError(
+                "the sign detector knows phase resonance only",
+                field="phase_lag_deg",
+                value=self.phase_lag_deg,
+                allowed="-90",
             )
         if self.detector == "sign" and self.frequency_law == "frequency-error":
-            raise ValueError(
-                'detector = "sign": the frequency-error law needs amplitudes, allowed is two-phase or adaptive'
+            raise InputError(
+                "the frequency-error law needs amplitudes",
+                field="detector",
+                value="sign",
+                allowed="two-phase or adaptive",
             )
         return self
 
@@ -58,10 +65,11 @@ class PhaseLockedLoop(HarmonicsTable, FrequencySettings, RestSettings, DetectorS
             longest_s = longest_delay_s(crossover)
             if delay_s > longest_s:
                 given = ", ".join(f"{name} = {getattr(self, name):g}" for name in names)
-                raise ValueError(
-                    f"{given}: {1e3 * delay_s:.3g} ms from output to input may take "
-                    f"{math.degrees(delay_s * crossover):.0f} deg of its phase at {crossover:.3g} rad/s; allowed are "
-                    f"{LARGEST_TURN_DEG:g} deg, which is up to {1e3 * longest_s:.3g} ms, or smaller gains"
+                raise InputError(
+                    f"{1000.0 * delay_s:.3g} ms from output to input may take "
+                    f"{math.degrees(delay_s * crossover):.0f} deg of its phase at {crossover:.3g} rad/s",
+                    field=given,
+                    allowed=f"{LARGEST_TURN_DEG:g} deg, which is up to {1000.0 * longest_s:.3g} ms, or smaller gains",
                 )
 
     def longest_delay_s(self, amplitude_law: AmplitudeLaw) -> float:

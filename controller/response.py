@@ -9,6 +9,7 @@ from pydantic import Field
 from controller.primitives import log_proportional_integral, log_ratio, size, wrap
 from controller.settings import Settings
 from vibrolock.compiled import Record, kernel
+from vibrolock.errors import InputError
 
 PLANT_VARIES = 3.0  # factor by which the plant's gain may be off and is still followed
 
@@ -67,7 +68,7 @@ class ResponseSettings(Settings):
             return 0.0
         pole = complex(*self.plant_pole_rad_s)
         if not pole.real < 0.0:
-            raise ValueError(f"plant_pole_rad_s = {list(self.plant_pole_rad_s)}: allowed is a real part below 0")
+            raise InputError(field="plant_pole_rad_s", value=list(self.plant_pole_rad_s), allowed="a real part below 0")
         gain = self.response_integral_per_s / -pole
         return gain if self.response_loop == "complex" else gain.real
 

@@ -9,6 +9,7 @@ from controller.detector import phase_lag
 from controller.primitives import size, wrap
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel
+from vibrolock.errors import InputError
 
 REST = np.dtype([("gain", "f8"), ("share", "f8"), ("mode_shape_squared", "f8"), ("dt_s", "f8")])
 """Parameters of the estimate (one record).
@@ -35,8 +36,9 @@ class RestSettings(Settings):
     def build_rest(self, sample_rate_hz: float, drive_mode_shape: float | None) -> np.ndarray:
         """Return one record of `REST`; raise ValueError if the mode shape (kg^-1/2) is needed and missing."""
         if drive_mode_shape is None and self.rest_low_pass_rad_s > 0.0:
-            raise ValueError(
-                "drive_mode_shape: rest_low_pass_rad_s needs it, here or as specimen.drive_mode_shape of the bench"
+            raise InputError(
+                "rest_low_pass_rad_s needs it, here or as specimen.drive_mode_shape of the bench",
+                field="drive_mode_shape",
             )
         out = np.zeros(1, REST)
         out["gain"] = -math.expm1(-self.rest_low_pass_rad_s / sample_rate_hz)

@@ -50,22 +50,25 @@ class Backbone(Result):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", tuple(self.points))
-        if not self.points:
-            raise IdentificationError("points: a backbone needs at least one")
+        IdentificationError.raise_if(not self.points, "a backbone needs at least one", field="points")
         first = self.points[0]
         for number, point in enumerate(self.points):
             if point.channels != first.channels or point.harmonics.shape != first.harmonics.shape:
-                raise IdentificationError(f"points[{number}]: channels or harmonics differ from those of points[0]")
+                raise IdentificationError(
+                    "channels or harmonics differ from those of points[0]", field=f"points[{number}]"
+                )
         if self.drive_mode_shape is not None and not (np.isfinite(self.drive_mode_shape) and self.drive_mode_shape):
-            raise IdentificationError(f"drive_mode_shape: is {self.drive_mode_shape}, must be finite and not zero")
+            raise IdentificationError(
+                field="drive_mode_shape", value=self.drive_mode_shape, allowed="finite and not zero"
+            )
         std = self.drive_mode_shape_std
         if std is not None and not (np.isfinite(std) and std >= 0.0):
-            raise IdentificationError(f"drive_mode_shape_std: is {std}, allowed is 0 or above")
+            raise IdentificationError(field="drive_mode_shape_std", value=std, allowed="0 or above")
         for name, labels in (("directions", self.directions), ("repeats", self.repeats)):
             if labels and len(labels) != len(self.points):
-                raise IdentificationError(f"{name}: {len(labels)} given for {len(self.points)} points")
+                raise IdentificationError(f"{len(labels)} given for {len(self.points)} points", field=name)
         if unknown := set(self.directions) - {"up", "down"}:
-            raise IdentificationError(f"directions: '{sorted(unknown)[0]}' given, allowed are up and down")
+            raise IdentificationError(f"'{sorted(unknown)[0]}' given", field="directions", allowed="up and down")
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -95,7 +98,7 @@ class Backbone(Result):
     def select(self, keep: Sequence[bool]) -> "Backbone":
         """Return the backbone of the points where ``keep`` is true, with their labels."""
         if len(keep) != len(self.points):
-            raise IdentificationError(f"keep: {len(keep)} given for {len(self.points)} points")
+            raise IdentificationError(f"{len(keep)} given for {len(self.points)} points", field="keep")
         chosen = [index for index, kept in enumerate(keep) if kept]
         return replace(
             self,

@@ -51,16 +51,21 @@ class Channel:
             raise IdentificationError("channel name: is empty")
         if self.role not in get_args(Role):
             raise IdentificationError(
-                f"channel '{self.name}': role is '{self.role}', allowed are {', '.join(get_args(Role))}"
+                where=f"channel '{self.name}'", field="role", value=self.role, allowed=get_args(Role)
             )
         if self.role == "force" and self.unit not in _FORCE_UNITS:
             raise IdentificationError(
-                f"channel '{self.name}': unit is '{self.unit}', a force is given in N (V or 1 if there is no better unit)"
+                "a force is given in N (V or 1 if there is no better unit)",
+                where=f"channel '{self.name}'",
+                field="unit",
+                value=self.unit,
             )
         if self.role in ("drive", "response") and self.unit not in _MOTION_OF_UNIT:
             raise IdentificationError(
-                f"channel '{self.name}': unit is '{self.unit}', a motion is in m, m/s or m/s2 (V or 1 if there is no better "
-                "unit)"
+                "a motion is in m, m/s or m/s2 (V or 1 if there is no better unit)",
+                where=f"channel '{self.name}'",
+                field="unit",
+                value=self.unit,
             )
 
     @property
@@ -77,7 +82,7 @@ def find_role(channels: Sequence[Channel], role: Role) -> int:
     if len(found) != 1:
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in channels) or "none"
         raise IdentificationError(
-            f"channels: {len(found)} have the role '{role}', needs exactly one; channels: {names}"
+            f"{len(found)} have the role '{role}'", field="channels", allowed="exactly one", hint=f"channels: {names}"
         )
     return found[0]
 
@@ -97,7 +102,10 @@ def in_newtons(channels: Sequence[Channel], what: str) -> None:
             channel.role in ("drive", "response") and channel.unit in ("V", "1")
         ):
             raise IdentificationError(
-                f"channel '{channel.name}': unit is '{channel.unit}'; {what} needs a force in N and motions in m, m/s or m/s2"
+                f"{what} needs a force in N and motions in m, m/s or m/s2",
+                where=f"channel '{channel.name}'",
+                field="unit",
+                value=channel.unit,
             )
 
 
@@ -118,9 +126,11 @@ def chosen_rows(
         out = tuple(row for row in (*forces, *motions) if row not in into)
         if not out:
             names = ", ".join(f"{channel.name} ({channel.role})" for channel in channels)
-            raise IdentificationError(f"outputs: no channel is a motion, name them; channels are {names}")
+            raise IdentificationError(
+                "no channel is a motion, name them", field="outputs", hint=f"channels are {names}"
+            )
     if both := [channels[row].name for row in out if row in into]:
-        raise IdentificationError(f"outputs: {both[0]} is an input already")
+        raise IdentificationError(f"{both[0]} is an input already", field="outputs")
     return into, out
 
 
@@ -132,8 +142,7 @@ def _rows(channels: Sequence[Channel], what: str, wanted: Sequence[str]) -> tupl
         rows = rows or [row for row, channel in enumerate(channels) if channel.role == name]
         if not rows:
             names = ", ".join(channel.name for channel in channels)
-            raise IdentificationError(f"{what}: there is no channel {name}; channels are {names}")
+            raise IdentificationError(f"there is no channel {name}", field=what, hint=f"channels are {names}")
         found += [row for row in rows if row not in found]
-    if not found:
-        raise IdentificationError(f"{what}: none given, needs one channel at least")
+    IdentificationError.raise_if(not found, "none given", field=what, allowed="one channel at least")
     return tuple(found)

@@ -1,7 +1,7 @@
 """The error that this package raises if measurements or models cannot be used as given."""
 
-from vibrolock.errors import InvalidValueError
+from vibrolock.errors import InputError
 
 
-class IdentificationError(InvalidValueError):
+class IdentificationError(InputError):
     """Measurements, a mapping or a model are not usable as given."""

@@ -60,19 +60,17 @@ class FrequencyResponse(Result):
             object.__setattr__(self, name, array)
             if array.shape != self.frequency_hz.shape or not array.size:
                 raise IdentificationError(
-                    f"{name}: {array.size} values for {self.frequency_hz.size} frequencies, needs at least one of each"
+                    f"{array.size} values for {self.frequency_hz.size} frequencies",
+                    field=name,
+                    allowed="at least one of each",
                 )
             refused = array <= 0.0 if name == "frequency_hz" else array == 0.0
             if refused.any():
                 where = int(np.argmax(refused))
                 allowed = "be above zero" if name == "frequency_hz" else "not be zero"
-                raise IdentificationError(f"{name}: value at [{where}] is {array[where]}, must {allowed}")
-        if self.kind not in get_args(Motion):
-            raise IdentificationError(f"kind: is '{self.kind}', allowed are {', '.join(get_args(Motion))}")
-        if self.controlled not in get_args(Controlled):
-            raise IdentificationError(
-                f"controlled: is '{self.controlled}', allowed are {', '.join(get_args(Controlled))}"
-            )
+                raise IdentificationError(f"value at [{where}] is {array[where]}, must {allowed}", field=name)
+        IdentificationError.unless_one_of("kind", self.kind, get_args(Motion))
+        IdentificationError.unless_one_of("controlled", self.controlled, get_args(Controlled))
         positive("level", self.level)
 
     @property
@@ -107,8 +105,7 @@ def pack_frequency_responses(responses: Sequence[FrequencyResponse]) -> tuple[di
 
     The arrays hold the levels one after another; ``points_per_level`` gives the number of points of each.
     """
-    if not responses:
-        raise IdentificationError("responses: is empty, needs at least one level")
+    IdentificationError.raise_if(not responses, "is empty", field="responses", allowed="at least one level")
     arrays: dict[str, NDArray[Any]] = {
         name: np.concatenate([getattr(item, name) for item in responses])
         for name in ("frequency_hz", "force", "response")

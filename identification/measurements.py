@@ -74,16 +74,17 @@ class PeriodicVibration:
         object.__setattr__(self, "channels", tuple(self.channels))
         names = [channel.name for channel in self.channels]
         if len(set(names)) != len(names):
-            raise IdentificationError(f"channels: names are not unique ({', '.join(names)})")
+            raise IdentificationError(f"names are not unique ({', '.join(names)})", field="channels")
         find_role(self.channels, "force")
         find_role(self.channels, "drive")
         in_newtons(self.channels, "a periodic vibration")
         positive("frequency_hz", self.frequency_hz, "Hz")
-        if self.periods < 1:
-            raise IdentificationError(f"periods: is {self.periods}, needs at least 1")
+        IdentificationError.unless_at_least("periods", self.periods, 1)
         self._check("harmonics", np.complex128, 2)
         if self.harmonics.shape[1] < 2:
-            raise IdentificationError(f"harmonics: shape {self.harmonics.shape}, needs harmonics 0 and 1 at least")
+            raise IdentificationError(
+                f"shape {self.harmonics.shape}", field="harmonics", allowed="harmonics 0 and 1 at least"
+            )
         self._check("residual_rms", np.float64, 1)
         if self.drift is not None:
             self._check("drift", np.complex128, 1)
@@ -92,12 +93,12 @@ class PeriodicVibration:
                 continue
             self._check(name, dtype, 2)
             if (shape := getattr(self, name).shape) != self.harmonics.shape:
-                raise IdentificationError(f"{name}: shape {shape}, harmonics have {self.harmonics.shape}")
+                raise IdentificationError(f"shape {shape}, harmonics have {self.harmonics.shape}", field=name)
 
     def _check(self, name: str, dtype: type[np.generic], ndim: int) -> None:
         array = finite_array(name, getattr(self, name), dtype, ndim)
         if array.shape[0] != len(self.channels):
-            raise IdentificationError(f"{name}: shape {array.shape} for {len(self.channels)} channels")
+            raise IdentificationError(f"shape {array.shape} for {len(self.channels)} channels", field=name)
         object.__setattr__(self, name, array)
 
     def index(self, name: str) -> int:

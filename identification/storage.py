@@ -123,7 +123,7 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "
     """
     layout = _layout_of(kind)
     if not isinstance(attributes, Mapping):
-        raise IdentificationError(f"{_label(kind, where)}: is {attributes!r}, needs a mapping of fields")
+        raise IdentificationError(where=_label(kind, where), allowed="a mapping of fields")
     held, told = dict(arrays), dict(attributes)
     if layout.kinds is not None:
         kind = _concrete(kind, layout.kinds(), told.pop("kind", None))
@@ -132,7 +132,7 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "
             layout.upgrade(held, told)
     hints, known = _hints(kind), _fields(kind)
     if unknown := next((name for name in told if name not in hints), None):
-        raise IdentificationError(f"{_label(kind, where)}: {unknown!r} is missing or unknown")
+        raise IdentificationError(f"{unknown!r} is missing or unknown", where=_label(kind, where))
     values: dict[str, Any] = {}
     for one in known:
         name = one.name
@@ -145,7 +145,7 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "
             values[name] = getattr(values[part], name)
     for one in known:
         if one.name not in values and one.default is MISSING and one.default_factory is MISSING:
-            raise IdentificationError(f"{_label(kind, where)}: {one.name!r} is missing or unknown")
+            raise IdentificationError(f"{one.name!r} is missing or unknown", where=_label(kind, where))
     with _fitting(kind):
         return kind(**values)
 
@@ -158,7 +158,7 @@ def _fitting(kind: type) -> Iterator[None]:
     except IdentificationError:
         raise
     except (TypeError, ValueError, AttributeError, LookupError) as error:
-        raise IdentificationError(f"{_label(kind)}: does not fit ({error})") from None
+        raise IdentificationError(f"does not fit ({error})", where=_label(kind)) from None
 
 
 def _encoded(value: Any, name: str, group: str, arrays: dict[str, NDArray[Any]]) -> Any:
@@ -242,12 +242,12 @@ def _plain(hint: Any, value: Any, name: str, owner: _Owner) -> Any:
 
 
 def _misfit(owner: _Owner, name: str, value: Any) -> IdentificationError:
-    return IdentificationError(f"{_label(*owner)}: {name} is {value!r}, which does not fit")
+    return IdentificationError(f"{name} is {value!r}, which does not fit", where=_label(*owner))
 
 
 def _concrete(kind: type[T], kinds: Mapping[str, type], named: Any) -> type[T]:
     if named not in kinds:
-        raise IdentificationError(f"{_label(kind)}: kind is {named!r}, allowed are {', '.join(kinds)}")
+        raise IdentificationError(f"kind is {named!r}", where=_label(kind), allowed=kinds)
     return kinds[named]
 
 

@@ -20,9 +20,9 @@ def finite_array(name: str, values: ArrayLike, dtype: DTypeLike, ndim: int) -> N
     try:
         array = read_only(values, dtype)
     except (TypeError, ValueError) as error:
-        raise IdentificationError(f"{name}: not an array of numbers ({error})") from None
+        raise IdentificationError(f"not an array of numbers ({error})", field=name) from None
     if array.ndim != ndim:
-        raise IdentificationError(f"{name}: has {array.ndim} dimensions (shape {array.shape}), needs {ndim}")
+        raise IdentificationError(f"has {array.ndim} dimensions (shape {array.shape})", field=name, allowed=ndim)
     return finite(name, array)
 
 
@@ -30,7 +30,7 @@ def finite(name: str, array: NDArray[Any]) -> NDArray[Any]:
     """Return the array itself; raise `IdentificationError` unless all of it is finite."""
     if not np.all(np.isfinite(array)):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise IdentificationError(f"{name}: value at {list(index)} is {array[index]}, must be finite")
+        raise IdentificationError(f"value at {list(index)} is {array[index]}", field=name, allowed="finite")
     return array
 
 
@@ -38,7 +38,7 @@ def positive(name: str, value: float, unit: str = "") -> float:
     """Return ``value`` as a float; raise `IdentificationError` unless it is finite and above zero."""
     number = float(value)
     if not (np.isfinite(number) and number > 0.0):
-        raise IdentificationError(f"{name}: is {number:g}{unit and ' '}{unit}, must be finite and above zero")
+        raise IdentificationError(field=name, value=number, unit=unit, allowed="finite and above zero")
     return number
 
 
@@ -47,4 +47,4 @@ def one_specimen(**named: str) -> None:
     known = {what: specimen for what, specimen in named.items() if specimen}
     if len(set(known.values())) > 1:
         listed = ", ".join(f"{what} of '{specimen}'" for what, specimen in known.items())
-        raise IdentificationError(f"specimen: {listed}; they must belong to one specimen")
+        raise IdentificationError(listed, field="specimen", hint="they must belong to one specimen")

@@ -261,7 +261,7 @@ class DAQ(ABC):
 
         A driver overrides this if it has `adjustable`. It is called while the device is open and not running.
         """
-        raise DaqRefused(f"queue_blocks = {queue_blocks}: this driver has no queue that can be set")
+        raise DaqRefused("this driver has no queue that can be set", field="queue_blocks", value=queue_blocks)
 
     # What callers use; no driver overrides it
 
@@ -284,7 +284,7 @@ class DAQ(ABC):
             raise DaqRefused(f"the device is {self.state.value}; it can be started when it is open")
         largest = self.capabilities.largest_block
         if not 1 <= block <= largest:
-            raise DaqRefused(f"block = {block}: allowed is 1 to {largest} samples")
+            raise DaqRefused(field="block", value=block, allowed=f"1 to {largest} samples")
         self.block = block
         self.flags = np.zeros(block, np.uint16)
         self.put_out = np.full(block, math.nan)

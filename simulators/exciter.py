@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from simulators.part import Part, Positive
 from simulators.shipped import GEOMETRY, shaker_values
+from vibrolock.errors import InputError
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -90,12 +91,12 @@ class Exciter(Part):
     @model_validator(mode="after")
     def _limit_is_the_amplifiers(self) -> "Exciter":
         if self.amplifier == "current" and self.voltage_limit_v is not None:
-            raise ValueError(
-                f"voltage_limit_v = {self.voltage_limit_v!r}: allowed is current_limit_a, it holds a current"
+            raise InputError(
+                field="voltage_limit_v", value=self.voltage_limit_v, allowed="current_limit_a, it holds a current"
             )
         if self.amplifier == "voltage" and self.current_limit_a is not None:
-            raise ValueError(
-                f"current_limit_a = {self.current_limit_a!r}: allowed is voltage_limit_v, it holds a voltage"
+            raise InputError(
+                field="current_limit_a", value=self.current_limit_a, allowed="voltage_limit_v, it holds a voltage"
             )
         return self
 
@@ -152,8 +153,8 @@ class Stinger(Part):
         modulus = table.get("youngs_modulus_pa") or YOUNGS_MODULUS_PA.get(str(material))
         given = {"diameter_m": diameter, "length_m": length, "material": material or modulus}
         if missing := [key for key, value in given.items() if value is None]:
-            raise ValueError(
-                f"{missing[0]}: is missing; allowed is stiffness_n_m, or diameter_m, length_m and a material"
+            raise InputError(
+                "is missing", field=missing[0], allowed="stiffness_n_m, or diameter_m, length_m and a material"
             )
         numbers = [value for value in (modulus, diameter, length) if isinstance(value, int | float) and value > 0.0]
         if len(numbers) < 3:
@@ -163,5 +164,5 @@ class Stinger(Part):
     @model_validator(mode="after")
     def _one_material(self) -> "Stinger":
         if self.material is not None and self.youngs_modulus_pa is not None:
-            raise ValueError(f"youngs_modulus_pa = {self.youngs_modulus_pa:g}: allowed is this or material")
+            raise InputError(field="youngs_modulus_pa", value=self.youngs_modulus_pa, allowed="this or material")
         return self

@@ -15,6 +15,7 @@ from pydantic import Field
 
 from simulators.part import Part, Several
 from simulators.plant.assembly import LinearPlant
+from vibrolock.errors import InputError
 
 Relative = Annotated[float, Field(ge=0.0, le=0.3)]
 AboveMinusOne = Annotated[float, Field(gt=-1.0)]
@@ -105,7 +106,9 @@ def deviated(plant: LinearPlant, omega_rad_s: NDArray[np.float64], deviation: De
     moves = []
     for name, values in (("frequency", deviation.frequency), ("damping", deviation.damping)):
         if len(values) not in (0, m):
-            raise ValueError(f"deviation.{name}: has {len(values)} values, allowed is {m}, one per mode, or none")
+            raise InputError(
+                f"has {len(values)} values", field=f"deviation.{name}", allowed=f"{m}, one per mode, or none"
+            )
         moves.append(1.0 + (np.array(values) if values else np.zeros(m)))
     frequency, damping = moves
     stiffer = omega_rad_s**2 * (frequency**2 - 1.0)

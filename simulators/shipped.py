@@ -5,6 +5,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from vibrolock.errors import InputError
+
 
 def shipped_specimens() -> tuple[str, ...]:
     """Return the names of the shipped specimens."""
@@ -14,8 +16,7 @@ def shipped_specimens() -> tuple[str, ...]:
 
 def specimen_table(name: str) -> dict[str, Any]:
     """The whole table of a shipped specimen; `ValueError` names those there are."""
-    if name not in shipped_specimens():
-        raise ValueError(f"specimen = {name!r}: allowed is one of {', '.join(shipped_specimens())}")
+    InputError.unless_one_of("specimen", name, shipped_specimens())
     return tomllib.loads((files("simulators") / "specimens" / f"{name}.toml").read_text(encoding="utf-8"))
 
 
@@ -31,8 +32,7 @@ def shaker_descriptions() -> dict[str, str]:
 
 def shaker_values(name: str) -> dict[str, Any]:
     """The keys of an exciter that a shaker has; `ValueError` names the shakers there are."""
-    if name not in _shakers():
-        raise ValueError(f"shaker = {name!r}: allowed is one of {', '.join(_shakers())}")
+    InputError.unless_one_of("shaker", name, _shakers())
     return {key: value for key, value in _shakers()[name].items() if key not in ("description", "source")}
 
 

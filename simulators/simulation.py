@@ -10,6 +10,7 @@ from simulators.layout import Flag, RigArrays, RigState
 from simulators.plant.compilation import pad
 from simulators.stepping import run_observed
 from simulators.virtual_rig import VirtualRig
+from vibrolock.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class Simulation:
         """Drive with ``voltages`` [n] (V), one per sample; `ValueError` where they are not one row of numbers."""
         voltage_v = np.ascontiguousarray(voltages, dtype=np.float64)
         if voltage_v.ndim != 1 or voltage_v.size == 0:
-            raise ValueError(f"voltages: shape {voltage_v.shape}, allowed is one row of at least one number")
+            raise InputError(f"shape {voltage_v.shape}", field="voltages", allowed="one row of at least one number")
         first = int(self.state.counter[0])
         readings_v = np.empty((voltage_v.size, len(self.rig.sensors)))
         truth = np.empty((voltage_v.size, self._observe.shape[1]))

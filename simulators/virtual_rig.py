@@ -22,6 +22,7 @@ from simulators.sites.elements import Element, Magnet
 from simulators.sites.friction import FrictionSite
 from simulators.structures.structure import ModalStructure, Structure
 from simulators.wear import Wear
+from vibrolock.errors import InputError
 
 _OPEN, _LOOSE_N_M = 1e4, 1e-6
 
@@ -81,11 +82,10 @@ class VirtualRig(Part):
             self._check_points()
         names = self.channel_names
         if twice := [name for name in names if names.count(name) > 1]:
-            raise ValueError(f"sensors: two are named {twice[0]!r}, allowed is one of each name")
+            raise InputError(f"two are named {twice[0]!r}", field="sensors", allowed="one of each name")
         with computable("structure"):
             moves = np.any(self.structure.shape(self.stinger.at))
-        if not moves:
-            raise ValueError(f"stinger.at = {self.stinger.at!r}: allowed is a point that moves")
+        InputError.raise_if(not moves, field="stinger.at", value=self.stinger.at, allowed="a point that moves")
         with computable("structure, elements, friction, exciter, stinger"):
             check_elements(self.elements, self.plant)
             check_plant(self.plant)
@@ -103,14 +103,13 @@ class VirtualRig(Part):
         used |= {"stinger.at": self.stinger.at}
         used |= {f"sensors[{i}].at": sensor.at for i, sensor in enumerate(self.sensors) if sensor.at is not None}
         for path, at in used.items():
-            if at not in points:
-                raise ValueError(f"{path} = {at!r}: allowed is one of {', '.join(points)}")
+            InputError.unless_one_of(path, at, points)
         for i, joint in enumerate(self.friction):
             if isinstance(self.structure, ModalStructure) and joint.quantity != "deflection":
-                message = "allowed is 'deflection' where the modes are given"
-                raise ValueError(f"friction[{i}].quantity = {joint.quantity!r}: {message}")
+                allowed = "'deflection' where the modes are given"
+                raise InputError(field=f"friction[{i}].quantity", value=joint.quantity, allowed=allowed)
             if joint.relative_to_mode_1 and self.structure.shape(joint.at, joint.quantity)[0] == 0.0:
-                raise ValueError(f"friction[{i}].at = {joint.at!r}: allowed is a coordinate that mode 1 moves")
+                raise InputError(field=f"friction[{i}].at", value=joint.at, allowed="a coordinate that mode 1 moves")
 
     def _check_joints(self, plant: LinearPlant) -> None:
         """Raise `ValueError` if joints are stiffer than their structure, which would be unstable while they slip."""
@@ -121,28 +120,30 @@ class VirtualRig(Part):
         lowest = np.linalg.eigvalsh(slipping)[0]
         if lowest < -1e-9 * np.max(np.abs(plant.modal_stiffness)):
             total = sum(joint.stuck_stiffness for joint in self.friction)
-            raise ValueError(f"friction: stiffness {total:.6g} in all, allowed is less than the structure has there")
+            raise InputError(
+                f"stiffness {total:.6g} in all", field="friction", allowed="less than the structure has there"
+            )
 
     def _check_wear(self) -> None:
         """Raise `ValueError` if wear is for another number of modes, has steps below a sample, or ends in an invalid rig."""
         self._worn_deviation(0.0)
         if self.wear.every_s * self.converter.sample_rate_hz < 1.0:
             shortest_s = 1.0 / self.converter.sample_rate_hz
-            raise ValueError(f"wear.every_s = {self.wear.every_s:g}: allowed is from {shortest_s:g}, one sample")
+            raise InputError(field="wear.every_s", value=self.wear.every_s, allowed=f"from {shortest_s:g}, one sample")
         if self.wear.wears and self.wear.until_s is not None:
             worn = self._worn_plant(self.wear.until_s)
             try:
                 check_plant(worn)
                 self._check_joints(worn)
             except ValueError as error:
-                raise ValueError(f"wear.until_s = {self.wear.until_s:g}: then {error}, or less wear") from None
+                raise InputError(f"then {error}, or less wear", field="wear.until_s", value=self.wear.until_s) from None
 
     def _check_low_passes(self) -> None:
         half_hz = 0.5 * self.converter.internal_rate_hz
         for i, sensor in enumerate(self.sensors):
             if sensor.low_pass_hz >= half_hz:
-                message = f"allowed is below {half_hz:g}, half the internal rate"
-                raise ValueError(f"sensors[{i}].low_pass_hz = {sensor.low_pass_hz:g}: {message}")
+                allowed = f"below {half_hz:g}, half the internal rate"
+                raise InputError(field=f"sensors[{i}].low_pass_hz", value=sensor.low_pass_hz, allowed=allowed)
 
     def build(self, seed: int | None = None) -> tuple[RigArrays, RigState]:
         """Return the kernels' arrays and a state at rest; ``seed`` of noise and scatter replaces the rig's own."""

@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
 from simulators.scatter import Deviation
+from vibrolock.errors import InputError
 
 Rate = Annotated[float, Field(ge=-1.0, le=1.0)]
 
@@ -42,11 +43,11 @@ class Wear(Part):
             fastest = min(rates, default=0.0)
             if fastest >= 0.0:
                 continue
-            allowed = f"allowed is below {-1.0 / fastest:.6g}, where {name} = {fastest:g} reaches -100 %"
+            allowed = f"below {-1.0 / fastest:.6g}, where {name} = {fastest:g} reaches -100 %"
             if self.until_s is None:
-                raise ValueError(f"until_s: is missing, {allowed}")
+                raise InputError("is missing", field="until_s", allowed=allowed)
             if fastest * self.until_s <= -1.0:
-                raise ValueError(f"until_s = {self.until_s:g}: {allowed}")
+                raise InputError(field="until_s", value=self.until_s, allowed=allowed)
         return self
 
     @property
@@ -68,8 +69,7 @@ class Wear(Part):
 
         Raises `ValueError` for a time below 0, or if the rates are for another number of modes.
         """
-        if not 0.0 <= time_s < math.inf:
-            raise ValueError(f"time_s = {time_s:g}: allowed is from 0, finite")
+        InputError.raise_if(not 0.0 <= time_s < math.inf, field="time_s", value=time_s, allowed="from 0, finite")
         elapsed_s = time_s if self.until_s is None else min(time_s, self.until_s)
         frequency = _per_mode("frequency_per_s", self.frequency_per_s, n_mode)
         damping = _per_mode("damping_per_s", self.damping_per_s, n_mode)
@@ -79,7 +79,7 @@ class Wear(Part):
 def _per_mode(name: str, rates: tuple[float, ...], n_mode: int) -> NDArray[np.float64]:
     """Return one rate per mode [n_mode]."""
     if len(rates) not in (0, 1, n_mode):
-        raise ValueError(
-            f"wear.{name}: has {len(rates)} values, allowed is {n_mode}, one per mode, one for all, or none"
+        raise InputError(
+            f"has {len(rates)} values", field=f"wear.{name}", allowed=f"{n_mode}, one per mode, one for all, or none"
         )
     return np.broadcast_to(np.array(rates or (0.0,)), n_mode)

@@ -1,9 +1,27 @@
 """Errors that carry their parts: what was given where, what is allowed, and what to do."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
+from itertools import takewhile
 from typing import Any, Self
 
 from vibrolock.printable import one_line, shown
+
+_UNITS = {
+    "hz": "Hz",
+    "1_s": "1/s",
+    "rad_s": "rad/s",
+    "m_s2": "m/s^2",
+    "s": "s",
+    "v": "V",
+    "n": "N",
+    "m": "m",
+    "deg": "deg",
+}
+"""Units of the endings of names."""
+_UNIT_WORDS = frozenset(
+    ["1", "a", "c", "deg", "hz", "j", "kg", "m", "m2", "m3", "n", "pa", "per", "rad", "s", "s2", "s3", "v"]
+)
+"""Words of which an ending that names a unit consists; one that is not among `_UNITS` is not shown."""
 
 
 class StatedError(Exception):
@@ -23,9 +41,9 @@ class StatedError(Exception):
     value
         What was given; None if nothing was.
     unit
-        Unit of ``value``.
+        Unit of ``value``; by default the one in which the name of the field ends.
     allowed
-        Allowed values: a text, or the names of which one is allowed.
+        Allowed values: a text, or those of which one is allowed.
     hint
         What to do about it.
     further
@@ -39,25 +57,31 @@ class StatedError(Exception):
         field: str = "",
         value: Any = None,
         unit: str = "",
-        allowed: str | Iterable[object] = "",
+        allowed: object = "",
         hint: str = "",
         further: Sequence["StatedError | str"] = (),
     ) -> None:
         self.reason = " ".join(map(str, reason))
         self.where = str(where).removesuffix(": ")
-        self.field, self.unit, self.hint, self.further = field, unit, hint, tuple(further)
+        self.field, self.hint, self.further = field, hint, tuple(further)
         self.value = value.tolist() if hasattr(value, "tolist") else value
-        self.allowed = allowed if isinstance(allowed, str) else ", ".join(map(str, allowed))
-        super().__init__(self.line(f"`{field}`"))
+        self.unit = unit or (unit_of(field) if isinstance(self.value, int | float) else "")
+        self.allowed = (
+            ", ".join(map(str, allowed))
+            if isinstance(allowed, Iterable) and not isinstance(allowed, str)
+            else str(allowed)
+        )
+        super().__init__(self.line(lambda error: f"`{error.field}`"))
 
-    def line(self, field: str) -> str:
-        """Return the line of the error, with another name in place of its ``field``."""
-        value = "" if self.value is None else f"= {_number_or_shown(self.value)}{self.unit and ' '}{self.unit}"
-        subject = ": ".join(filter(None, (self.where, f"{field} {value}".strip() if self.field else value)))
+    def line(self, name: Callable[["StatedError"], str]) -> str:
+        """Return the line of the error, with another name in place of the field of each fault."""
+        value = "" if self.value is None else f"= {_number_or_shown(self.value)} {self.unit}".strip()
+        subject = ": ".join(filter(None, (self.where, f"{name(self)} {value}".strip() if self.field else value)))
         allowed = self.allowed and f"allowed: {self.allowed}"
         told = "; ".join(filter(None, (self.reason, allowed, self.hint)))
         joint = ": " if self.reason or self.value is None else "; "
-        return one_line("; ".join(map(str, (joint.join(filter(None, (subject, told))), *self.further))))
+        others = (one.line(name) if isinstance(one, StatedError) else one for one in self.further)
+        return one_line("; ".join((joint.join(filter(None, (subject, told))), *others)))
 
     @classmethod
     def of(
@@ -69,16 +93,23 @@ class StatedError(Exception):
         """
         if not isinstance(error, StatedError):
             return cls(error, where=where, field=within, further=further)
+        of_a_field = bool(error.field) or not error.where
         return cls(
             error.reason,
-            where=": ".join(filter(None, (str(where), error.where))),
-            field=".".join(filter(None, (within, error.field))),
+            where=": ".join(filter(None, (str(where), "" if of_a_field else within, error.where))),
+            field=".".join(filter(None, (within, error.field))) if of_a_field else "",
             value=error.value,
             unit=error.unit,
             allowed=error.allowed,
             hint=error.hint,
             further=(*error.further, *further),
         )
+
+    @classmethod
+    def raise_if(cls, wrong: object, *reason: object, **parts: Any) -> None:
+        """Raise the error with these parts if something is ``wrong``."""
+        if wrong:
+            raise cls(*reason, **parts)
 
     @classmethod
     def unless_one_of(cls, field: str, value: object, names: Collection[object]) -> None:
@@ -105,8 +136,15 @@ class StatedError(Exception):
             raise cls(field=field, value=value, unit=unit, allowed=f"above {low:g} {unit}".strip())
 
 
-class InvalidValueError(StatedError, ValueError):
+class InputError(StatedError, ValueError):
     """An argument or a setting has a value that is not allowed."""
+
+
+def unit_of(field: str) -> str:
+    """Return the unit in which the name of a field ends, such as ``Hz`` of ``levels_hz[3]``; empty without one."""
+    words = field.partition("[")[0].split("_") if field.endswith("]") else field.split("_")
+    ending = [*takewhile(_UNIT_WORDS.__contains__, reversed(words[1:]))]
+    return _UNITS.get("_".join(reversed(ending)), "")
 
 
 def at_least(low: float, unit: str = "") -> str:

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from controller.adaptive_filter import MOST_HARMONICS
 from controller.harmonics.records import HARMONICS, ORDERS
 from controller.settings import Settings
+from vibrolock.errors import InputError
 
 LARGEST_WANTED = 10.0
 SMALLEST_MARGIN_DEG = 35.0
@@ -56,17 +57,19 @@ class HarmonicsSettings(Settings):
         for name, orders in (("left_alone", self.left_alone), ("force_per_v", self.force_per_v)):
             for order in orders:
                 if not 2 <= order <= self.highest:
-                    raise ValueError(
-                        f"{name}: has harmonic {order}, allowed is 2 to {self.highest}, the loop's highest"
+                    raise InputError(
+                        f"has harmonic {order}", field=name, allowed=f"2 to {self.highest}, the loop's highest"
                     )
         for order, value in self.force_per_v.items():
             if not (math.isfinite(abs(complex(*value))) and value != (0.0, 0.0)):
-                raise ValueError(
-                    f"force_per_v: harmonic {order} = {list(value)}, allowed are finite numbers, not both 0"
+                raise InputError(
+                    f"harmonic {order} = {list(value)}", field="force_per_v", allowed="finite numbers, not both 0"
                 )
         for order in self.left_alone:
             if order in self.wanted:
-                raise ValueError(f"left_alone: has harmonic {order}, which wanted prescribes; allowed is one of them")
+                raise InputError(
+                    f"has harmonic {order}, which wanted prescribes", field="left_alone", allowed="one of them"
+                )
         return self
 
     @property
@@ -96,18 +99,21 @@ class HarmonicsSettings(Settings):
         turn = 2.0 * math.pi * highest_hz / sample_rate_hz
         at = f"at {highest_hz:g} Hz and {sample_rate_hz:g} samples/s"
         if self.highest * turn > HIGHEST_TURN:
-            raise ValueError(f"harmonics.highest = {self.highest}: allowed {at} is up to {int(HIGHEST_TURN / turn)}")
+            raise InputError(
+                f"allowed {at} is up to {int(HIGHEST_TURN / turn)}", field="harmonics.highest", value=self.highest
+            )
         if self.corner * turn * (2 * self.highest + 1) > 1.0:
             most = 1.0 / (turn * (2 * self.highest + 1))
-            raise ValueError(
-                f"harmonics.corner = {self.corner:g}: allowed {at} is up to {most:.2g} with H = {self.highest}"
+            raise InputError(
+                f"allowed {at} is up to {most:.2g} with H = {self.highest}", field="harmonics.corner", value=self.corner
             )
         margin = self.phase_margin_deg(turn * lead_samples)
         if margin < SMALLEST_MARGIN_DEG:
-            raise ValueError(
-                f"harmonics.integral = {self.integral:g}: its phase margin {at} is {margin:.0f} deg with {lead_samples:g} "
-                f"samples from output to input, allowed is at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks, or a "
-                "shorter queue"
+            raise InputError(
+                f"its phase margin {at} is {margin:.0f} deg with {lead_samples:g} samples from output to input",
+                field="harmonics.integral",
+                value=self.integral,
+                allowed=f"at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks, or a shorter queue",
             )
 
     def longest_delay_s(self, highest_hz: float) -> float:
@@ -133,11 +139,12 @@ def check_wanted(name: str, wanted: Mapping[int, tuple[float, float]], highest: 
     """Raise ValueError, naming ``name``, unless prescribed harmonics are from 2 to ``highest`` and their numbers possible."""
     for order, (ratio, phase_deg) in wanted.items():
         if not 2 <= order <= highest:
-            raise ValueError(f"{name}: has harmonic {order}, allowed is 2 to {highest}, the loop's highest")
+            raise InputError(f"has harmonic {order}", field=name, allowed=f"2 to {highest}, the loop's highest")
         if not (0.0 <= ratio <= LARGEST_WANTED and math.isfinite(phase_deg)):
-            raise ValueError(
-                f"{name}: harmonic {order} = [{ratio:g}, {phase_deg:g}], allowed is a ratio from 0 to {LARGEST_WANTED:g} "
-                "and a phase"
+            raise InputError(
+                f"harmonic {order} = [{ratio:g}, {phase_deg:g}]",
+                field=name,
+                allowed=f"a ratio from 0 to {LARGEST_WANTED:g} and a phase",
             )
 
 

@@ -14,6 +14,7 @@ from controller.tuning.plant import PlantModel
 from controller.tuning.stability import Margins, closed_loop_poles, margins, unstable_poles
 from controller.tuning.steps import settling_s, step_response
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 
 LEVEL_STEP = 0.3  # relative step, about that of a backbone with ten levels over a decade
 POOR_SENSITIVITY = 3.0
@@ -129,8 +130,7 @@ def assess(loop: ControlLoop, *, failed: Sequence[str] = (), notes: Sequence[str
 
 def worst(loop: ControlLoop, plants: Sequence[PlantModel]) -> Design:
     """Assess the laws on the worst of several plants: most unstable poles first, then highest peak of the sensitivity."""
-    if not plants:
-        raise ValueError("plants: none given, allowed is at least one")
+    InputError.raise_if(not plants, "none given", field="plants", allowed="at least one")
 
     def badness(plant: PlantModel) -> tuple[int, float]:
         there = replace(loop, plant=plant)

@@ -10,6 +10,7 @@ from controller.tuning.laws import ComplexResponseLaw, FrequencyErrorLaw, Linear
 from controller.tuning.loop import ControlLoop
 from controller.tuning.plant import PlantModel
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 
 
 def exact_phase_law(
@@ -91,10 +92,9 @@ def _best(
     """Return the law with the largest ki over all ratios kp/ki, by a grid and a bounded scalar search."""
     from scipy.optimize import minimize_scalar
 
-    if not plants:
-        raise ValueError("plants: none given, allowed is at least one")
+    InputError.raise_if(not plants, "none given", field="plants", allowed="at least one")
     if not 1.0 < sensitivity_peak <= 4.0:
-        raise ValueError(f"sensitivity_peak = {sensitivity_peak:g}: allowed is above 1, up to 4")
+        raise InputError(field="sensitivity_peak", value=sensitivity_peak, allowed="above 1, up to 4")
     omega = [frequencies_for(plant) for plant in plants]
     unit = [
         ControlLoop(plant, low_pass_rad_s, law_of(0.0, 1.0), amplitude_law, lag_deg).frequency_loop_gain(1j * w)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vibrolock.arrays import Float
+from vibrolock.errors import InputError
 
 HIGHEST, LOWEST = 1.0 / 5.0, 1.0 / 20.0  # of the frequency: above, it does not average a period; below, it is too slow
 
@@ -38,9 +39,12 @@ def low_pass_from_densities(
     of each signal has the variance ``N_0 w_LP/(2 A^2)``.
     """
     if not min(force_amplitude, acceleration_amplitude, omega_rad_s, lag_std_deg) > 0.0:
-        raise ValueError(
-            f"force_amplitude = {force_amplitude:g}, acceleration_amplitude = {acceleration_amplitude:g}, "
-            f"omega_rad_s = {omega_rad_s:g}, lag_std_deg = {lag_std_deg:g}: allowed are all above 0"
+        raise InputError(
+            f"acceleration_amplitude = {acceleration_amplitude:g}, omega_rad_s = {omega_rad_s:g}, "
+            f"lag_std_deg = {lag_std_deg:g}",
+            field="force_amplitude",
+            value=force_amplitude,
+            allowed="all above 0",
         )
     per_w = 0.5 * (force_density / force_amplitude**2 + acceleration_density / acceleration_amplitude**2)
     wanted = math.radians(lag_std_deg) ** 2 / per_w if per_w > 0.0 else math.inf
@@ -66,7 +70,7 @@ def low_pass_from_noise(
     omega = (theta[-1] - theta[0]) / (theta.size - 1) * sample_rate_hz
     periods = (theta[-1] - theta[0]) / (2.0 * math.pi)
     if periods < 20.0:
-        raise ValueError(f"theta_rad: {periods:.1f} periods, allowed are at least 20")
+        raise InputError(f"{periods:.1f} periods", field="theta_rad", allowed="at least 20")
     drift = np.linspace(-1.0, 1.0, theta.size)
     waves = [wave(h * theta) for h in range(1, harmonics + 1) for wave in (np.cos, np.sin)]
     basis = np.stack([np.ones_like(theta), drift, *waves, waves[0] * drift, waves[1] * drift], axis=1)

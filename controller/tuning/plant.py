@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vibrolock.arrays import Complex
+from vibrolock.errors import InputError
 
 STANDARD_ERRORS = ("frequency_std_rad_s", "damping_ratio_std", "drive_shape_std", "force_v_n_std")
 
@@ -64,13 +65,13 @@ class PlantModel:
     def __post_init__(self) -> None:
         for name in ("frequency_rad_s", "damping_ratio", "drive_shape", "centre_rad_s", "sample_rate_hz"):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} = {getattr(self, name):g}: allowed is above 0")
+                raise InputError(field=name, value=getattr(self, name), allowed="above 0")
         for name in STANDARD_ERRORS:
             std = getattr(self, name)
             if std is not None and not 0.0 <= std < math.inf:
-                raise ValueError(f"{name} = {std:g}: allowed is 0 or more")
+                raise InputError(field=name, value=std, allowed="0 or more")
         if not 0.0 <= self.latency_samples < math.inf:
-            raise ValueError(f"latency_samples = {self.latency_samples:g}: allowed is 0 or more")
+            raise InputError(field="latency_samples", value=self.latency_samples, allowed="0 or more")
 
     @property
     def delay_s(self) -> float:
@@ -134,8 +135,7 @@ class PlantModel:
         """
         from scipy.optimize import brentq
 
-        if not -180.0 < lag_deg < 0.0:
-            raise ValueError(f"lag_deg = {lag_deg:g}: allowed is between -180 and 0")
+        InputError.raise_if(not -180.0 < lag_deg < 0.0, field="lag_deg", value=lag_deg, allowed="between -180 and 0")
         turn = cmath.exp(1j * math.radians(lag_deg))
 
         def error(omega: float) -> float:
@@ -148,7 +148,7 @@ class PlantModel:
             low, high = max(guess - width, 1e-3 * self.frequency_rad_s), guess + width
             if error(low) > 0.0 > error(high) and error(low) - error(high) < math.pi:
                 return float(brentq(error, low, high, xtol=1e-12 * guess, rtol=1e-14))
-        raise ValueError(f"lag_deg = {lag_deg:g}: the accelerance of this plant does not have it near the mode")
+        raise InputError("the accelerance of this plant does not have it near the mode", field="lag_deg", value=lag_deg)
 
     def volts_per_newton(self, lag_deg: float = -90.0) -> float:
         """Return the voltage (peak) for one newton of force (peak) at the frequency with this lag."""
@@ -190,14 +190,14 @@ class PlantModel:
         """
         names = {f.name for f in fields(cls)}
         if wrong := sorted(names.symmetric_difference(table) - (set(STANDARD_ERRORS) - set(table))):
-            raise ValueError(f"plant.{wrong[0]}: {'missing' if wrong[0] in names else 'not known'}")
+            raise InputError("missing" if wrong[0] in names else "not known", field=f"plant.{wrong[0]}")
         lengths = {"residual_per_kg": 2, "force_v_n": 4, "acceleration_v_s2_m": 4, "band_hz": 2}
         values: dict[str, Any] = {}
         for name, value in table.items():
             numbers = np.asarray(value, dtype=float)
             shape = (lengths[name],) if name in lengths else ()
             if numbers.shape != shape or not np.all(np.isfinite(numbers)):
-                raise ValueError(f"plant.{name} = {value}: allowed is {shape or 'one'} finite number(s)")
+                raise InputError(field=f"plant.{name}", value=value, allowed=f"{shape or 'one'} finite number(s)")
             values[name] = tuple(map(float, numbers)) if shape else float(numbers)
         return cls(**values)
 

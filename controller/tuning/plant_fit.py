@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from controller.tuning.plant_errors import parameter_covariance
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 
 NO_RESONANCE = "force_per_v, acceleration_per_v: their ratio shows no damped resonance inside the band"
 UNRESOLVED = 3.0  # lines: width of a resonance below which its damping cannot be told from noise
@@ -148,14 +149,14 @@ def _checked(frequency_hz: ArrayLike, force: ArrayLike, acceleration: ArrayLike)
     h_f, h_a = np.asarray(force, np.complex128), np.asarray(acceleration, np.complex128)
     if frequency.ndim != 1 or h_f.shape != frequency.shape or h_a.shape != frequency.shape:
         shapes = f"{frequency.shape}, {h_f.shape} and {h_a.shape}"
-        raise ValueError(
-            f"frequency_hz, force_per_v, acceleration_per_v: shapes {shapes}, allowed are three equal rows"
+        raise InputError(
+            f"shapes {shapes}", field="frequency_hz, force_per_v, acceleration_per_v", allowed="three equal rows"
         )
     if frequency.size < 20:
-        raise ValueError(f"frequency_hz: {frequency.size} lines, allowed are at least 20 around the mode")
+        raise InputError(f"{frequency.size} lines", field="frequency_hz", allowed="at least 20 around the mode")
     if not (np.all(np.isfinite(h_f)) and np.all(np.isfinite(h_a)) and np.all(frequency > 0.0)):
-        raise ValueError(
-            "frequency_hz, force_per_v, acceleration_per_v: allowed are finite numbers, frequencies above 0"
+        raise InputError(
+            field="frequency_hz, force_per_v, acceleration_per_v", allowed="finite numbers, frequencies above 0"
         )
     return frequency, h_f, h_a
 
@@ -165,7 +166,7 @@ def _checked_covariance(covariance: ArrayLike | None, lines: int) -> Complex | N
         return None
     found = np.asarray(covariance, np.complex128)
     if found.shape != (lines, 2, 2) or not np.all(np.isfinite(found)):
-        raise ValueError(f"covariance: shape {found.shape}, allowed are finite numbers of shape {(lines, 2, 2)}")
+        raise InputError(f"shape {found.shape}", field="covariance", allowed=f"finite numbers of shape {(lines, 2, 2)}")
     return found
 
 
@@ -230,9 +231,9 @@ def _start(s: Complex, h_f: Complex, h_a: Complex) -> tuple[float, Float]:
     columns = np.stack([z**2 / (z**2 + c * z + k), np.ones_like(z), z**2], axis=1) * np.abs(h_f)[:, None]
     shape_squared, lower, upper = _real_least_squares(columns, y * np.abs(h_f))
     if shape_squared <= 0.0:
-        raise ValueError(
-            "force_per_v, acceleration_per_v: the resonance pulls instead of pushing (phi_d^2 < 0); "
-            "check the polarity of force and acceleration"
+        raise InputError(
+            "the resonance pulls instead of pushing (phi_d^2 < 0); check the polarity of force and acceleration",
+            field="force_per_v, acceleration_per_v",
         )
     columns = np.stack([*(h_f * z**power for power in range(4)), *(h_a * z**power for power in range(-2, 2))], axis=1)
     exciter = _real_least_squares(columns, np.ones_like(z))

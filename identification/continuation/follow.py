@@ -59,13 +59,13 @@ def continued(
     """
     allowed, z = steps or Steps(), np.array(finite_array("unknowns", unknowns, np.float64, 1))
     if not lowest <= parameter <= highest:
-        raise IdentificationError(f"parameter: begins at {parameter:g}, allowed is {lowest:g} to {highest:g}")
+        raise IdentificationError(f"begins at {parameter:g}", field="parameter", allowed=f"{lowest:g} to {highest:g}")
     size = np.broadcast_to(np.asarray(scale, dtype=float), z.shape)
     if not (np.all(size > 0.0) and np.all(np.isfinite(size))):
-        raise IdentificationError("scale: needs finite values above zero")
+        raise IdentificationError(field="scale", allowed="finite values above zero")
     begin = solved(system, z, parameter, scale=size, steps=allowed)
     if begin is None:
-        raise IdentificationError(f"unknowns: no solution found near them at the parameter {parameter:g}")
+        raise IdentificationError(f"no solution found near them at the parameter {parameter:g}", field="unknowns")
     walk = Walk(system, np.append(size, positive("parameter_scale", parameter_scale)), allowed)
     first = walk.first(np.append(begin, parameter), direction)
     found, turns, length = [first], list[tuple[int, Float]](), allowed.first

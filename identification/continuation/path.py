@@ -46,8 +46,7 @@ class Steps:
     def __post_init__(self) -> None:
         for name in ("first", "smallest", "largest", "angle_deg", "tolerance"):
             positive(name, getattr(self, name))
-        if self.iterations < 1:
-            raise IdentificationError(f"iterations: is {self.iterations}, needs at least 1")
+        IdentificationError.unless_at_least("iterations", self.iterations, 1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -57,7 +57,7 @@ class Walk:
         along[-1] = np.copysign(1.0, direction)
         tangent = self._tangent(v, units, along)
         if tangent is None:
-            raise IdentificationError(f"parameter: the curve turns back just where it begins, at {v[-1]:g}")
+            raise IdentificationError(f"the curve turns back just where it begins, at {v[-1]:g}", field="parameter")
         return Point(v, units, tangent)
 
     def _tangent(self, v: Float, units: Float, along: Float) -> Float | None:

@@ -97,13 +97,14 @@ def decay_backbone(
     part = data[:, round(begin_s * rate_hz) : last]
     if part.shape[1] < _FEWEST_SAMPLES:
         raise IdentificationError(
-            f"start_s, stop_s: {part.shape[1]} samples from {begin_s:g} s on, where the decay begins, to its end; "
-            f"needs {_FEWEST_SAMPLES} at least"
+            f"{part.shape[1]} samples from {begin_s:g} s on, where the decay begins, to its end",
+            field="start_s, stop_s",
+            allowed=f"{_FEWEST_SAMPLES} at least",
         )
     candidates, notes = separated(part[motions], rate_hz, near)
     if drive_mode_shape is not None and len(candidates) > 1:
         raise IdentificationError(
-            f"drive_mode_shape: is that of one mode, the decay has {len(candidates)}; name one by `near_hz`"
+            f"is that of one mode, the decay has {len(candidates)}; name one by `near_hz`", field="drive_mode_shape"
         )
     record = _Record(part, channels, motions, force, rate_hz, begin_s, certain)
     if force is not None and drive_mode_shape is not None:
@@ -122,15 +123,16 @@ def decay_backbone(
 def _check(data: Float, channels: tuple[Channel, ...], number: int, harmonics: int, shape: float | None) -> None:
     if data.shape[0] != len(channels):
         raise IdentificationError(
-            f"samples: shape {data.shape} for {len(channels)} channels, needs one row per channel"
+            f"shape {data.shape} for {len(channels)} channels", field="samples", allowed="one row per channel"
         )
     if not any(channel.role in ("drive", "response") for channel in channels):
-        raise IdentificationError("channels: none is a motion (role drive or response), a decay needs at least one")
+        raise IdentificationError(
+            "none is a motion (role drive or response), a decay needs at least one", field="channels"
+        )
     for name, value in (("number", number), ("harmonics", harmonics)):
-        if value < 1:
-            raise IdentificationError(f"{name}: is {value}, needs at least 1")
+        IdentificationError.unless_at_least(name, value, 1)
     if shape is not None and not (np.isfinite(shape) and shape):
-        raise IdentificationError(f"drive_mode_shape: is {shape}, must be finite and not zero")
+        raise IdentificationError(field="drive_mode_shape", value=shape, allowed="finite and not zero")
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +158,9 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
     fastest = float(np.max(np.diff(theta)))
     if 2.0 * np.pi / fastest < _MIN_SAMPLES_PER_PERIOD:
         raise IdentificationError(
-            f"samples: {2.0 * np.pi / fastest:.2f} samples per period of the mode at {candidate.track.start_hz:.4g} Hz, needs "
-            f"{_MIN_SAMPLES_PER_PERIOD:g}"
+            f"{2.0 * np.pi / fastest:.2f} samples per period of the mode at {candidate.track.start_hz:.4g} Hz",
+            field="samples",
+            allowed=f"{_MIN_SAMPLES_PER_PERIOD:g}",
         )
     found = demodulated(theta, record.data, record.rate_hz, periods)
     variance = noise_variance(theta, record.data, periods)
@@ -169,8 +172,10 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
     if stop - start < _FEWEST_INSTANTS:
         lasting = max(0, stop - start) * periods // 2
         raise IdentificationError(
-            f"samples: the mode at {candidate.track.start_hz:.4g} Hz is above the noise for {lasting} periods of its decay, "
-            f"beside the window of {4 * periods}; needs {_FEWEST_INSTANTS * periods // 2}"
+            f"the mode at {candidate.track.start_hz:.4g} Hz is above the noise for {lasting} periods of its "
+            f"decay, beside the window of {4 * periods}",
+            field="samples",
+            allowed=f"{_FEWEST_INSTANTS * periods // 2}",
         )
     kept = slice(start, stop)
     seen = Demodulated(

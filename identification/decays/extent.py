@@ -35,11 +35,11 @@ def beginning_s(
     length_s = data.shape[1] / rate_hz
     if start_s is not None:
         if not 0.0 <= start_s < length_s:
-            raise IdentificationError(f"start_s: is {start_s:g} s, the record goes from 0 to {length_s:.4g} s")
+            raise IdentificationError(f"the record goes from 0 to {length_s:.4g} s", field="start_s", value=start_s)
         return start_s, True
     moving = data[list(motions)]
     if not np.any(moving.std(axis=1) > 0.0):
-        raise IdentificationError("samples: no motion channel moves, there is no decay")
+        raise IdentificationError("no motion channel moves, there is no decay", field="samples")
     period_s = 1.0 / _strongest_hz(moving, rate_hz)
     by_motion = _last_large(moving, rate_hz, period_s)
     by_force = None if force is None else _force_end(data[force], rate_hz)

@@ -66,7 +66,7 @@ def fitted_levels(series: Series, number: int, order: int) -> LevelFits:
     """
     envelope = _envelope(series)
     if not envelope[0] > envelope[-1]:
-        raise IdentificationError("samples: the vibration does not decay; give `start_s` and `stop_s`")
+        raise IdentificationError("the vibration does not decay", field="samples", hint="give `start_s` and `stop_s`")
     levels = np.linspace(envelope[0], envelope[-1], number + 2)[1:-1]
     falling = np.minimum.accumulate(envelope)
     centres = np.array([np.interp(-level, -falling, series.seen.at_s) for level in levels])
@@ -75,13 +75,14 @@ def fitted_levels(series: Series, number: int, order: int) -> LevelFits:
     least = cost.min(axis=0)
     if not np.isfinite(least).any():
         raise IdentificationError(
-            "samples: the decay is too short for a fit at any level; record it longer, or from a higher level"
+            "the decay is too short for a fit at any level; record it longer, or from a higher level", field="samples"
         )
     keep = np.flatnonzero(least < _WORST)
     if not keep.size:
         raise IdentificationError(
-            f"samples: the noise leaves the damping uncertain by {100.0 * float(least.min()):.0f} % at every level; record "
-            "from a higher level"
+            f"the noise leaves the damping uncertain by {100.0 * float(least.min()):.0f} % at every level; "
+            "record from a higher level",
+            field="samples",
         )
     best = cost.argmin(axis=0)
     names = [entry.name for entry in fields(LevelFits)]

@@ -123,15 +123,16 @@ class DecayBackbone(Result):
     notes: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        if not self.modes:
-            raise IdentificationError("modes: a decay needs at least one")
+        IdentificationError.raise_if(not self.modes, "a decay needs at least one", field="modes")
 
     def mode(self, near_hz: float | None = None) -> DecayMode:
         """Return the mode nearest to a frequency; without one, the only mode there is."""
         if near_hz is None:
             if len(self.modes) > 1:
                 listed = ", ".join(f"{mode.modal_frequency_hz[-1]:.4g} Hz" for mode in self.modes)
-                raise IdentificationError(f"near_hz: the decay has {len(self.modes)} modes ({listed}); name one")
+                raise IdentificationError(
+                    f"the decay has {len(self.modes)} modes ({listed})", field="near_hz", hint="name one"
+                )
             return self.modes[0]
         return min(self.modes, key=lambda mode: abs(float(mode.modal_frequency_hz[-1]) - near_hz))
 

@@ -61,24 +61,25 @@ def separated(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> t
             continue
         periods, why = _filter(one, found)
         if periods is None and one.asked:
-            raise IdentificationError(f"near_hz: {why}")
+            raise IdentificationError(why, field="near_hz")
         if periods is None:
             notes.append(f"not evaluated: {why}")
             continue
         track = improved(one.track, data[one.row], rate_hz, periods)
         if not _above_noise(data[one.row], track, rate_hz, periods):
             if one.asked:
-                raise IdentificationError(f"near_hz: the vibration at {one.middle_hz:.4g} Hz is not above the noise")
+                raise IdentificationError(
+                    f"the vibration at {one.middle_hz:.4g} Hz is not above the noise", field="near_hz"
+                )
             continue
         if any(one is not other and other.track.holds(track.start_hz) for other in found):
             why = f"the vibration at {one.middle_hz:.4g} Hz leads to that of a neighbour"
-            if one.asked:
-                raise IdentificationError(f"near_hz: {why}")
+            IdentificationError.raise_if(one.asked, why, field="near_hz")
             continue
         chosen.append(Candidate(track, periods))
     if not chosen:
         raise IdentificationError(
-            "samples: " + ("; ".join(notes) or "no mode stands out of the noise; name one by `near_hz`")
+            "; ".join(notes) or "no mode stands out of the noise; name one by `near_hz`", field="samples"
         )
     return chosen, tuple(notes)
 
@@ -91,15 +92,19 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
     harmonics: list[Track] = []
     for near in near_hz or ():
         if near >= 0.5 * rate_hz:
-            raise IdentificationError(f"near_hz: is {near:g} Hz, the spectrum ends at {0.5 * rate_hz:g} Hz")
+            raise IdentificationError(f"the spectrum ends at {0.5 * rate_hz:g} Hz", field="near_hz", value=near)
         around = peaks[np.abs(peaks / near - 1.0) < _NAMED_WITHIN] if peaks.size else peaks
         at = float(around[np.argmin(np.abs(around - near))]) if around.size else near
         new = _followed(data, rate_hz, at, asked=True)
         if new is None:
             listed = ", ".join(f"{peak:.4g}" for peak in peaks[:_MOST_MODES]) or "none"
-            raise IdentificationError(f"near_hz: no vibration near {near:g} Hz; peaks of the spectrum, Hz: {listed}")
+            raise IdentificationError(
+                f"no vibration near {near:g} Hz", field="near_hz", hint=f"peaks of the spectrum, Hz: {listed}"
+            )
         if any(other.track.holds(new.track.start_hz) for other in found):
-            raise IdentificationError(f"near_hz: {near:g} Hz leads to a mode that is named already, each one once")
+            raise IdentificationError(
+                f"{near:g} Hz leads to a mode that is named already, each one once", field="near_hz"
+            )
         found.append(new)
     for peak in peaks:
         if len(found) >= _MOST_MODES or any(other.holds(peak) for other in (*(one.track for one in found), *harmonics)):

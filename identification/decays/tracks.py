@@ -112,8 +112,9 @@ def ridge(signal: Float, rate_hz: float, near_hz: float) -> Ridge | None:
     lengths = [length for length in lengths if 4 * length <= signal.size] or [signal.size // 3]
     if lengths[0] < _FEWEST_PERIODS * rate_hz / near_hz:
         raise IdentificationError(
-            f"samples: {signal.size} samples of the decay are too few periods at {near_hz:g} Hz, "
-            f"needs {3 * _FEWEST_PERIODS:g}"
+            f"{signal.size} samples of the decay are too few periods at {near_hz:g} Hz",
+            field="samples",
+            allowed=f"{3 * _FEWEST_PERIODS:g}",
         )
     best, largest = None, 0.0
     for length in lengths:

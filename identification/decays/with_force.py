@@ -100,8 +100,9 @@ def decay_with_force(
     keep = np.flatnonzero(cost.min(axis=0) < _WORST)
     if not keep.size:
         raise IdentificationError(
-            "samples: the noise and the exciter leave the damping unknown at every level; record from a higher level, or take "
-            "the exciter off"
+            "the noise and the exciter leave the damping unknown at every level; record from a higher level, "
+            "or take the exciter off",
+            field="samples",
         )
     best = cost.argmin(axis=0)
     chosen = [found for n in keep if (found := tables[best[n]][n]) is not None]
@@ -120,7 +121,7 @@ def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -
     if stop_s is not None:
         rest = rest.select(rest.time_s <= stop_s)
     if rest.time_s.size < _FEWEST_INSTANTS:
-        raise IdentificationError(f"start_s: {rest.time_s.size} instants of the slow flow after {start_s:g} s")
+        raise IdentificationError(f"{rest.time_s.size} instants of the slow flow after {start_s:g} s", field="start_s")
     size = rest.amplitude_m
     early = slice(0, _FEWEST_INSTANTS)
     decay_1_s, omega = (float(np.median(np.abs(part[early]))) for part in (rest.growth_1_s, rest.rate_1_s))
@@ -129,7 +130,9 @@ def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -
     count = int(below[0]) if below.size else size.size
     if count < _FEWEST_INSTANTS:
         raise IdentificationError(
-            f"samples: the decay is above the noise for {count} instants of the slow flow, needs {_FEWEST_INSTANTS}"
+            f"the decay is above the noise for {count} instants of the slow flow",
+            field="samples",
+            allowed=_FEWEST_INSTANTS,
         )
     return rest.select(np.arange(size.size) < count)
 

@@ -45,7 +45,7 @@ def drive_point(
     row, output = driven_rows(model)
     low = default_hz() if lowest_hz is None else positive("lowest_hz", lowest_hz, "Hz")
     if low >= _HIGHEST * rate_hz:
-        raise IdentificationError(f"lowest_hz: is {low:g} Hz, must be well below half of {rate_hz:g} Hz")
+        raise IdentificationError(field="lowest_hz", value=low, allowed=f"well below half of {rate_hz:g} Hz")
     return DrivePoint(v, row, output, MOTION_ORDER[model.outputs[output].motion], low)
 
 
@@ -57,12 +57,13 @@ def driven_rows(model: Driven) -> tuple[int, int]:
     forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
     if len(forces) != 1:
         raise IdentificationError(
-            f"model: has {len(forces)} forces among its inputs, needs one, which the exciter makes"
+            f"has {len(forces)} forces among its inputs", field="model", allowed="one, which the exciter makes"
         )
     others = [channel.name for row, channel in enumerate(model.inputs) if row != forces[0]]
     if others:
         raise IdentificationError(
-            f"model: has inputs beside its force ({', '.join(others)}), whose values a run with an exciter does not know; "
-            "needs a model of the force alone"
+            f"has inputs beside its force ({', '.join(others)}), whose values a run with an exciter does not know",
+            field="model",
+            allowed="a model of the force alone",
         )
     return forces[0], find_role(model.outputs, "drive")

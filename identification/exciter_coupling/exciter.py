@@ -66,10 +66,10 @@ class VoltagePath:
 
     def __post_init__(self) -> None:
         if not self.sample_rate_hz > 0.0:
-            raise IdentificationError(f"sample_rate_hz: is {self.sample_rate_hz:g} Hz, must be above zero")
+            raise IdentificationError(field="sample_rate_hz", value=self.sample_rate_hz, allowed="above zero")
         for name in ("delay_s", "dispersion_s3", "coupling_hz"):
             if not np.isfinite(getattr(self, name)):
-                raise IdentificationError(f"{name}: is {getattr(self, name):g}, must be finite")
+                raise IdentificationError(field=name, value=getattr(self, name), allowed="finite")
 
     def factor(self, frequency_hz: ArrayLike) -> Complex:
         """complex, like ``frequency_hz`` (Hz, above zero): amplitude at the amplifier over the recorded one."""
@@ -104,7 +104,7 @@ class ExciterLines:
             object.__setattr__(self, name, finite_array(name, getattr(self, name), kind, 1))
             if getattr(self, name).shape != self.frequency_hz.shape:
                 raise IdentificationError(
-                    f"{name}: {getattr(self, name).size} values for {self.frequency_hz.size} lines"
+                    f"{getattr(self, name).size} values for {self.frequency_hz.size} lines", field=name
                 )
 
 
@@ -115,7 +115,10 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
     values = arrays.pop("values")
     if values.size != len(PARAMETERS):
         raise IdentificationError(
-            f"exciter: has {values.size} parameters, needs {len(PARAMETERS)} ({', '.join(PARAMETERS)}); identify it anew"
+            f"has {values.size} parameters",
+            field="exciter",
+            allowed=f"{len(PARAMETERS)} ({', '.join(PARAMETERS)})",
+            hint="identify it anew",
         )
     for names, numbers in (
         (PARAMETERS, values),
@@ -187,13 +190,13 @@ class Exciter(Result):
         object.__setattr__(self, "notes", tuple(self.notes))
         for name in PARAMETERS:
             if not np.isfinite(getattr(self, name)):
-                raise IdentificationError(f"{name}: is {getattr(self, name):g}, must be finite")
+                raise IdentificationError(field=name, value=getattr(self, name), allowed="finite")
         if self.force_per_volt_n_v == 0.0:
-            raise IdentificationError("force_per_volt_n_v: is 0, must not be zero")
+            raise IdentificationError("must not be zero", field="force_per_volt_n_v", value=0)
         size = len(PARAMETERS)
         covariance = np.full((size, size), np.nan) if self.covariance is None else np.array(self.covariance, float)
         if covariance.shape != (size, size):
-            raise IdentificationError(f"covariance: shape {covariance.shape}, needs {(size, size)}")
+            raise IdentificationError(f"shape {covariance.shape}", field="covariance", allowed=f"{(size, size)}")
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
 

@@ -146,8 +146,11 @@ def _refuse_unphysical(values: Float) -> None:
     for name, value in found.items():
         if value <= 0.0:
             raise IdentificationError(
-                f"{name}: {value:.3g} fits best, must be above zero; widen the band, from below to above the resonance of "
-                "the suspension, and check the polarity of force and drive channel"
+                f"{value:.3g} fits best",
+                field=name,
+                allowed="above zero",
+                hint="widen the band, from below to above the resonance of the suspension, and check the polarity of "
+                "force and drive channel",
             )
 
 
@@ -224,12 +227,12 @@ def _lines(
     used = spectra.excited & (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high) & (spectra.frequency_hz > 0)
     if np.count_nonzero(used) < _FEWEST_LINES:
         raise IdentificationError(
-            f"lowest_hz, highest_hz: {np.count_nonzero(used)} excited lines in {low:g} to {high:g} Hz, needs at least "
-            f"{_FEWEST_LINES}"
+            f"{np.count_nonzero(used)} excited lines in {low:g} to {high:g} Hz",
+            field="lowest_hz, highest_hz",
+            allowed=f"at least {_FEWEST_LINES}",
         )
     periods = spectra.spectra.shape[1]
-    if periods < 2:
-        raise IdentificationError("spectra: has 1 period, needs at least 2 to tell the noise")
+    IdentificationError.raise_if(periods < 2, "has 1 period", field="spectra", allowed="at least 2 to tell the noise")
     drive = find_role(spectra.channels, "drive")
     rows = [find_role(spectra.channels, "force"), drive, spectra.index(voltage)]
     frequency = spectra.frequency_hz[used]
@@ -237,7 +240,7 @@ def _lines(
     signals[:, :, 1] *= (2j * np.pi * frequency) ** (2 - MOTION_ORDER[spectra.channels[drive].motion])
     mean = signals.mean(axis=1)
     if np.any(mean[:, 2] == 0.0):
-        raise IdentificationError(f"{voltage}: is zero at an excited line; is it the output that was played?")
+        raise IdentificationError("is zero at an excited line", field=voltage, hint="is it the output that was played?")
     scatter = signals - mean[:, None]
     noise = np.einsum("rpik,rpjk->kij", scatter, np.conj(scatter)) / ((periods - 1) * signals.shape[0] * periods)
     return _Lines(frequency, np.moveaxis(mean, 1, 0), _pooled(noise, mean[:, 0]), rate_hz)

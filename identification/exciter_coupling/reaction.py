@@ -149,8 +149,9 @@ def chosen_filter(reaction: Reaction, linear: StateSpace, row: int, output: int)
             best, least = loop, factor
     if best is None:
         raise IdentificationError(
-            f"exciter: no filter for its reaction from {reaction.lowest_hz:.4g} Hz on is stable with the model and near to "
-            "it; give another lowest_hz, or a model whose drive point is an acceleration"
+            f"no filter for its reaction from {reaction.lowest_hz:.4g} Hz on is stable with the model and "
+            "near to it; give another lowest_hz, or a model whose drive point is an acceleration",
+            field="exciter",
         )
     return best
 

@@ -11,7 +11,8 @@ def belongs(model: Simulator, experiment: Experiment, what: str) -> None:
     """Raise `IdentificationError` unless the experiment has the channels and the sample rate of the model."""
     if abs(experiment.sample_rate_hz / model.sample_rate_hz - 1.0) > 1e-9:
         raise IdentificationError(
-            f"{what}: sampled at {experiment.sample_rate_hz:g} Hz, the model is of {model.sample_rate_hz:g} Hz; resample one"
+            f"sampled at {experiment.sample_rate_hz:g} Hz, the model is of {model.sample_rate_hz:g} Hz; resample one",
+            where=what,
         )
     for name, mine, theirs in (
         ("inputs", model.inputs, experiment.input_channels),
@@ -19,7 +20,7 @@ def belongs(model: Simulator, experiment: Experiment, what: str) -> None:
     ):
         if [c.name for c in mine] != [c.name for c in theirs]:
             have, need = (", ".join(c.name for c in channels) for channels in (theirs, mine))
-            raise IdentificationError(f"{what}: {name} are {have}, the model has {need}")
+            raise IdentificationError(f"{name} are {have}, the model has {need}", where=what)
 
 
 def check_not_zero(experiment: Experiment, what: str) -> None:
@@ -27,5 +28,6 @@ def check_not_zero(experiment: Experiment, what: str) -> None:
     for channel, values in zip(experiment.output_channels, experiment.counted_outputs, strict=True):
         if not np.any(values):
             raise IdentificationError(
-                f"{what}: output '{channel.name}' is zero where it counts, and errors relative to it have no meaning"
+                f"output '{channel.name}' is zero where it counts, and errors relative to it have no meaning",
+                where=what,
             )

@@ -69,8 +69,7 @@ def errors_of(
     Raises `IdentificationError` if there are no experiments, their channels or sample rates differ from the model's, or an
     output is zero where it counts.
     """
-    if not experiments:
-        raise IdentificationError("experiments: none given, needs one at least")
+    IdentificationError.raise_if(not experiments, "none given", field="experiments", allowed="one at least")
     relative, rms = np.full((2, len(experiments), len(model.outputs)), np.inf)
     bounded, use = np.zeros(len(experiments), dtype=bool), np.full(len(experiments), np.inf)
     for index, experiment in enumerate(experiments):

@@ -77,38 +77,51 @@ class Experiment:
             array = finite_array(f"{where}{name}", getattr(self, name), np.float64, 2)
             if array.shape[0] != len(channels) or not len(channels):
                 raise IdentificationError(
-                    f"{where}{name}: shape {array.shape}, needs a row for each channel, one at least"
+                    f"shape {array.shape}", field=f"{where}{name}", allowed="a row for each channel, one at least"
                 )
             object.__setattr__(self, name, array)
         n = self.inputs.shape[1]
         if self.outputs.shape[1] != n:
-            raise IdentificationError(f"{where}outputs: have {self.outputs.shape[1]} samples, inputs {n}")
+            raise IdentificationError(f"have {self.outputs.shape[1]} samples, inputs {n}", where=where, field="outputs")
         if np.ndim(self.sample_rate_hz):
             raise IdentificationError(
-                f"{where}sample_rate_hz: has shape {np.shape(self.sample_rate_hz)}, needs one number; resample what was "
-                "sampled at unequal steps"
+                f"has shape {np.shape(self.sample_rate_hz)}",
+                where=where,
+                field="sample_rate_hz",
+                allowed="one number",
+                hint="resample what was sampled at unequal steps",
             )
         positive(f"{where}sample_rate_hz", self.sample_rate_hz, "Hz")
         positive(f"{where}weight", self.weight)
         if self.initial_state not in get_args(InitialState):
             raise IdentificationError(
-                f"{where}initial_state: is '{self.initial_state}', allowed are {', '.join(get_args(InitialState))}"
+                where=where, field="initial_state", value=self.initial_state, allowed=get_args(InitialState)
             )
         if not 0 <= self.counted_from < n:
             raise IdentificationError(
-                f"{where}counted_from: is {self.counted_from}, allowed is 0 to {n - 1}, one sample at least must count"
+                where=where,
+                field="counted_from",
+                value=self.counted_from,
+                allowed=f"0 to {n - 1}, one sample at least must count",
             )
         if self.period_samples < 0 or (self.period_samples and self.counted % self.period_samples):
             raise IdentificationError(
-                f"{where}period_samples: is {self.period_samples}, the {self.counted} samples that count are no whole "
-                "number of periods"
+                f"the {self.counted} samples that count are no whole number of periods",
+                where=where,
+                field="period_samples",
+                value=self.period_samples,
             )
         lines = (len(self.outputs), (self.period_samples + 1) // 2 - 1)
         if self.output_noise is not None and self.period_samples and np.shape(self.output_noise) != lines:
-            raise IdentificationError(f"{where}output_noise: shape {np.shape(self.output_noise)}, needs {lines}")
+            raise IdentificationError(
+                f"shape {np.shape(self.output_noise)}", where=where, field="output_noise", allowed=lines
+            )
         if self.excited_hz is not None and not 0.0 <= self.excited_hz[0] < self.excited_hz[1]:
             raise IdentificationError(
-                f"{where}excited_hz: is {self.excited_hz}, needs two rising frequencies, none below zero"
+                where=where,
+                field="excited_hz",
+                value=self.excited_hz,
+                allowed="two rising frequencies, none below zero",
             )
 
     @classmethod
@@ -218,18 +231,18 @@ def same_data(one: Experiment, other: Experiment) -> bool:
 
 def same_channels(experiments: Sequence[Experiment]) -> None:
     """Raise `IdentificationError` unless there is at least one experiment and all have the same channels and sample rate."""
-    if not experiments:
-        raise IdentificationError("experiments: none given, needs one at least")
+    IdentificationError.raise_if(not experiments, "none given", field="experiments", allowed="one at least")
     first = experiments[0]
     for index, other in enumerate(experiments):
         what = f"experiments[{index}]{f' ({other.name})' if other.name else ''}"
         if abs(other.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
             raise IdentificationError(
-                f"{what}: sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one"
+                f"sampled at {other.sample_rate_hz:g} Hz, the first at {first.sample_rate_hz:g} Hz; resample one",
+                where=what,
             )
         for name in ("input_channels", "output_channels"):
             mine, theirs = (tuple(c.name for c in getattr(e, name)) for e in (other, first))
             if mine != theirs:
                 raise IdentificationError(
-                    f"{what}: {name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}"
+                    f"{name.replace('_', ' ')} {', '.join(mine)}, the first has {', '.join(theirs)}", where=what
                 )

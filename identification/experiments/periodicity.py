@@ -22,9 +22,11 @@ def check_periods(records: TimeRecords) -> None:
     for record, channel, difference in _differences(records):
         if difference > _REFUSED:
             raise IdentificationError(
-                f"period_samples: is {records.period_samples}, but in record '{record}' such periods of channel '{channel}' "
-                f"differ by {100.0 * difference:.0f} %, allowed is up to {100.0 * _REFUSED:.0f} %; give the right length, "
-                "or leave it out for data that are not periodic"
+                f"in record '{record}' such periods of channel '{channel}' differ by {100.0 * difference:.0f} %",
+                field="period_samples",
+                value=records.period_samples,
+                allowed=f"up to {100.0 * _REFUSED:.0f} %",
+                hint="give the right length, or leave it out for data that are not periodic",
             )
 
 

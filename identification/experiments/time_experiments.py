@@ -78,7 +78,7 @@ def time_experiments(
     rate = suitable_rate_hz(records) if rate_hz is None else positive("rate_hz", rate_hz, "Hz")
     if rate > records.sample_rate_hz * (1.0 + _SAME):
         raise IdentificationError(
-            f"rate_hz: is {rate:g} Hz, allowed is up to {records.sample_rate_hz:g} Hz, as fast as was recorded"
+            field="rate_hz", value=rate, allowed=f"up to {records.sample_rate_hz:g} Hz, as fast as was recorded"
         )
     return tuple(_experiment(records, record, into, out, rate) for record in records.records)
 
@@ -131,8 +131,10 @@ def resampled_periods(samples: Float, period_samples: int, rate_hz: float, new_r
     size = round(exact)
     if size < 3 or abs(exact - size) > 1e-6:
         raise IdentificationError(
-            f"rate_hz: is {new_rate_hz:g} Hz, a period of {period_samples} samples at {rate_hz:g} Hz then has {exact:.6g} "
-            f"samples; allowed are whole multiples of {rate_hz / period_samples:g} Hz"
+            f"a period of {period_samples} samples at {rate_hz:g} Hz then has {exact:.6g} samples",
+            field="rate_hz",
+            value=new_rate_hz,
+            allowed=f"whole multiples of {rate_hz / period_samples:g} Hz",
         )
     periods = samples.reshape(len(samples), -1, period_samples)
     if size == period_samples:

@@ -43,7 +43,7 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
         return
     samples, lengths, levels = (arrays.pop(name, np.zeros(0)) for name in ("samples", "lengths", "levels"))
     if samples.ndim != 2 or np.any(lengths < 0) or lengths.sum() != samples.shape[1]:
-        raise IdentificationError(f"lengths: do not add up to the samples, which have shape {samples.shape}")
+        raise IdentificationError(f"do not add up to the samples, which have shape {samples.shape}", field="lengths")
     parts = np.split(samples, np.cumsum(lengths)[:-1], axis=1)
     arrays.update({f"records_{number}/samples": part for number, part in enumerate(parts)})
     named = zip(attributes.pop("names", ()), levels.tolist(), strict=True)
@@ -104,13 +104,12 @@ class TimeRecords(Result):
         positive("sample_rate_hz", self.sample_rate_hz, "Hz")
         names = [channel.name for channel in self.channels]
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise IdentificationError(f"channels: '{twice}' is the name of two; names must differ")
-        if not self.records:
-            raise IdentificationError("records: there is none, needs one at least")
+            raise IdentificationError(f"'{twice}' is the name of two", field="channels", hint="names must differ")
+        IdentificationError.raise_if(not self.records, "there is none", field="records", allowed="one at least")
         if self.instrument and self.instrument not in names:
-            raise IdentificationError(f"instrument: is '{self.instrument}', channels are {', '.join(names)}")
+            raise IdentificationError(f"channels are {', '.join(names)}", field="instrument", value=self.instrument)
         if not 0.0 <= self.ahead_periods < np.inf:
-            raise IdentificationError(f"ahead_periods: is {self.ahead_periods:g}, needs zero or more")
+            raise IdentificationError(field="ahead_periods", value=self.ahead_periods, allowed="zero or more")
         for number, record in enumerate(self.records, 1):
             rows, count = record.samples.shape
             if rows != len(names) or not count:

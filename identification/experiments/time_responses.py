@@ -67,8 +67,9 @@ def time_spectra(records: TimeRecords) -> PeriodicSpectra:
     their periods differ, or no line is excited.
     """
     size = records.period_samples
-    if not size:
-        raise IdentificationError("period_samples: is 0, the records are not periodic and have no spectra by periods")
+    IdentificationError.raise_if(
+        not size, "the records are not periodic and have no spectra by periods", field="period_samples", value=0
+    )
     check_periods(records)
     periods = min(record.samples.shape[1] for record in records.records) // size
     lines = np.array([_lines(record.samples[:, -periods * size :], size) for record in records.records])

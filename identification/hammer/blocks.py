@@ -127,7 +127,9 @@ def _lengths(
     length = length if record_s is not None else length + before
     if length < _SHORTEST or before >= length // 2:
         raise IdentificationError(
-            f"record_s: a record of a hit has {length} samples, {before} of them before it; needs {_SHORTEST} and at most half"
+            f"a record of a hit has {length} samples, {before} of them before it",
+            field="record_s",
+            allowed=f"{_SHORTEST} and at most half",
         )
     return before, length
 

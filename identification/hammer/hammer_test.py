@@ -87,15 +87,16 @@ def hammer_test(
     data = [finite_array(f"records[{i}]", record, np.float64, 2) for i, record in enumerate(records)]
     for i, record in enumerate(data):
         if record.shape[0] != len(channels) or record.shape[1] < 16:
-            raise IdentificationError(f"records[{i}]: shape {record.shape}, needs {len(channels)} channels by samples")
-    if not data:
-        raise IdentificationError("records: is empty, needs at least one")
+            raise IdentificationError(
+                f"shape {record.shape}", field=f"records[{i}]", allowed=f"{len(channels)} channels by samples"
+            )
+    IdentificationError.raise_if(not data, "is empty", field="records", allowed="at least one")
     blocks = blocks_of(data, channels, rate, record_s, pretrigger_s, trigger_n, full_scale)
     used = [block for block in blocks if not block.hit.fault]
     if len(used) < 2:
         faults = "; ".join(f"{block.hit.label}: {block.hit.fault}" for block in blocks if block.hit.fault)
         raise IdentificationError(
-            f"hits: {len(used)} of {len(blocks)} count, needs two at least ({faults or 'no faults'})"
+            f"{len(used)} of {len(blocks)} count", field="hits", allowed=f"two at least ({faults or 'no faults'})"
         )
     values = np.array([block.samples for block in used])
     motions = [row for row, channel in enumerate(channels) if channel.role in ("drive", "response")]
@@ -124,11 +125,11 @@ def _check(
     force_window_s: float | None,
 ) -> None:
     if estimator not in ("H1", "H2", "Hv"):
-        raise IdentificationError(f"estimator: is '{estimator}', allowed are H1, H2, Hv")
+        raise IdentificationError(field="estimator", value=estimator, allowed="H1, H2, Hv")
     known = [channel.name for channel in channels]
     for name, value in full_scale.items():
         if name not in known:
-            raise IdentificationError(f"full_scale: '{name}' is none of the channels {', '.join(known)}")
+            raise IdentificationError(f"'{name}' is none of the channels {', '.join(known)}", field="full_scale")
         positive(f"full_scale of {name}", value)
     lengths = {"record_s": record_s, "trigger_n": trigger_n, "force_window_s": force_window_s}
     for name, length in lengths.items():
@@ -136,7 +137,7 @@ def _check(
             positive(name, length, "N" if name == "trigger_n" else "s")
     for name, rate in {"decay_rate_1_s": decay_rate_1_s, "pretrigger_s": pretrigger_s}.items():
         if rate is not None and not 0.0 <= rate < np.inf:
-            raise IdentificationError(f"{name}: is {rate:g}, must be finite, 0 or above")
+            raise IdentificationError(field=name, value=rate, allowed="finite, 0 or above")
 
 
 def _band(
@@ -151,8 +152,10 @@ def _band(
     lines = (frequency_hz >= lowest_hz) & (frequency_hz <= highest_hz) & (frequency_hz > 0.0)
     if np.count_nonzero(lines) < 3:
         raise IdentificationError(
-            f"lowest_hz, highest_hz: {np.count_nonzero(lines)} lines in {lowest_hz:g} to {highest_hz:g} Hz, which are "
-            f"{frequency_hz[1]:.3g} Hz apart; needs 3 at least"
+            f"{np.count_nonzero(lines)} lines in {lowest_hz:g} to {highest_hz:g} Hz, which are "
+            f"{frequency_hz[1]:.3g} Hz apart",
+            field="lowest_hz, highest_hz",
+            allowed="3 at least",
         )
     return np.asarray(lines)
 

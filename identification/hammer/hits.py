@@ -58,8 +58,9 @@ def found_pulses(forces: Sequence[Float], trigger_n: float | None, apart: int) -
     level = max(_SHARE * highest, _NOISE * noise) if trigger_n is None else trigger_n
     if highest <= level:
         raise IdentificationError(
-            f"force: no hit above {level:.3g} N, the highest sample is {highest:.3g} N and noise has {noise:.3g} N RMS; lower "
-            "trigger_n, or is the polarity of the force reversed?"
+            f"no hit above {level:.3g} N, the highest sample is {highest:.3g} N and noise has {noise:.3g} N "
+            "RMS; lower trigger_n, or is the polarity of the force reversed?",
+            field="force",
         )
     return [_grouped(_pulses(force, level), apart) for force in forces]
 

@@ -80,8 +80,7 @@ class HammerTest(Result):
         lines, outputs = self.responses.frequency_hz.size, len(self.responses.outputs)
         for name, shape in (("coherence", (lines, outputs)), ("force_n_s", (lines,))):
             array = finite_array(name, getattr(self, name), np.float64, len(shape))
-            if array.shape != shape:
-                raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
+            IdentificationError.raise_if(array.shape != shape, f"shape {array.shape}", field=name, allowed=f"{shape}")
             object.__setattr__(self, name, array)
 
     @property

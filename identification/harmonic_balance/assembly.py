@@ -32,8 +32,7 @@ def response_of(
     ``largest_range_use`` are not allowed, or if no vibration is found at either end.
     """
     allowed = positive("largest_range_use", largest_range_use)
-    if points < 2:
-        raise IdentificationError(f"points: is {points}, needs at least 2")
+    IdentificationError.unless_at_least("points", points, 2)
     (low, high), more, found = band_hz, list(more), list[Followed]()
     for begin, end in ((low, high), (high, low)):
         path = followed(balance, begin, end, points=points, step=_STEP, largest_use=allowed)
@@ -46,8 +45,9 @@ def response_of(
         more.append(path.note)
     if not found:
         raise IdentificationError(
-            f"force_n: at {force_n:g} {'V' if force == 'voltage' else 'N'} the model has no periodic vibration at {low:.4g} "
-            f"or {high:.4g} Hz that rest leads to within {allowed:g} times its range"
+            f"at {force_n:g} {('V' if force == 'voltage' else 'N')} the model has no periodic vibration at "
+            f"{low:.4g} or {high:.4g} Hz that rest leads to within {allowed:g} times its range",
+            field="force_n",
         )
     states = [_along(balance, each) for each in found]
     every = states[0] if len(states) == 1 else states[0].joined(states[1])
@@ -72,7 +72,9 @@ def steady_state_of(
     else:
         z = polished(balance, unknowns_near(balance, near), at_hz)
     if z is None:
-        raise IdentificationError(f"frequency_hz: no periodic vibration was found at {at_hz:g} Hz and {force_n:g}")
+        raise IdentificationError(
+            f"no periodic vibration was found at {at_hz:g} Hz and {force_n:g}", field="frequency_hz"
+        )
     stable = np.array([statically_stable(balance, z, at_hz)])
     return steady_states(balance, z[None], np.array([at_hz]), stable)
 

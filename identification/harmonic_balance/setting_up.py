@@ -33,33 +33,36 @@ def held_values(model: Driven, held_inputs: Mapping[str, float] | None) -> tuple
     for name, value in given.items():
         if name not in names:
             raise IdentificationError(
-                f"held_inputs: the model has no input '{name}', its inputs are {', '.join(names)}"
+                f"the model has no input '{name}', its inputs are {', '.join(names)}", field="held_inputs"
             )
         if model.inputs[names.index(name)].role == "force":
-            raise IdentificationError(f"held_inputs: '{name}' is the force, which drives; hold the other inputs")
+            raise IdentificationError(
+                f"'{name}' is the force, which drives", field="held_inputs", hint="hold the other inputs"
+            )
         if not np.isfinite(value):
-            raise IdentificationError(f"held_inputs: '{name}' is {value:g}, needs a finite value")
+            raise IdentificationError(f"'{name}' is {value:g}", field="held_inputs", allowed="a finite value")
     forces = [row for row, channel in enumerate(model.inputs) if channel.role == "force"]
     free = [row for row, name in enumerate(names) if name not in given]
     if len(forces) > 1 or (not forces and len(free) != 1):
         raise IdentificationError(
-            f"model: has {len(names)} inputs, {len(forces)} of them forces and {len(given)} held constant; needs one force, or "
-            "a voltage alone (held_inputs holds others)"
+            f"has {len(names)} inputs, {len(forces)} of them forces and {len(given)} held constant",
+            field="model",
+            allowed="one force, or a voltage alone (held_inputs holds others)",
         )
     row = forces[0] if forces else free[0]
     missing = [names[other] for other in free if other != row]
     if missing:
         raise IdentificationError(
-            f"held_inputs: has no value for {', '.join(missing)}, which the model has beside {names[row]}; give each its "
-            "constant value"
+            f"has no value for {', '.join(missing)}, which the model has beside {names[row]}; give each its "
+            "constant value",
+            field="held_inputs",
         )
     return row, np.array([float(given.get(name, 0.0)) for name in names])
 
 
 def drive_of(model: Driven, level: float, held: Held, exciter: Exciter | None, coefficients: int, row: int) -> Drive:
     """Return the drive at input ``row``; raise `IdentificationError` if model, exciter and held quantity do not match."""
-    if held not in get_args(Held):
-        raise IdentificationError(f"force: is '{held}', allowed are {', '.join(get_args(Held))}")
+    IdentificationError.unless_one_of("force", held, get_args(Held))
     amplitude = positive("force_n", level, "V" if held == "voltage" else "N")
     m = len(model.inputs)
     if model.inputs[row].role != "force":
@@ -67,12 +70,13 @@ def drive_of(model: Driven, level: float, held: Held, exciter: Exciter | None, c
     if exciter is None:
         if held != "pure-sine":
             raise IdentificationError(
-                f"force: '{held}' of a model driven by a force needs an exciter, which makes the force's harmonics; "
-                "without one 'pure-sine' is predicted"
+                f"'{held}' of a model driven by a force needs an exciter, which makes the force's harmonics; "
+                "without one 'pure-sine' is predicted",
+                field="force",
             )
         return Sine(amplitude, row, m)
     if held == "pure-sine":
-        raise IdentificationError("exciter: makes harmonics of the force; leave it out for 'pure-sine'")
+        raise IdentificationError("makes harmonics of the force", field="exciter", hint="leave it out for 'pure-sine'")
     drive = find_role(model.outputs, "drive")
     order = MOTION_ORDER[model.outputs[drive].motion]
     return Coupled(exciter, amplitude, held, drive, order, row, m, coefficients)
@@ -80,14 +84,15 @@ def drive_of(model: Driven, level: float, held: Held, exciter: Exciter | None, c
 
 def _voltage_driven(model: Driven, amplitude: float, held: Held, exciter: Exciter | None, row: int) -> Drive:
     if exciter is not None:
-        raise IdentificationError("exciter: is inside a model that is driven by a voltage; leave it out")
+        raise IdentificationError("is inside a model that is driven by a voltage", field="exciter", hint="leave it out")
     force = find_role(model.outputs, "force")
     if held == "voltage":
         return Sine(amplitude, row, len(model.inputs), is_voltage=True)
     if held == "pure-sine":
         raise IdentificationError(
-            "force: 'pure-sine' is not what a sine of voltage makes; a model driven by a voltage answers 'fundamental', "
-            "'rms' or 'voltage'"
+            "'pure-sine' is not what a sine of voltage makes; a model driven by a voltage answers "
+            "'fundamental', 'rms' or 'voltage'",
+            field="force",
         )
     return HeldOutput(amplitude, held, force, row, len(model.inputs))
 

@@ -85,7 +85,7 @@ class SteadyStates:
             rows = [row for row, channel in enumerate(channels) if channel.role == "force"]
             if rows:
                 return np.asarray(harmonics[:, :, rows[0]])
-        raise IdentificationError("model: has no force among its inputs and outputs")
+        raise IdentificationError("has no force among its inputs and outputs", field="model")
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -117,7 +117,7 @@ def motion_rows(channels: tuple[Channel, ...]) -> list[int]:
     drive = [row for row, channel in enumerate(channels) if channel.role == "drive"]
     others = [row for row, channel in enumerate(channels) if channel.role == "response"]
     if not drive + others:
-        raise IdentificationError("model: no output is a motion, whose amplitude could be predicted")
+        raise IdentificationError("no output is a motion, whose amplitude could be predicted", field="model")
     return drive + others
 
 

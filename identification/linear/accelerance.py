@@ -89,7 +89,7 @@ def weighted_responses(responses: FrequencyResponseMatrix, weighting: Weighting 
     count = responses.value[0].size
     modulus = np.abs(responses.value).reshape(-1, count)
     if not np.all(np.max(modulus, axis=0) > 0.0):
-        raise IdentificationError("value: a response is zero at all lines")
+        raise IdentificationError("a response is zero at all lines", field="value")
     deviations = responses.deviations if kind == "total" else None
     smooth = _relative(modulus) if covariance is None else pooled(covariance, _lines_alike(deviations))
     return WeightedResponses(
@@ -115,9 +115,9 @@ def known_covariance(responses: FrequencyResponseMatrix, weighting: Weighting) -
     """
     known = {"total": responses.total_covariance, "noise": responses.noise_covariance}
     if weighting not in ("auto", "relative", *known):
-        raise IdentificationError(f"weighting: is '{weighting}', allowed are auto, total, noise, relative")
+        raise IdentificationError(field="weighting", value=weighting, allowed="auto, total, noise, relative")
     if known.get(weighting, 0) is None:
-        raise IdentificationError(f"weighting: is '{weighting}', but the responses have no {weighting}_covariance")
+        raise IdentificationError(f"the responses have no {weighting}_covariance", field="weighting", value=weighting)
     size = np.abs(responses.value).reshape(responses.value.shape[0], -1)
     for kind in ("total", "noise") if weighting == "auto" else (weighting,):
         covariance = known.get(kind)
@@ -140,7 +140,7 @@ def motion_factors(responses: FrequencyResponseMatrix) -> Complex:
     """
     if responses.frequency_hz[0] == 0.0:
         raise IdentificationError(
-            "frequency_hz: begins at 0 Hz, where no motion is an acceleration; select a band above"
+            "begins at 0 Hz, where no motion is an acceleration; select a band above", field="frequency_hz"
         )
     order = [0 if channel.role == "force" else 2 - MOTION_ORDER[channel.motion] for channel in responses.outputs]
     return np.asarray(responses.s[:, None] ** np.array(order))

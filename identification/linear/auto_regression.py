@@ -93,13 +93,14 @@ def auto_regression(records: Sequence[tuple[Float, Float]], weights: Sequence[fl
     scale_u, scale_y = (np.sqrt(np.mean(np.hstack([pair[part] for pair in records]) ** 2, axis=1)) for part in (0, 1))
     if not (np.all(scale_u > 0.0) and np.all(scale_y > 0.0)):
         what, scale = ("inputs", scale_u) if np.any(scale_u == 0.0) else ("outputs", scale_y)
-        raise IdentificationError(f"{what}: channel {int(np.argmin(scale)) + 1} is zero throughout (dead channel)")
+        raise IdentificationError(f"channel {int(np.argmin(scale)) + 1} is zero throughout (dead channel)", field=what)
     samples = sum(u.shape[1] for u, _ in records)
     step = inputs + outputs
     most = min(_LARGEST_ORDER, (_COLUMNS - inputs) // step, (samples // _ROWS_PER_COLUMN - inputs) // step)
     most = min(most, min(u.shape[1] for u, _ in records) // 4)
-    if most < 1:
-        raise IdentificationError(f"experiments: have {samples} samples, too few for a linear model to begin with")
+    IdentificationError.raise_if(
+        most < 1, f"have {samples} samples, too few for a linear model to begin with", field="experiments"
+    )
     factor, rows = np.zeros((0, inputs + most * step + outputs)), 0
     for number, (u, y) in enumerate(records):
         root = np.sqrt(weights[number]) if weights else 1.0
@@ -198,7 +199,7 @@ def regressed_responses(
     low = max(low, (high - low) / _LINES)
     if not low < high:
         raise IdentificationError(
-            f"band_hz: is {low:g} to {high:g} Hz, needs two rising values below half the sample rate"
+            f"is {low:g} to {high:g} Hz", field="band_hz", allowed="two rising values below half the sample rate"
         )
     frequency = np.linspace(low, high, _LINES)
     value, covariance = found.responses(np.exp(2j * np.pi * frequency / sample_rate_hz))
@@ -232,5 +233,7 @@ def _excited_band(records: Sequence[tuple[Float, Float]], sample_rate_hz: float)
     power = scipy.ndimage.uniform_filter1d(power, _SMOOTHED, axis=1, mode="nearest")
     inside = np.all(power >= _EXCITED**2 * power.max(axis=1, keepdims=True), axis=0) & (frequency > 0.0)
     if np.count_nonzero(inside) < 2:
-        raise IdentificationError("inputs: no band is excited at all of them; excite them at the same frequencies")
+        raise IdentificationError(
+            "no band is excited at all of them", field="inputs", hint="excite them at the same frequencies"
+        )
     return float(frequency[inside][0]), float(frequency[inside][-1])

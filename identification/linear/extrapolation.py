@@ -52,13 +52,13 @@ def extrapolated_to_zero(
     force = np.array([model.force_rms_n for model in models])
     if not np.all(np.isfinite(force)) or force[0] <= 0.0 or np.any(force[1:] < _SPREAD * force[:-1]):
         listed = ", ".join(f"{value:.4g}" for value in force)
-        raise IdentificationError(f"force_rms_n: levels are {listed} N, need to be above zero and 10 % apart")
+        raise IdentificationError(f"levels are {listed} N", field="force_rms_n", allowed="above zero and 10 % apart")
     powers = np.atleast_1d(np.asarray(exponent, dtype=np.float64))
     if powers.size > 2 or not np.all(np.isfinite(powers)) or np.any(powers <= 0.0):
-        raise IdentificationError(f"exponent: is {exponent}, needs one or two numbers above zero")
+        raise IdentificationError(field="exponent", value=exponent, allowed="one or two numbers above zero")
     one_specimen(**{f"level {force_n:.4g} N": model.specimen for force_n, model in zip(force, models, strict=True)})
     if any(model.channels != models[0].channels for model in models):
-        raise IdentificationError("channels: differ between the levels")
+        raise IdentificationError("differ between the levels", field="channels")
     kept, values, covariances = _common(models)
     _, covariance = _intercept(force ** np.mean(powers), values, covariances)
     ends = [_intercept(force**power, values, covariances)[0] for power in powers]
@@ -79,8 +79,7 @@ def _common(models: Sequence[LinearModes]) -> tuple[list[int], Float, Float]:
             for model, j in zip(models, partners, strict=True)
         ):
             matches.append((k, partners))
-    if not matches:
-        raise IdentificationError("frequency_hz: no mode is found at all levels")
+    IdentificationError.raise_if(not matches, "no mode is found at all levels", field="frequency_hz")
     values, covariances = [], []
     for level, model in enumerate(models):
         chosen = [partners[level] for _, partners in matches]

@@ -105,7 +105,8 @@ def linear_modes(
     if not driven and (len(responses.inputs) != 1 or responses.inputs[0].role != "force"):
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in responses.inputs)
         raise IdentificationError(
-            f"inputs: are {names}; modes need the responses to one force, at the drive point, or that force among the outputs"
+            f"are {names}; modes need the responses to one force, at the drive point, or that force among the outputs",
+            field="inputs",
         )
     selected = responses.select(
         lowest_hz=0.0 if lowest_hz is None else lowest_hz, highest_hz=np.inf if highest_hz is None else highest_hz
@@ -114,7 +115,7 @@ def linear_modes(
     band = over_force(selected) if driven else selected
     data = joint.first_guess() if joint else weighted_accelerance(band, "relative" if driven else weighting)
     if isinstance(modes, int) and modes < 1:
-        raise IdentificationError(f"modes: is {modes}, needs at least 1")
+        raise IdentificationError(field="modes", value=modes, allowed="at least 1")
     if isinstance(modes, LinearModes):
         fit, notes = _without_spurious(data, band, poles_of(modes, data), normal=normal, modes=None)
     else:
@@ -192,8 +193,9 @@ def _without_spurious(
         fit = fit_modes(data, poles, normal=normal)
         if fit.residual > _NEEDED * max(whole, 1.0):
             raise IdentificationError(
-                f"modes: {modes} wanted, but {notes[-1]} raises the misfit from {whole:.2g} to {fit.residual:.2g}: "
-                "it is a mode; ask for more modes, or for those of a narrower band"
+                f"{modes} wanted, but {notes[-1]} raises the misfit from {whole:.2g} to {fit.residual:.2g}: it "
+                "is a mode; ask for more modes, or for those of a narrower band",
+                field="modes",
             )
         reasons, prominence = accepted(fit, data, drive, normal=normal)
         count = prominence.size
@@ -205,12 +207,15 @@ def _without_spurious(
         if (out and not (modes is None or isinstance(modes, int))) or len(out) == count:
             reversed_ = any("residue of -" in name for name in names)
             hint = ", or the polarity of force or drive channel is reversed" if reversed_ else ""
-            raise IdentificationError(f"modes: {'; '.join(names)}; no mode there that can be normalised{hint}")
+            raise IdentificationError(
+                "; ".join(names), field="modes", hint=f"no mode there that can be normalised{hint}"
+            )
         if not out:
             if isinstance(modes, int) and count < modes:
                 found = ", ".join(f"{f:.5g}" for f in np.sort(fit.omega) / (2 * np.pi))
                 raise IdentificationError(
-                    f"modes: {modes} wanted, {count} found ({found} Hz); give starting frequencies for the others"
+                    f"{modes} wanted, {count} found ({found} Hz); give starting frequencies for the others",
+                    field="modes",
                 )
             return fit, notes
         notes += [f"left out: {name}" for name in names]

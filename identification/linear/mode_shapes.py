@@ -41,22 +41,27 @@ class ModeShapes:
         shapes = finite_array("shapes", self.shapes, np.float64, 2)
         object.__setattr__(self, "shapes", shapes)
         if shapes.shape[0] != len(self.channels):
-            raise IdentificationError(f"shapes: shape {shapes.shape} for {len(self.channels)} channels")
+            raise IdentificationError(f"shape {shapes.shape} for {len(self.channels)} channels", field="shapes")
         if self.shapes_std is not None:
             object.__setattr__(self, "shapes_std", read_only(self.shapes_std, np.float64))
             if np.shape(self.shapes_std) != shapes.shape:
-                raise IdentificationError(f"shapes_std: shape {np.shape(self.shapes_std)}, shapes have {shapes.shape}")
+                raise IdentificationError(
+                    f"shape {np.shape(self.shapes_std)}, shapes have {shapes.shape}", field="shapes_std"
+                )
         if self.covariance is not None:
             covariance = finite_array("covariance", self.covariance, np.float64, 2)
             object.__setattr__(self, "covariance", covariance)
             if covariance.shape != (shapes.size, shapes.size):
-                raise IdentificationError(f"covariance: shape {covariance.shape} for {shapes.size} shape values")
+                raise IdentificationError(
+                    f"shape {covariance.shape} for {shapes.size} shape values", field="covariance"
+                )
         if not shapes.shape[1] or np.linalg.matrix_rank(shapes) < shapes.shape[1]:
             raise IdentificationError(
-                f"shapes: {shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes"
+                f"{shapes.shape[1]} modes are not told apart by {shapes.shape[0]} channels; use fewer modes",
+                field="shapes",
             )
         if not 0 <= self.mode < shapes.shape[1]:
-            raise IdentificationError(f"mode: is {self.mode}, allowed are 0 to {shapes.shape[1] - 1}")
+            raise IdentificationError(field="mode", value=self.mode, allowed=f"0 to {shapes.shape[1] - 1}")
 
     @property
     def tested(self) -> Float:

@@ -122,13 +122,15 @@ class LinearModes(Result):
                     continue
                 array = np.array(getattr(self, name), dtype=dtype)
                 if array.shape != shape:
-                    raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
+                    raise IdentificationError(f"shape {array.shape}", field=name, allowed=f"{shape}")
                 array.setflags(write=False)
                 object.__setattr__(self, name, array)
         for name in ("frequency_hz", "damping_ratio", "shapes"):
             finite_array(name, getattr(self, name), np.float64, 2 if name == "shapes" else 1)
         if not modes or self.frequency_hz[0] <= 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
-            raise IdentificationError("frequency_hz: needs at least one, above zero, each above the one before")
+            raise IdentificationError(
+                field="frequency_hz", allowed="at least one, above zero, each above the one before"
+            )
 
     @property
     def drive_row(self) -> int:
@@ -218,7 +220,7 @@ def mac_matrix(a: LinearModes, b: LinearModes) -> NDArray[np.float64]:
     common = [(row, names.index(channel.name)) for row, channel in enumerate(a.channels) if channel.name in names]
     if not common:
         raise IdentificationError(
-            f"channels: {', '.join(c.name for c in a.channels)} and {', '.join(names)} share none"
+            f"{', '.join(c.name for c in a.channels)} and {', '.join(names)} share none", field="channels"
         )
     x, y = a.shapes[[i for i, _ in common]], b.shapes[[j for _, j in common]]
     product = np.outer(np.sum(x**2, axis=0), np.sum(y**2, axis=0))

@@ -66,10 +66,12 @@ class FrequencyResponseMatrix(Result):
         for name in ("outputs", "inputs", "input_rms", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         if not self.outputs or not self.inputs:
-            raise IdentificationError("outputs, inputs: needs at least one of each")
+            raise IdentificationError(field="outputs, inputs", allowed="at least one of each")
         object.__setattr__(self, "frequency_hz", finite_array("frequency_hz", self.frequency_hz, np.float64, 1))
         if not self.frequency_hz.size or self.frequency_hz[0] < 0.0 or np.any(np.diff(self.frequency_hz) <= 0.0):
-            raise IdentificationError("frequency_hz: needs at least one, none below zero, each above the one before")
+            raise IdentificationError(
+                field="frequency_hz", allowed="at least one, none below zero, each above the one before"
+            )
         self._check("value", (len(self.outputs), len(self.inputs)))
         paths = len(self.outputs) * len(self.inputs)
         for name in ("noise_covariance", "total_covariance"):
@@ -79,14 +81,16 @@ class FrequencyResponseMatrix(Result):
             records = np.shape(self.deviations)[1] if np.ndim(self.deviations) > 1 else 0
             self._check("deviations", (records, paths))
         if not (np.isfinite(self.decay_rate_1_s) and self.decay_rate_1_s >= 0.0):
-            raise IdentificationError(f"decay_rate_1_s: is {self.decay_rate_1_s:g} 1/s, must be finite, 0 or above")
+            raise IdentificationError(field="decay_rate_1_s", value=self.decay_rate_1_s, allowed="finite, 0 or above")
         if self.input_rms and len(self.input_rms) != len(self.inputs):
-            raise IdentificationError(f"input_rms: {len(self.input_rms)} values for {len(self.inputs)} inputs")
+            raise IdentificationError(f"{len(self.input_rms)} values for {len(self.inputs)} inputs", field="input_rms")
 
     def _check(self, name: str, trailing: tuple[int, int]) -> None:
         array = finite_array(name, getattr(self, name), np.complex128, 3)
         if array.shape != (self.frequency_hz.size, *trailing):
-            raise IdentificationError(f"{name}: shape {array.shape}, needs {(self.frequency_hz.size, *trailing)}")
+            raise IdentificationError(
+                f"shape {array.shape}", field=name, allowed=f"{(self.frequency_hz.size, *trailing)}"
+            )
         object.__setattr__(self, name, array)
 
     @property
@@ -112,12 +116,11 @@ class FrequencyResponseMatrix(Result):
     def covariance(self, kind: Literal["noise", "total"]) -> Complex:
         """complex[n_lines, m, m]: ``noise_covariance`` or ``total_covariance``; raises `IdentificationError` if unknown."""
         found = {"noise": self.noise_covariance, "total": self.total_covariance}
-        if kind not in found:
-            raise IdentificationError(f"kind: is '{kind}', allowed are noise, total")
+        IdentificationError.raise_if(kind not in found, field="kind", value=kind, allowed="noise, total")
         covariance = found[kind]
         if covariance is None:
             needed = {"noise": "two periods or more", "total": "two realisations or more"}[kind]
-            raise IdentificationError(f"{kind}_covariance: is unknown, a measurement of {needed} has it")
+            raise IdentificationError(f"is unknown, a measurement of {needed} has it", field=f"{kind}_covariance")
         return covariance
 
     def path(self, output: str, input: str | None = None) -> Complex:
@@ -133,8 +136,9 @@ class FrequencyResponseMatrix(Result):
         lines = (self.frequency_hz >= lowest_hz) & (self.frequency_hz <= highest_hz)
         if not lines.any():
             raise IdentificationError(
-                f"lowest_hz, highest_hz: no line in {lowest_hz:g} to {highest_hz:g} Hz, there are some in "
-                f"{self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
+                f"no line in {lowest_hz:g} to {highest_hz:g} Hz",
+                field="lowest_hz, highest_hz",
+                allowed=f"from {self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz",
             )
         paths = (np.array(rows)[:, None] * len(self.inputs) + np.arange(len(self.inputs))).ravel()
 

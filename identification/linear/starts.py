@@ -38,7 +38,7 @@ def poles_of(modes: LinearModes, data: WeightedResponses) -> Float:
     inside = (modes.frequency_hz >= data.frequency_hz[0]) & (modes.frequency_hz <= data.frequency_hz[-1])
     if not np.any(inside):
         raise IdentificationError(
-            f"modes: none of those given is in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+            f"none of those given is in {data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz", field="modes"
         )
     return np.concatenate([2.0 * np.pi * modes.frequency_hz[inside], np.abs(modes.damping_ratio[inside])])
 
@@ -58,8 +58,9 @@ def start_of(
     found = searched(data)
     if found is None:
         raise IdentificationError(
-            f"modes: no pole is stable over the orders in {_band(data)}, and no single pole explains the responses; "
-            "give starting frequencies, a narrower band, or a recording with more periods"
+            f"no pole is stable over the orders in {_band(data)}, and no single pole explains the responses; "
+            "give starting frequencies, a narrower band, or a recording with more periods",
+            field="modes",
         )
     return found
 
@@ -96,8 +97,9 @@ def _near(stable: StabilisationDiagram, data: WeightedResponses, wanted: Sequenc
     near_hz = np.sort(finite_array("modes", wanted, np.float64, 1))
     if not near_hz.size or near_hz[0] < data.frequency_hz[0] or near_hz[-1] > data.frequency_hz[-1]:
         raise IdentificationError(
-            f"modes: frequencies are {', '.join(f'{f:g}' for f in near_hz) or 'none'} Hz, allowed are "
-            f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz"
+            f"frequencies are {', '.join(f'{f:g}' for f in near_hz) or 'none'} Hz",
+            field="modes",
+            allowed=f"{data.frequency_hz[0]:g} to {data.frequency_hz[-1]:g} Hz",
         )
     frequency, damping, taken = near_hz.copy(), np.full(near_hz.size, np.nan), set[int]()
     candidates = np.flatnonzero(stable.stable)

@@ -157,11 +157,14 @@ def spectral_radius(a: Float) -> float:
 def _points(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Complex:
     if responses.decay_rate_1_s:
         raise IdentificationError(
-            f"decay_rate_1_s: is {responses.decay_rate_1_s:.4g} 1/s, allowed is 0; `linear_modes` takes such responses"
+            field="decay_rate_1_s",
+            value=responses.decay_rate_1_s,
+            allowed="0",
+            hint="`linear_modes` takes such responses",
         )
     if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
         raise IdentificationError(
-            f"sample_rate_hz: is {sample_rate_hz:g} Hz, needs more than twice {responses.frequency_hz[-1]:g} Hz"
+            field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"
         )
     return np.asarray(np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz))
 
@@ -172,14 +175,18 @@ def _check(data: WeightedResponses, start: StateSpace) -> None:
     shapes = ((n, n), (n, inputs), (outputs, n), (outputs, inputs))
     for name, part, shape in zip("abcd", start, shapes, strict=True):
         if part.shape != shape:
-            raise IdentificationError(f"start: {name} has shape {part.shape}, needs {shape}")
+            raise IdentificationError(f"{name} has shape {part.shape}", field="start", allowed=f"{shape}")
     if (radius := spectral_radius(start.a)) >= 1.0:
-        raise IdentificationError(f"start: has an eigenvalue of magnitude {radius:.6g}, allowed is below 1 (stable)")
+        raise IdentificationError(
+            f"has an eigenvalue of magnitude {radius:.6g}", field="start", allowed="below 1 (stable)"
+        )
     free = n * (outputs + inputs) + outputs * inputs
     if 2 * lines * outputs * inputs < free:
         raise IdentificationError(
-            f"frequency_hz: {lines} lines are too few for the {free} free parameters of {n} states, needs "
-            f"{-(-free // (2 * outputs * inputs))}; lower the order"
+            f"{lines} lines are too few for the {free} free parameters of {n} states",
+            field="frequency_hz",
+            allowed=f"{-(-free // (2 * outputs * inputs))}",
+            hint="lower the order",
         )
 
 

@@ -73,8 +73,10 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
     lines, outputs, inputs = data.value.shape
     if 2 * lines * inputs < block_rows * (outputs + inputs):
         raise IdentificationError(
-            f"frequency_hz: {lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} "
-            f"inputs, needs {-(-block_rows * (outputs + inputs) // (2 * inputs))}; lower the order"
+            f"{lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} inputs",
+            field="frequency_hz",
+            allowed=f"{-(-block_rows * (outputs + inputs) // (2 * inputs))}",
+            hint="lower the order",
         )
     # One weight per line keeps the equations exact; lines with small errors have more weight.
     weight = 1.0 / np.sqrt(np.mean(data.std**2, axis=(1, 2)))
@@ -148,20 +150,22 @@ def subspace(
     IdentificationError
         If the order is below one, there are too few block rows or lines, or lines are at or above half the sample rate.
     """
-    if order < 1:
-        raise IdentificationError(f"order: is {order}, needs at least 1")
+    IdentificationError.unless_at_least("order", order, 1)
     if responses.decay_rate_1_s:
         raise IdentificationError(
-            f"decay_rate_1_s: is {responses.decay_rate_1_s:.4g} 1/s, allowed is 0; `linear_modes` takes such responses"
+            field="decay_rate_1_s",
+            value=responses.decay_rate_1_s,
+            allowed="0",
+            hint="`linear_modes` takes such responses",
         )
     if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
         raise IdentificationError(
-            f"sample_rate_hz: is {sample_rate_hz:g} Hz, needs more than twice {responses.frequency_hz[-1]:g} Hz"
+            field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"
         )
     rows = order + 2 if block_rows is None else block_rows
     if (rows - 1) * len(responses.outputs) < order:
         raise IdentificationError(
-            f"block_rows: is {rows}, too few for order {order} of {len(responses.outputs)} outputs"
+            f"too few for order {order} of {len(responses.outputs)} outputs", field="block_rows", value=rows
         )
     data = weighted_responses(responses, weighting)
     z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)

@@ -68,9 +68,8 @@ def as_levels(value: Any, where: str) -> Sequence[Any]:
     if isinstance(value, Mapping):
         return [value]
     if not _is_list(value):
-        raise IdentificationError(f"{where}: is {_kind(value)}, needs a list of structures")
-    if not len(value):
-        raise IdentificationError(f"{where}: is empty, needs at least one level")
+        raise IdentificationError(f"is {_kind(value)}", where=where, allowed="a list of structures")
+    IdentificationError.raise_if(not len(value), "is empty", where=where, allowed="at least one level")
     return list(value)
 
 
@@ -79,16 +78,16 @@ def numbers(value: Any, ndim: int, where: str) -> NDArray[Any]:
     try:
         array = np.asarray(value)
     except ValueError:
-        raise IdentificationError(f"{where}: is a list of unequal lengths, needs numbers") from None
+        raise IdentificationError("is a list of unequal lengths", where=where, allowed="numbers") from None
     if array.dtype.kind not in "iufc":
-        raise IdentificationError(f"{where}: is {_kind(value)}, needs numbers")
+        raise IdentificationError(f"is {_kind(value)}", where=where, allowed="numbers")
     if ndim == 1 and array.ndim <= 2 and array.size == max(array.shape, default=1):
         return array.reshape(-1)
     if ndim == 2 and array.ndim <= 1:
         return array.reshape(-1, 1)
     if ndim == 2 and array.ndim == 2:
         return array.T if array.shape[0] == 1 else array
-    raise IdentificationError(f"{where}: has shape {array.shape}, needs {'a vector' if ndim == 1 else 'a matrix'}")
+    raise IdentificationError(f"has shape {array.shape}", where=where, allowed="a vector" if ndim == 1 else "a matrix")
 
 
 def _is_list(value: Any) -> bool:

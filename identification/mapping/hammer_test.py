@@ -10,6 +10,7 @@ from identification.errors import IdentificationError
 from identification.hammer.hammer_test import hammer_test
 from identification.hammer.result import HammerTest
 from identification.mapping.base import ChannelMapping, MappingTable, Path, as_levels, in_si, numbers, value_at
+from vibrolock.errors import InputError
 
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
@@ -66,7 +67,7 @@ class HammerTestMapping(MappingTable):
     def _different(self) -> "HammerTestMapping":
         names = [channel.name for channel in self.channels]
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ValueError(f"channels: '{twice}' is the name of two; names must differ")
+            raise InputError(f"'{twice}' is the name of two", field="channels", hint="names must differ")
         return self
 
 
@@ -114,7 +115,7 @@ def _records(entry: Any, mapping: HammerTestMapping, number: int) -> list[NDArra
     ]
     if len({signal.shape for signal in signals}) > 1:
         shapes = ", ".join(f"{c.name} {signal.shape}" for c, signal in zip(mapping.channels, signals, strict=True))
-        raise IdentificationError(f"{where}channels: unequal lengths ({shapes})")
+        raise IdentificationError(f"unequal lengths ({shapes})", where=where, field="channels")
     return [np.array([s[:, column] for s in signals], dtype=np.float64) for column in range(signals[0].shape[1])]
 
 
@@ -131,4 +132,4 @@ def _sample_rate(data: Any, entry: Any, mapping: HammerTestMapping) -> float:
         return float(1.0 / step)
     if isinstance(data, dict) and isinstance(data.get("sample_rate_hz"), float):
         return float(data["sample_rate_hz"])
-    raise IdentificationError("sample_rate_hz: is missing; give it, or time")
+    raise IdentificationError("is missing", field="sample_rate_hz", hint="give it, or time")

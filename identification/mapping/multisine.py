@@ -67,12 +67,14 @@ def map_multisine(data: Any, mapping: MultisineMapping) -> PeriodicSpectra:
             whole = record.shape[1] // design.period_samples * design.period_samples
             if not whole:
                 raise IdentificationError(
-                    f"channels: have {record.shape[1]} samples, needs one period, {design.period_samples} at least"
+                    f"have {record.shape[1]} samples",
+                    field="channels",
+                    allowed=f"one period, {design.period_samples} at least",
                 )
             records.append(record[:, :whole] * factors[:, None])
     if mapping.records is not None:
         if unknown := [number for number in mapping.records if number > len(records)]:
-            raise IdentificationError(f"records: {unknown[0]}, the data has 1 to {len(records)}")
+            raise IdentificationError(f"{unknown[0]}, the data has 1 to {len(records)}", field="records")
         records = [records[number - 1] for number in mapping.records]
     return periodic_spectra(records, channels, design, transient_periods=mapping.transient_periods)
 
@@ -91,7 +93,7 @@ def _records(data: Any, mapping: MultisineMapping, where: str) -> list[NDArray[n
     ]
     if len({signal.shape for signal in signals}) > 1:
         shapes = ", ".join(f"{c.name} {signal.shape}" for c, signal in zip(mapping.channels, signals, strict=True))
-        raise IdentificationError(f"{where}channels: unequal lengths ({shapes})")
+        raise IdentificationError(f"unequal lengths ({shapes})", where=where, field="channels")
     return [np.array([s[:, column] for s in signals], dtype=np.float64) for column in range(signals[0].shape[1])]
 
 

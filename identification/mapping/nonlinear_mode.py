@@ -59,19 +59,18 @@ def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMod
             )
     if len({array.size for array in stored.values()}) > 1:
         sizes = ", ".join(f"{name} {array.size}" for name, array in stored.items())
-        raise IdentificationError(f"columns: unequal lengths ({sizes})")
+        raise IdentificationError(f"unequal lengths ({sizes})", field="columns")
     frequency = stored["frequency"] / (1.0 if mapping.frequency_unit == "Hz" else 2.0 * np.pi)
     damping = stored["damping"] * (0.01 if mapping.damping_unit == "%" else 1.0)
     peak = np.sqrt(2.0) if mapping.values == "rms" else 1.0
     unit, factor = si_of(mapping.amplitude_unit, "amplitude_unit")
     if unit not in _ORDER:
         raise IdentificationError(
-            f"amplitude_unit: is '{mapping.amplitude_unit}', needs a displacement, velocity or acceleration"
+            field="amplitude_unit", value=mapping.amplitude_unit, allowed="a displacement, velocity or acceleration"
         )
     amplitude = stored["amplitude"] * factor * peak / (2.0 * np.pi * frequency) ** _ORDER[unit]
     force_unit, force_factor = si_of(mapping.force_unit, "force_unit")
-    if force_unit != "N":
-        raise IdentificationError(f"force_unit: is '{mapping.force_unit}', needs a force")
+    IdentificationError.raise_if(force_unit != "N", field="force_unit", value=mapping.force_unit, allowed="a force")
     force = stored["force"] * force_factor * peak if "force" in stored else np.full(frequency.size, np.nan)
     return _mode(mapping, frequency, damping, amplitude, force)
 

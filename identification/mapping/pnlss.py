@@ -90,15 +90,16 @@ def _array(data: Any, mapping: PnlssMapping, name: str) -> Float:
 def _shaped(array: Float, name: str, shape: tuple[int, int]) -> Float:
     """Return the array in ``shape``, with the dimensions of size one that file readers drop."""
     if array.size != shape[0] * shape[1] or (array.ndim == 2 and 1 not in shape and array.shape != shape):
-        raise IdentificationError(f"{name}: shape {array.shape}, needs {shape}")
+        raise IdentificationError(f"shape {array.shape}", field=name, allowed=f"{shape}")
     return array.reshape(shape)
 
 
 def _powers(data: Any, mapping: PnlssMapping, name: str, variables: int) -> NDArray[np.int64]:
     array = _array(data, mapping, name)
     if array.size and array.shape[-1:] != (variables,):
-        raise IdentificationError(f"{name}: shape {array.shape}, needs {variables} columns: states, then inputs")
+        raise IdentificationError(
+            f"shape {array.shape}", field=name, allowed=f"{variables} columns: states, then inputs"
+        )
     powers = np.round(array).astype(np.int64)
-    if not np.array_equal(powers, array):
-        raise IdentificationError(f"{name}: are no whole numbers")
+    IdentificationError.raise_if(not np.array_equal(powers, array), "are no whole numbers", field=name)
     return powers.reshape(-1, variables)

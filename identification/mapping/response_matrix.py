@@ -96,11 +96,13 @@ def _paths(data: Any, mapping: ResponseMatrixMapping, lines: int) -> Any:
                 raise IdentificationError(f"{where}: '{name}' is none of {', '.join(names)}")
         response = complex_at(data, path.value, 1, f"{where}.value")
         if response.size != lines:
-            raise IdentificationError(f"{where}.value: {response.size} values for {lines} frequencies")
+            raise IdentificationError(f"{response.size} values for {lines} frequencies", field=f"{where}.value")
         if not np.all(np.isfinite(response)):
-            raise IdentificationError(f"{where}.value: is not finite at [{int(np.argmin(np.isfinite(response)))}]")
+            raise IdentificationError(
+                f"is not finite at [{int(np.argmin(np.isfinite(response)))}]", field=f"{where}.value"
+            )
         value[:, outputs.index(path.output), inputs.index(path.input)] = response
     missing = [f"{o} to {i}" for k, o in enumerate(outputs) for j, i in enumerate(inputs) if np.isnan(value[0, k, j])]
     if missing:
-        raise IdentificationError(f"paths: the response of {', '.join(missing)} is missing")
+        raise IdentificationError(f"the response of {', '.join(missing)} is missing", field="paths")
     return value

@@ -28,10 +28,11 @@ def instants_at(data: Any, path: str) -> tuple[float, float]:
 def common_rate_hz(told: Mapping[str, float | None]) -> float:
     """Return the sample rate on which all that name one agree, by where it is from; raise `IdentificationError` otherwise."""
     rates = {name: rate for name, rate in told.items() if rate is not None}
-    if not rates:
-        raise IdentificationError("sample_rate_hz: is missing; give it, or time")
+    IdentificationError.raise_if(not rates, "is missing", field="sample_rate_hz", hint="give it, or time")
     lowest, highest = min(rates.values()), max(rates.values())
     if not lowest > 0.0 or not highest < np.inf or highest / lowest - 1.0 > _SAME:
         text = ", ".join(f"{name} {rate:g} Hz" for name, rate in rates.items())
-        raise IdentificationError(f"sample_rate_hz: disagrees ({text}); correct or leave out the wrong one")
+        raise IdentificationError(
+            f"disagrees ({text})", field="sample_rate_hz", hint="correct or leave out the wrong one"
+        )
     return next(iter(rates.values()))

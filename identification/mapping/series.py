@@ -31,8 +31,9 @@ def series(value: Any, axes: Sequence[str], index: int, where: str) -> Series:
     """
     array = _array(value, where)
     if array.size == max(array.shape, default=1):
-        if index > 1:
-            raise IdentificationError(f"{where}.index: is {index}, '{where}' is a vector, which has 1 channel")
+        IdentificationError.raise_if(
+            index > 1, f"'{where}' is a vector, which has 1 channel", field=f"{where}.index", value=index
+        )
         array, axes = array.reshape(-1), ("sample",)
     if array.ndim != len(axes):
         raise IdentificationError(
@@ -44,7 +45,7 @@ def series(value: Any, axes: Sequence[str], index: int, where: str) -> Series:
         at = names.index("channel")
         if index > array.shape[at]:
             raise IdentificationError(
-                f"{where}.index: is {index}, the array has 1 to {array.shape[at]} (shape {array.shape})"
+                f"the array has 1 to {array.shape[at]} (shape {array.shape})", field=f"{where}.index", value=index
             )
         array = np.take(array, index - 1, axis=at)
         names.pop(at)
@@ -60,15 +61,15 @@ def _array(value: Any, where: str) -> NDArray[Any]:
     try:
         array = np.asarray(value)
     except ValueError:
-        raise IdentificationError(f"{where}: is a list of unequal lengths, needs numbers") from None
+        raise IdentificationError("is a list of unequal lengths", where=where, allowed="numbers") from None
     if array.dtype.kind not in "biuf":
         what = "complex" if array.dtype.kind == "c" else "no array of numbers"
-        raise IdentificationError(f"{where}: is {what}, needs real numbers over time")
+        raise IdentificationError(f"is {what}", where=where, allowed="real numbers over time")
     if array.size < 2:
-        raise IdentificationError(f"{where}: has shape {array.shape}, needs two samples at least")
+        raise IdentificationError(f"has shape {array.shape}", where=where, allowed="two samples at least")
     if array.dtype.kind == "f" and not np.all(np.isfinite(array)):
         at = [int(i) for i in np.argwhere(~np.isfinite(array))[0]]
-        raise IdentificationError(f"{where}: value at {at} is {array[tuple(at)]}, must be finite")
+        raise IdentificationError(f"value at {at} is {array[tuple(at)]}", where=where, allowed="finite")
     return array
 
 
@@ -83,9 +84,8 @@ def common_length(
     lengths = [one.shape[-1] for one in late]
     told = ", ".join(f"{name} {' x '.join(map(str, shape))}" for name, shape in shapes.items())
     if len({one.shape[:2] for one in late}) > 1:
-        raise IdentificationError(f"channels: unequal numbers of levels x realisations x samples ({told})")
+        raise IdentificationError(f"unequal numbers of levels x realisations x samples ({told})", field="channels")
     if len(set(lengths)) > 1 and not cut:
-        raise IdentificationError(f"channels: unequal lengths (levels x realisations x samples: {told})")
-    if min(lengths) < 2:
-        raise IdentificationError(f"channels: no two samples are left in common ({told})")
+        raise IdentificationError(f"unequal lengths (levels x realisations x samples: {told})", field="channels")
+    IdentificationError.raise_if(min(lengths) < 2, f"no two samples are left in common ({told})", field="channels")
     return np.array([one[..., : min(lengths)] for one in late])

@@ -115,11 +115,11 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
     for number, group in enumerate(mapping.sets):
         where = f"sets[{number}]"
         if group.phase is not None and mapping.phase is None:
-            raise IdentificationError(f"{where}.phase: is '{group.phase}', but the mapping has no [phase] table")
+            raise IdentificationError("the mapping has no [phase] table", field=f"{where}.phase", value=group.phase)
         levels = _levels(data, group, where)
         if group.level_values and len(group.level_values) != len(levels):
             raise IdentificationError(
-                f"{where}.level_values: {len(group.level_values)} given, the data has {len(levels)} levels"
+                f"{len(group.level_values)} given, the data has {len(levels)} levels", field=f"{where}.level_values"
             )
         found += [_response(level, index, group, mapping, where) for index, level in enumerate(levels)]
     return tuple(found)
@@ -162,7 +162,7 @@ def _response(
         raise IdentificationError(f"{where}, level {index + 1}: unequal lengths ({sizes})")
     if (group.phase is None) != np.iscomplexobj(stored["response"]):
         state = "left out, but '{}' holds real" if group.phase is None else "given, but '{}' holds complex"
-        raise IdentificationError(f"{where}.phase: is {state.format(group.response)} numbers")
+        raise IdentificationError(f"is {state.format(group.response)} numbers", field=f"{where}.phase")
     for name in ("force", "response"):
         if not np.iscomplexobj(stored[name]) and np.any(stored[name] < 0.0):
             raise IdentificationError(f"{where}.{name}, level {index + 1}: an amplitude is below zero; check the path")
@@ -185,7 +185,7 @@ def _response(
             frequency_hz, force, response, kind, group.controlled, level, label, specimen=mapping.specimen
         )
     except (AttributeError, KeyError, IndexError, ValueError) as error:
-        raise IdentificationError(f"{where}, level {index + 1}: {error}") from None
+        raise IdentificationError.of(error, where=f"{where}, level {index + 1}") from None
 
 
 def _turn(phase: NDArray[Any], convention: PhaseConvention, kind: Motion) -> Complex:

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from identification.mapping.base import ChannelMapping, MappingTable, Path
 from identification.mapping.csv_layout import CsvLayout
+from vibrolock.errors import InputError
 
 Axis = Literal["sample", "channel", "period", "realisation", "level"]
 Count = Annotated[int, Field(ge=0)]
@@ -70,7 +71,7 @@ class Stretch(MappingTable):
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 raise ValueError(f"{one} and {other}: give one of the two")
         if self.repeat > 1 and self.samples is None and self.duration_s is None:
-            raise ValueError("repeat: needs samples or duration_s")
+            raise InputError(field="repeat", allowed="samples or duration_s")
         return self
 
 
@@ -126,15 +127,17 @@ class TimeDataMapping(MappingTable):
         check_axes(self.axes)
         names = [channel.name for channel in self.channels]
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ValueError(f"channels: '{twice}' is the name of two; names must differ")
+            raise InputError(f"'{twice}' is the name of two", field="channels", hint="names must differ")
         if self.instrument and self.instrument not in names:
-            raise ValueError(f"instrument = '{self.instrument}': allowed is one of {', '.join(names)}")
+            raise InputError(field="instrument", value=self.instrument, allowed=names)
         if (self.lowest_hz is None) != (self.highest_hz is None):
             raise ValueError("lowest_hz and highest_hz: give both or none")
         if self.lowest_hz is not None and self.highest_hz is not None and self.lowest_hz >= self.highest_hz:
-            raise ValueError(f"lowest_hz = {self.lowest_hz:g}: allowed is below highest_hz = {self.highest_hz:g}")
+            raise InputError(field="lowest_hz", value=self.lowest_hz, allowed=f"below highest_hz = {self.highest_hz:g}")
         if self.transient_periods and not self.is_periodic:
-            raise ValueError("transient_periods: is for periodic data; add period_samples, or leave it out")
+            raise InputError(
+                "is for periodic data", field="transient_periods", hint="add period_samples, or leave it out"
+            )
         return self
 
     @property
@@ -149,7 +152,5 @@ class TimeDataMapping(MappingTable):
 
 def check_axes(axes: tuple[str, ...]) -> None:
     """Raise ValueError unless ``sample`` is among the axes, and none is named twice."""
-    if "sample" not in axes:
-        raise ValueError(f"axes = {list(axes)}: sample must be among them")
-    if len(set(axes)) < len(axes):
-        raise ValueError(f"axes = {list(axes)}: each may be named once")
+    InputError.raise_if("sample" not in axes, "sample must be among them", field="axes", value=list(axes))
+    InputError.raise_if(len(set(axes)) < len(axes), "each may be named once", field="axes", value=list(axes))

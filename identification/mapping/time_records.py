@@ -57,7 +57,9 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         raw += _raw_records({name: some[number] for name, some in entries.items()}, every, mapping, where)
     rate = raw[0].rate_hz
     if any(abs(one.rate_hz / rate - 1.0) > 1e-6 for one in raw):
-        raise IdentificationError(f"sample_rate_hz: records have rates from {rate:g} Hz on; wanted is one")
+        raise IdentificationError(
+            f"records have rates from {rate:g} Hz on", field="sample_rate_hz", hint="wanted is one"
+        )
     cut, notes = _cut(raw, mapping, rate)
     channels, _ = in_si(mapping.channels)
     forces = [row for row, channel in enumerate(channels) if channel.role == "force"]
@@ -129,7 +131,9 @@ def _raw_records(
     periods = {one.period_samples for one in found} - {0}
     if len(periods) > 1 or (periods and mapping.period_samples not in (None, *periods)):
         lengths = ", ".join(map(str, sorted({*periods, mapping.period_samples or 0} - {0})))
-        raise IdentificationError(f"{where}period_samples: disagree ({lengths}), wanted is one length of a period")
+        raise IdentificationError(
+            f"disagree ({lengths}), wanted is one length of a period", where=where, field="period_samples"
+        )
     together = common_length(
         [one.values for one in found],
         skipped,
@@ -178,7 +182,9 @@ def _skipped(channels: Sequence[SampledChannel], starts: Sequence[float], rate_h
     for channel, samples in zip(channels, late, strict=True):
         if abs(samples - round(samples)) > _WHOLE:
             raise IdentificationError(
-                f"channels.{channel.name}: begins {samples:.2f} samples before another; allowed are whole samples, resample it"
+                f"begins {samples:.2f} samples before another",
+                field=f"channels.{channel.name}",
+                allowed="whole samples, resample it",
             )
     return [round(samples) + channel.start_samples for channel, samples in zip(channels, late, strict=True)]
 
@@ -188,7 +194,7 @@ def _cut(raw: Sequence[_Raw], mapping: TimeDataMapping, rate_hz: float) -> tuple
     ratio = 1.0 if mapping.new_rate_hz is None else mapping.new_rate_hz / rate_hz
     if ratio > 1.0 + 1e-9:
         raise IdentificationError(
-            f"new_rate_hz: is {mapping.new_rate_hz:g} Hz, the data has {rate_hz:g} Hz; allowed is up to that"
+            f"the data has {rate_hz:g} Hz", field="new_rate_hz", value=mapping.new_rate_hz, allowed="up to that"
         )
     found, left, groups = [], 0, 1 + max(one.group for one in raw)
     for number, one in enumerate(raw, 1):
@@ -229,7 +235,7 @@ def _stretches(stretches: Sequence[Stretch], size: int, rate_hz: float, number: 
             end = size if length is None else at + length
             if end > size or at >= end:
                 raise IdentificationError(
-                    f"stretches[{which}]: ends at sample {max(end, at)}, record {number} has {size} samples"
+                    f"ends at sample {max(end, at)}, record {number} has {size} samples", field=f"stretches[{which}]"
                 )
             found.append((at, end, which))
     return found
@@ -240,7 +246,7 @@ def _decimated(samples: Float, rate_hz: float, new_hz: float, at_rest: bool, whe
     slow = decimated(samples, rate_hz, new_hz)
     first = 0 if at_rest else EDGE_SAMPLES
     if slow.shape[1] <= first + EDGE_SAMPLES:
-        raise IdentificationError(f"new_rate_hz: is {new_hz:g} Hz, {where} is too short for its filter")
+        raise IdentificationError(f"{where} is too short for its filter", field="new_rate_hz", value=new_hz)
     return slow[:, first : slow.shape[1] - EDGE_SAMPLES], float(first)
 
 
@@ -294,7 +300,8 @@ def _named(cut: Sequence[_Raw], mapping: TimeDataMapping, force: Sequence[int], 
     levels = mapping.levels
     if levels is not None and len(levels) not in (len(groups), len(cut)):
         raise IdentificationError(
-            f"levels: has {len(levels)} numbers, the data has {len(groups)} levels and {len(cut)} records; one for each"
+            f"has {len(levels)} numbers, the data has {len(groups)} levels and {len(cut)} records; one for each",
+            field="levels",
         )
     records: list[TimeRecord] = []
     for number, one in enumerate(cut):

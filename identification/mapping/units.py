@@ -32,5 +32,5 @@ def si_of(unit: str, where: str) -> tuple[str, float]:
     unit = unit.strip()
     known = UNITS.get(_SPELLINGS.get(unit, unit))
     if known is None:
-        raise IdentificationError(f"{where}: is '{unit}', understood are {', '.join(UNITS)}")
+        raise IdentificationError(f"is '{unit}'", where=where, allowed=UNITS)
     return known

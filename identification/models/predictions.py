@@ -53,14 +53,14 @@ class Predictions(Result):
         if not self.steady_bands:
             object.__setattr__(self, "steady_bands", (None,) * len(self.steady))
         if len(self.steady_bands) != len(self.steady):
-            raise IdentificationError(f"steady: {len(self.steady)} predictions, {len(self.steady_bands)} bands")
+            raise IdentificationError(f"{len(self.steady)} predictions, {len(self.steady_bands)} bands", field="steady")
         for kind, counts in (
             ("steady", (len(self.steady), len(self.steady_references), len(self.steady_errors))),
             ("sweeps", (len(self.sweeps), len(self.sweep_references), len(self.sweep_errors))),
         ):
             if len(set(counts)) > 1:
                 raise IdentificationError(
-                    f"{kind}: {counts[0]} predictions, {counts[1]} references, {counts[2]} errors"
+                    f"{counts[0]} predictions, {counts[1]} references, {counts[2]} errors", field=kind
                 )
 
     @property

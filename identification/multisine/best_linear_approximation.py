@@ -97,19 +97,22 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     lines = spectra.spectra[..., spectra.excited].reshape(-1, len(spectra.channels), int(spectra.excited.sum()))
     if lines.shape[0] <= len(rows):
         raise IdentificationError(
-            f"periods, realisations: make {lines.shape[0]} records, a coherence with {len(rows)} inputs needs more than that"
+            f"make {lines.shape[0]} records, a coherence with {len(rows)} inputs needs more than that",
+            field="periods, realisations",
         )
     y, u = lines[:, spectra.index(output)], lines[:, rows]
     sizes = np.sqrt(np.sum(np.abs(lines) ** 2, axis=0))[[spectra.index(output), *rows]]
     if np.any(sizes == 0.0):
         where = spectra.frequency_hz[spectra.excited][int(np.argmax(np.any(sizes == 0.0, axis=0)))]
-        raise IdentificationError(f"{output}, inputs: have no power at {where:g} Hz, an excited line")
+        raise IdentificationError(f"have no power at {where:g} Hz, an excited line", field=f"{output}, inputs")
     y, u = y / sizes[0], u / sizes[1:]
     powers = np.einsum("rik,rjk->kij", u, np.conj(u))
     cross = np.einsum("rk,rik->ki", y, np.conj(u))
     dependent = np.linalg.eigvalsh(powers)[:, 0] < _DEPENDENT
     if np.any(dependent):
         where = spectra.frequency_hz[spectra.excited][int(np.argmax(dependent))]
-        raise IdentificationError(f"inputs: depend on each other at {where:g} Hz, their shares cannot be separated")
+        raise IdentificationError(
+            f"depend on each other at {where:g} Hz, their shares cannot be separated", field="inputs"
+        )
     found = np.einsum("ki,kij,kj->k", cross, np.linalg.inv(powers), np.conj(cross)).real
     return np.asarray(np.clip(found, 0.0, 1.0))

@@ -66,23 +66,26 @@ class MultisineDesign:
         for name in ("sample_rate_hz", "lowest_hz", "highest_hz"):
             positive(name, getattr(self, name), "Hz")
         positive("rms", self.rms)
-        if self.period_samples < 3:
-            raise IdentificationError(f"period_samples: is {self.period_samples}, needs at least 3")
+        IdentificationError.unless_at_least("period_samples", self.period_samples, 3)
         check_grid(self.grid, self.detection_group, self.grid_seed)
         if self.highest_hz < self.lowest_hz:
-            raise IdentificationError(f"highest_hz: is {self.highest_hz:g} Hz, needs lowest_hz = {self.lowest_hz:g} Hz")
+            raise IdentificationError(
+                field="highest_hz", value=self.highest_hz, allowed=f"lowest_hz = {self.lowest_hz:g} Hz"
+            )
         if self.highest_hz >= 0.5 * self.sample_rate_hz:
             raise IdentificationError(
-                f"highest_hz: is {self.highest_hz:g} Hz, must be below half the sample rate, "
-                f"{0.5 * self.sample_rate_hz:g} Hz"
+                field="highest_hz",
+                value=self.highest_hz,
+                allowed=f"below half the sample rate, {0.5 * self.sample_rate_hz:g} Hz",
             )
         if not self.lines.size:
             group = (
                 f", of which it takes groups of {self.detection_group} odd ones" if self.grid == "odd-random" else ""
             )
             raise IdentificationError(
-                f"lowest_hz, highest_hz: no line of the {self.grid} grid in {self.lowest_hz:g} to {self.highest_hz:g} Hz; "
-                f"lines are {self.resolution_hz:g} Hz apart{group}"
+                f"no line of the {self.grid} grid in {self.lowest_hz:g} to {self.highest_hz:g} Hz; lines are "
+                f"{self.resolution_hz:g} Hz apart{group}",
+                field="lowest_hz, highest_hz",
             )
         if self.relative_amplitudes is not None:
             self._check_amplitudes(self.relative_amplitudes)
@@ -91,11 +94,14 @@ class MultisineDesign:
         object.__setattr__(self, "relative_amplitudes", tuple(relative))
         values = finite_array("relative_amplitudes", relative, np.float64, 1)
         if values.size != self.lines.size:
-            raise IdentificationError(f"relative_amplitudes: has {values.size} values for {self.lines.size} lines")
+            raise IdentificationError(
+                f"has {values.size} values for {self.lines.size} lines", field="relative_amplitudes"
+            )
         if np.any(values < 0.0) or not np.any(values):
             raise IdentificationError(
-                f"relative_amplitudes: lowest is {values.min():g}, highest {values.max():g}; "
-                "needs none below zero, one above"
+                f"lowest is {values.min():g}, highest {values.max():g}",
+                field="relative_amplitudes",
+                allowed="none below zero, one above",
             )
 
     @classmethod
@@ -115,13 +121,17 @@ class MultisineDesign:
         samples = positive("sample_rate_hz", sample_rate_hz, "Hz") / positive("resolution_hz", resolution_hz, "Hz")
         if not 3.0 <= samples <= _LONGEST_PERIOD:
             raise IdentificationError(
-                f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4g} samples at {sample_rate_hz:g} Hz; "
-                f"needs 3 to {_LONGEST_PERIOD:.0e}"
+                f"a period has {samples:.4g} samples at {sample_rate_hz:g} Hz",
+                field="resolution_hz",
+                value=resolution_hz,
+                allowed=f"3 to {_LONGEST_PERIOD:.0e}",
             )
         if abs(samples - round(samples)) > 1e-6:
             raise IdentificationError(
-                f"resolution_hz: is {resolution_hz:g} Hz, a period has {samples:.4f} samples at {sample_rate_hz:g} Hz; "
-                f"needs a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives"
+                f"a period has {samples:.4f} samples at {sample_rate_hz:g} Hz",
+                field="resolution_hz",
+                value=resolution_hz,
+                allowed=f"a whole number, such as {sample_rate_hz / round(samples):.9g} Hz gives",
             )
         return cls(
             sample_rate_hz,
@@ -196,8 +206,7 @@ class MultisineDesign:
         Fourier transform). At every line the spectra of the experiments are then orthogonal, so that the block can be
         inverted without loss (Dobrowiecki and Schoukens, Automatica 43, 2007). With one input the block is `realisation`.
         """
-        if n_inputs < 1:
-            raise IdentificationError(f"n_inputs: is {n_inputs}, needs one or more")
+        IdentificationError.unless_at_least("n_inputs", n_inputs, 1)
         turns = np.outer(np.arange(n_inputs), np.arange(n_inputs)) * (2.0 * np.pi / n_inputs)
         phases = self._phases(seed, index, n_inputs)
         return self._signals(phases + turns[:, :, None])
@@ -205,8 +214,7 @@ class MultisineDesign:
     def _phases(self, seed: int, index: int, inputs: int) -> Float:
         """float[inputs, n_lines]: phases uniformly distributed over the circle."""
         for name, value in (("seed", seed), ("index", index)):
-            if value < 0:
-                raise IdentificationError(f"{name}: is {value}, needs zero or more")
+            IdentificationError.raise_if(value < 0, field=name, value=value, allowed="zero or more")
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
         return random.uniform(0.0, 2.0 * np.pi, (inputs, self.lines.size))
 

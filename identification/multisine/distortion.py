@@ -62,8 +62,7 @@ class DistortionLevels(Result):
 
     def select(self, lines: Lines) -> Bool:
         """bool[n_lines]: selects the excited lines, or the ``odd`` or ``even`` detection lines."""
-        if lines not in get_args(Lines):
-            raise IdentificationError(f"lines: is '{lines}', allowed are {', '.join(get_args(Lines))}")
+        IdentificationError.unless_one_of("lines", lines, get_args(Lines))
         return self.excited if lines == "excited" else ~self.excited & (self.even == (lines == "even"))
 
     def amplitude(self, channel: str, lines: Lines) -> tuple[Float, Float]:
@@ -99,7 +98,7 @@ def distortion_levels(
     """
     realisations, periods = spectra.spectra.shape[:2]
     if periods < 2:
-        raise IdentificationError("periods: is 1, needs 2 or more to tell noise from distortion")
+        raise IdentificationError(field="periods", value=1, allowed="2 or more to tell noise from distortion")
     _check_silence(spectra, instruments)
     outputs = [channel.name for channel in spectra.channels if channel.name not in {input, *instruments}]
     rows = [spectra.index(name) for name in outputs]

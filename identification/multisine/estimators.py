@@ -51,15 +51,14 @@ def estimated_responses(
     ``keep_deviations`` keeps the error of every realisation. All lines must be excited; the other parameters are those of
     `best_linear_approximation`, which also raises the errors listed there.
     """
-    if estimator not in get_args(Estimator):
-        raise IdentificationError(f"estimator: is '{estimator}', allowed are {', '.join(get_args(Estimator))}")
+    IdentificationError.unless_one_of("estimator", estimator, get_args(Estimator))
     rows = chosen("outputs", channels, outputs, ("drive", "response"))
     columns = chosen("inputs", channels, inputs, ("force",))
     y, u = values[:, :, rows], values[:, :, columns]
     names = [channels[column].name for column in columns]
     if y.shape[0] % len(names):
         raise IdentificationError(
-            f"realisations: are {y.shape[0]}, need a multiple of the {len(names)} inputs {', '.join(names)}"
+            f"are {y.shape[0]}, need a multiple of the {len(names)} inputs {', '.join(names)}", field="realisations"
         )
     z, label = _instruments(channels, values.mean(axis=1), rows, columns, estimator, instruments)
     weights = _weights(u.mean(axis=1), z, frequency_hz, label)
@@ -93,7 +92,7 @@ def chosen(what: str, channels: Sequence[Channel], names: Sequence[str] | None, 
     if not rows or len(set(rows)) < len(rows):
         asked = f"no channel of role {' or '.join(roles)}" if names is None else ", ".join(names) or "none given"
         raise IdentificationError(
-            f"{what}: {asked}; needs one or more, each once, of {', '.join(channel.name for channel in channels)}"
+            asked, field=what, allowed=f"one or more, each once, of {', '.join(channel.name for channel in channels)}"
         )
     return rows
 
@@ -110,7 +109,10 @@ def _instruments(
     if estimator in ("H2", "Hv"):
         if len(columns) > 1:
             raise IdentificationError(
-                f"estimator: is '{estimator}' with {len(columns)} inputs, allowed is one; H1 takes several"
+                f"is '{estimator}' with {len(columns)} inputs",
+                field="estimator",
+                allowed="one",
+                hint="H1 takes several",
             )
         y, u = means[:, rows], means[:, columns]
         if estimator == "H2":
@@ -124,8 +126,9 @@ def _instruments(
     known = chosen("instruments", channels, instruments, ())
     if len(known) != len(columns):
         raise IdentificationError(
-            f"instruments: are {len(known)} ({', '.join(channels[row].name for row in known)}), needs one per input, "
-            f"{len(columns)}"
+            f"are {len(known)} ({', '.join(channels[row].name for row in known)})",
+            field="instruments",
+            allowed=f"one per input, {len(columns)}",
         )
     label = "instrument " if len(known) == 1 else "instruments "
     return means[:, None, known], label + ", ".join(f"'{channels[row].name}'" for row in known)
@@ -139,7 +142,7 @@ def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex
     if np.any(silent):
         where = frequency_hz[int(np.argmax(silent))]
         raise IdentificationError(
-            f"{label}: gives no input at {where:g} Hz, an excited line; is the design what was played?"
+            f"gives no input at {where:g} Hz, an excited line; is the design what was played?", field=label
         )
     scaled_u, scaled_z = u / size_u, np.conj(z / size_z)
     cross = np.einsum("rik,rojk->okij", scaled_u, scaled_z)
@@ -147,8 +150,9 @@ def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex
     if np.any(dependent):
         where = frequency_hz[int(np.argmax(dependent.any(axis=0)))]
         raise IdentificationError(
-            f"{label}: does not move the {u.shape[1]} inputs independently of each other at {where:g} Hz; needs as many "
-            "realisations with other phases at each input, best orthogonal ones"
+            f"does not move the {u.shape[1]} inputs independently of each other at {where:g} Hz",
+            field=label,
+            allowed="as many realisations with other phases at each input, best orthogonal ones",
         )
     scaled = np.einsum("rojk,okji->roik", scaled_z, np.linalg.inv(cross))
     return np.asarray(scaled / size_u)

@@ -18,12 +18,10 @@ _APART = 2**32 - 1  # a key that no realisation has
 
 def check_grid(grid: str, detection_group: int, grid_seed: int) -> None:
     """Raise `IdentificationError` if the grid is unknown, or if the group or the seed is out of its range."""
-    if grid not in get_args(Grid):
-        raise IdentificationError(f"grid: is '{grid}', allowed are {', '.join(get_args(Grid))}")
+    IdentificationError.unless_one_of("grid", grid, get_args(Grid))
     if detection_group < 2:
-        raise IdentificationError(f"detection_group: is {detection_group}, needs at least 2 odd lines")
-    if grid_seed < 0:
-        raise IdentificationError(f"grid_seed: is {grid_seed}, needs zero or more")
+        raise IdentificationError(field="detection_group", value=detection_group, allowed="at least 2 odd lines")
+    IdentificationError.raise_if(grid_seed < 0, field="grid_seed", value=grid_seed, allowed="zero or more")
 
 
 def excited_lines(band: Int, grid: Grid, detection_group: int, grid_seed: int) -> Int:

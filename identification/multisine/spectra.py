@@ -90,8 +90,9 @@ class PeriodicSpectra(Result):
         expected = (len(self.channels), self.frequency_hz.size)
         if self.spectra.shape[2:] != expected or not self.spectra.size or self.excited.size != self.frequency_hz.size:
             raise IdentificationError(
-                f"spectra: shape {self.spectra.shape} with {self.excited.size} values of excited, needs (realisations, "
-                f"periods, {expected[0]} channels, {expected[1]} lines)"
+                f"shape {self.spectra.shape} with {self.excited.size} values of excited",
+                field="spectra",
+                allowed=f"(realisations, periods, {expected[0]} channels, {expected[1]} lines)",
             )
 
     def index(self, name: str) -> int:
@@ -103,10 +104,12 @@ class PeriodicSpectra(Result):
         """bool[n_lines], whether a line is an even multiple of the resolution."""
         steps = np.diff(self.frequency_hz)
         if not steps.size or np.ptp(steps) > 1e-6 * steps[0]:
-            raise IdentificationError("frequency_hz: needs two lines or more, all neighbours equally far apart")
+            raise IdentificationError(
+                field="frequency_hz", allowed="two lines or more, all neighbours equally far apart"
+            )
         lines = self.frequency_hz / steps.mean()
         if np.any(np.abs(lines - np.round(lines)) > 1e-3):
-            raise IdentificationError(f"frequency_hz: lines {steps[0]:g} Hz apart are no multiples of that")
+            raise IdentificationError(f"lines {steps[0]:g} Hz apart are no multiples of that", field="frequency_hz")
         return np.asarray(np.round(lines) % 2 == 0)
 
     @property
@@ -184,28 +187,31 @@ def periodic_spectra(
     IdentificationError
         If values are NaN or infinite, records are not whole periods, or no period is left.
     """
-    if not len(records):
-        raise IdentificationError("records: is empty, needs at least one realisation")
+    IdentificationError.raise_if(not len(records), "is empty", field="records", allowed="at least one realisation")
     if transient_periods < 0:
-        raise IdentificationError(f"transient_periods: is {transient_periods}, needs zero or more")
+        raise IdentificationError(field="transient_periods", value=transient_periods, allowed="zero or more")
     size, spectra = design.period_samples, []
     for number, record in enumerate(records):
         data = finite_array(f"records[{number}]", record, np.float64, 2)
         periods, left = divmod(data.shape[1], size)
         if data.shape[0] != len(channels) or left:
             raise IdentificationError(
-                f"records[{number}]: shape {data.shape}, needs {len(channels)} channels by whole periods of {size} samples"
+                f"shape {data.shape}",
+                field=f"records[{number}]",
+                allowed=f"{len(channels)} channels by whole periods of {size} samples",
             )
         if periods <= transient_periods:
             raise IdentificationError(
-                f"records[{number}]: has {periods} periods, needs more than transient_periods = {transient_periods}"
+                f"has {periods} periods",
+                field=f"records[{number}]",
+                allowed=f"more than transient_periods = {transient_periods}",
             )
         kept = data.reshape(len(channels), periods, size)[:, transient_periods:]
         lines = np.fft.rfft(kept, axis=-1)[..., design.band_lines] * (2.0 / size)
         spectra.append(np.moveaxis(lines, 0, 1))
     if len({spectrum.shape for spectrum in spectra}) > 1:
         counts = ", ".join(str(spectrum.shape[0]) for spectrum in spectra)
-        raise IdentificationError(f"records: have {counts} settled periods, need the same number")
+        raise IdentificationError(f"have {counts} settled periods, need the same number", field="records")
     return PeriodicSpectra(
         channels=tuple(channels),
         frequency_hz=np.asarray(design.band_lines * design.resolution_hz, dtype=np.float64),

@@ -47,14 +47,17 @@ def shapes_for(
     listed = ", ".join(f"{modes.frequency_hz[k]:.4g}" for k in columns)
     if len(columns) > len(channels):
         raise IdentificationError(
-            f"modes: {len(columns)} closely spaced ones ({listed} Hz), {len(channels)} common channels "
-            f"({', '.join(channels)}) cannot tell them apart; measure at more points"
+            f"{len(columns)} closely spaced ones ({listed} Hz), {len(channels)} common channels "
+            f"({', '.join(channels)}) cannot tell them apart; measure at more points",
+            field="modes",
         )
     shapes = modes.shapes[np.ix_(rows, columns)]
     if (gain := _error_gain(shapes)) > _LARGEST_GAIN:
         raise IdentificationError(
-            f"modes: {listed} Hz look alike at {', '.join(channels)} (errors grow {gain:.0f} times, allowed is "
-            f"{_LARGEST_GAIN:g}); measure where their shapes differ"
+            f"{listed} Hz look alike at {', '.join(channels)} (errors grow {gain:.0f} times",
+            field="modes",
+            allowed=f"{_LARGEST_GAIN:g})",
+            hint="measure where their shapes differ",
         )
     found = ModeShapes(
         channels, shapes, 0, modes.shapes_std[np.ix_(rows, columns)], _shape_covariance(modes, rows, columns)
@@ -67,7 +70,7 @@ def _tested(modes: LinearModes, backbone: Backbone, mode: int | None) -> int:
     count = modes.frequency_hz.size
     if mode is not None:
         if not 0 <= mode < count:
-            raise IdentificationError(f"mode: is {mode}, allowed are 0 to {count - 1}")
+            raise IdentificationError(field="mode", value=mode, allowed=f"0 to {count - 1}")
         return mode
     start_hz = float(backbone.frequency_hz[int(np.argmin(backbone.amplitude_m))])
     away = np.abs(modes.frequency_hz / start_hz - 1.0)
@@ -75,13 +78,15 @@ def _tested(modes: LinearModes, backbone: Backbone, mode: int | None) -> int:
     listed = ", ".join(f"{f:.5g}" for f in modes.frequency_hz)
     if away[nearest] > _FURTHEST:
         raise IdentificationError(
-            f"modes: none lies within {100 * _FURTHEST:g} % of {start_hz:.5g} Hz, where the backbone begins ({listed} Hz "
-            "are there); give mode= if one of them is the tested one"
+            f"none lies within {100 * _FURTHEST:g} % of {start_hz:.5g} Hz, where the backbone begins "
+            f"({listed} Hz are there); give mode= if one of them is the tested one",
+            field="modes",
         )
     if others and away[others[0]] < max(_CLEARLY * away[nearest], _SAME):
         raise IdentificationError(
-            f"modes: the backbone begins at {start_hz:.5g} Hz, near to {modes.frequency_hz[nearest]:.5g} and "
-            f"{modes.frequency_hz[others[0]]:.5g} Hz alike; say by mode= which of them is tested"
+            f"the backbone begins at {start_hz:.5g} Hz, near to {modes.frequency_hz[nearest]:.5g} and "
+            f"{modes.frequency_hz[others[0]]:.5g} Hz alike; say by mode= which of them is tested",
+            field="modes",
         )
     return int(nearest)
 
@@ -94,8 +99,9 @@ def _common(modes: LinearModes, backbone: Backbone) -> tuple[tuple[str, ...], li
     if known.get(drive) != "drive":
         have = modes.channels[modes.drive_row].name
         raise IdentificationError(
-            f"modes: the backbone's drive point is '{drive}', the modal model's is '{have}'; both must be the same channel "
-            "of the same name"
+            f"the backbone's drive point is '{drive}', the modal model's is '{have}'; both must be the same "
+            "channel of the same name",
+            field="modes",
         )
     names = tuple(channel.name for channel in motions if channel.name in known)
     notes = [

@@ -158,9 +158,8 @@ class NonlinearMode(Result):
             object.__setattr__(self, name, array)
             allowed = (n, array.shape[-1]) if harmonic and array.ndim else further.get(name, (n,))
             if array.shape != allowed:
-                raise IdentificationError(f"{name}: shape {array.shape} does not fit {n} points")
-        if not n:
-            raise IdentificationError("force_n: a nonlinear mode needs at least one point")
+                raise IdentificationError(f"shape {array.shape} does not fit {n} points", field=name)
+        IdentificationError.raise_if(not n, "a nonlinear mode needs at least one point", field="force_n")
 
     def systematic(self, quantity: str) -> Float:
         """float[n]: standard error of ``quantity`` (a name in `QUANTITIES`) that is common to all points."""
@@ -191,8 +190,7 @@ class NonlinearMode(Result):
         force the true backbone has another value: 1.96 standard errors of the force times the slope between the neighbouring
         points are added at both ends (not in quadrature: the same errors may be in both). NaN with fewer than two levels.
         """
-        if axis not in _AXES:
-            raise IdentificationError(f"axis: is '{axis}', allowed are {', '.join(_AXES)}")
+        IdentificationError.unless_one_of("axis", axis, _AXES)
         along, values = np.asarray(getattr(self, axis)), np.asarray(getattr(self, quantity))
         error = 1.96 * np.asarray(getattr(self, STANDARD_ERRORS[axis])) * np.abs(_slopes(along, values))
         return np.asarray(self.interval(quantity) + error[:, None] * np.array([-1.0, 1.0]))
@@ -229,8 +227,7 @@ _SAME_LEVEL = 0.01  # relative distance of points that were measured at one leve
 
 
 def _column(quantity: str) -> int:
-    if quantity not in QUANTITIES:
-        raise IdentificationError(f"quantity: is '{quantity}', allowed are {', '.join(QUANTITIES)}")
+    IdentificationError.unless_one_of("quantity", quantity, QUANTITIES)
     return QUANTITIES.index(quantity)
 
 

@@ -103,11 +103,11 @@ def nonlinear_mode(
     notes: tuple[str, ...] = ()
     if modes is not None:
         if mode_shapes is not None:
-            raise IdentificationError("modes, mode_shapes: both given, allowed is one of them")
+            raise IdentificationError("both given", field="modes, mode_shapes", allowed="one of them")
         one_specimen(modes=modes.specimen, backbone=backbone.specimen)
         mode_shapes, _, notes = shapes_for(modes, backbone, mode)
     elif mode is not None:
-        raise IdentificationError(f"mode: is {mode}, but there are no modes to choose from; give modes")
+        raise IdentificationError("there are no modes to choose from", field="mode", value=mode, hint="give modes")
     for number, point in enumerate(backbone.points):
         _refuse(f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)", point)
     states, rows = _states(backbone, mode_shapes, _shape_for_mac(mode_shapes, linear_shape))
@@ -139,9 +139,9 @@ def nonlinear_mode(
 def _refuse(name: str, point: PeriodicVibration) -> None:
     """Raise `IdentificationError` if nothing can be identified from a point."""
     if not point.settled:
-        raise IdentificationError(f"{name}: is not settled; use backbone.settled() to leave such points out")
+        raise IdentificationError("is not settled", where=name, hint="use backbone.settled() to leave such points out")
     if point.force_n == 0.0 or point.amplitude_m == 0.0:
-        raise IdentificationError(f"{name}: force or drive-point motion is zero, nothing can be identified")
+        raise IdentificationError("force or drive-point motion is zero, nothing can be identified", where=name)
     if point.harmonics_std is None:
         return
     for role, what in (("force", "force"), ("drive", "drive-point motion")):
@@ -150,8 +150,9 @@ def _refuse(name: str, point: PeriodicVibration) -> None:
         if size < _DROWNED * std:
             unit = point.channels[row].unit
             raise IdentificationError(
-                f"{name}: {what} {size:.3g} {unit} drowns in its standard error of {std:.3g} {unit}; record more periods, "
-                "raise the level, or leave the point out (backbone.select)"
+                f"{what} {size:.3g} {unit} drowns in its standard error of {std:.3g} {unit}; record more "
+                "periods, raise the level, or leave the point out (backbone.select)",
+                where=name,
             )
 
 
@@ -160,18 +161,23 @@ def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
     for number, point in enumerate(backbone.points):
         name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
         if found["modal_amplitude"][number] == 0.0:
-            raise IdentificationError(f"{name}: modal amplitude is zero; check the channels of the mode shapes")
+            raise IdentificationError(
+                "modal amplitude is zero", where=name, hint="check the channels of the mode shapes"
+            )
         if np.isnan(found["modal_frequency_hz"][number]):
             raise IdentificationError(
-                f"{name}: phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency, must be near 90 deg; "
-                "check the polarity of force and drive channel"
+                f"phase lag {point.phase_lag_deg:.0f} deg gives no real modal frequency",
+                where=name,
+                allowed="near 90 deg",
+                hint="check the polarity of force and drive channel",
             )
     damping = found["damping_ratio"]
     negative = int(np.count_nonzero(damping < 0.0))
     if 2 * negative > damping.size:
         raise IdentificationError(
-            f"points: the damping ratio of {negative} of {damping.size} is negative, the force seems to draw power from the "
-            "specimen; check the polarity of force and drive channel"
+            f"the damping ratio of {negative} of {damping.size} is negative, the force seems to draw power "
+            "from the specimen; check the polarity of force and drive channel",
+            field="points",
         )
 
 

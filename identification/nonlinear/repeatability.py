@@ -88,7 +88,7 @@ class Repeatability:
 
     def _runs(self, quantity: str) -> Float:
         if quantity not in ("modal_frequency_hz", "damping_ratio"):
-            raise IdentificationError(f"quantity: is '{quantity}', allowed are modal_frequency_hz, damping_ratio")
+            raise IdentificationError(field="quantity", value=quantity, allowed="modal_frequency_hz, damping_ratio")
         return np.asarray(getattr(self, quantity))
 
 
@@ -203,21 +203,20 @@ def _modes(runs: Sequence[NonlinearMode | Backbone]) -> list[NonlinearMode]:
         if backbone.channels != backbones[0].channels:
             names = ", ".join(channel.name for channel in backbone.channels)
             first = ", ".join(channel.name for channel in backbones[0].channels)
-            raise IdentificationError(f"runs: channels of backbone {number} are {names}, of the first {first}")
+            raise IdentificationError(f"channels of backbone {number} are {names}, of the first {first}", field="runs")
     modes = [
         mode
         for run in runs
         for mode in ([run] if isinstance(run, NonlinearMode) else [nonlinear_mode(one) for one in run.passes()])
     ]
-    if len(modes) < 2:
-        raise IdentificationError(f"runs: {len(modes)} given, repeatability needs two at least")
+    IdentificationError.raise_if(len(modes) < 2, f"{len(modes)} given, repeatability needs two at least", field="runs")
     for number, mode in enumerate(modes, 1):
         if (size := np.unique(mode.amplitude_m).size) < 2:
-            raise IdentificationError(f"runs: run {number} has {size} amplitude, a curve needs two at least")
+            raise IdentificationError(f"run {number} has {size} amplitude, a curve needs two at least", field="runs")
     if len(specimens := {mode.specimen for mode in modes}) > 1:
-        raise IdentificationError(f"runs: of different specimens ({', '.join(sorted(specimens))})")
+        raise IdentificationError(f"of different specimens ({', '.join(sorted(specimens))})", field="runs")
     if len(sources := {mode.source for mode in modes}) > 1:
-        raise IdentificationError(f"runs: from different kinds of tests ({', '.join(sorted(sources))})")
+        raise IdentificationError(f"from different kinds of tests ({', '.join(sorted(sources))})", field="runs")
     return modes
 
 
@@ -226,10 +225,8 @@ def _common_levels(modes: Sequence[NonlinearMode]) -> Float:
     amplitudes = [np.sort(mode.amplitude_m) for mode in modes]
     low, high = max(a[0] for a in amplitudes), min(a[-1] for a in amplitudes)
     if not low < high:
-        raise IdentificationError(
-            "runs: no common range of amplitudes; "
-            + ", ".join(f"{1e3 * a[0]:.4g} to {1e3 * a[-1]:.4g} mm" for a in amplitudes)
-        )
+        ranges = ", ".join(f"{1000.0 * a[0]:.4g} to {1000.0 * a[-1]:.4g} mm" for a in amplitudes)
+        raise IdentificationError(f"no common range of amplitudes; {ranges}", field="runs")
     sizes = {a.size for a in amplitudes}
     levels = np.mean(amplitudes, axis=0) if len(sizes) == 1 else np.geomspace(low, high, min(sizes))
     return np.unique(np.clip(levels, low, high))

@@ -62,11 +62,10 @@ def single_point_mode(
         If no point is in the window, the mode shape is zero, or the window is out of its range.
     """
     if not 0.0 < phase_window_deg <= 80.0:
-        raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 80")
+        raise IdentificationError(field="phase_window_deg", value=phase_window_deg, allowed="above 0 to 80")
     if not (np.isfinite(drive_mode_shape) and drive_mode_shape):
-        raise IdentificationError(f"drive_mode_shape: is {drive_mode_shape}, must be finite and not zero")
-    if not responses:
-        raise IdentificationError("responses: none given, needs one at least")
+        raise IdentificationError(field="drive_mode_shape", value=drive_mode_shape, allowed="finite and not zero")
+    IdentificationError.raise_if(not responses, "none given", field="responses", allowed="one at least")
     frequency = np.concatenate([response.frequency_hz for response in responses])
     force = np.concatenate([response.force for response in responses])
     motion = np.concatenate([response.displacement_m for response in responses])
@@ -74,8 +73,10 @@ def single_point_mode(
     near = np.abs(lag - 90.0) <= phase_window_deg
     if not near.any():
         raise IdentificationError(
-            f"responses: none of {near.size} points lies within {phase_window_deg:g} deg of phase resonance "
-            f"(lags {lag.min():.0f} to {lag.max():.0f} deg); measure nearer to resonance, or check the polarity"
+            f"none of {near.size} points lies within {phase_window_deg:g} deg of phase resonance (lags "
+            f"{lag.min():.0f} to {lag.max():.0f} deg); measure nearer to resonance, or check the "
+            "polarity",
+            field="responses",
         )
     order = np.flatnonzero(near)[np.argsort(np.abs(motion[near]), kind="stable")]
     return _identified(
@@ -104,7 +105,8 @@ def _identified(
     if np.any(squared <= 0.0):
         worst = int(np.argmin(squared))
         raise IdentificationError(
-            f"drive_mode_shape: {shape:g} gives no real modal frequency at {frequency[worst]:g} Hz; check it and the units"
+            f"{shape:g} gives no real modal frequency at {frequency[worst]:g} Hz; check it and the units",
+            field="drive_mode_shape",
         )
     modal = np.sqrt(squared)
     unknown = np.full(frequency.size, np.nan)

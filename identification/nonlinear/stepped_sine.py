@@ -82,13 +82,14 @@ def stepped_sine_mode(
         If there are no response-controlled levels, or if every level has fewer than three usable points or no resonance.
     """
     if not 0.0 < phase_window_deg <= 90.0:
-        raise IdentificationError(f"phase_window_deg: is {phase_window_deg:g}, allowed is above 0 to 90")
+        raise IdentificationError(field="phase_window_deg", value=phase_window_deg, allowed="above 0 to 90")
     levels = [item for item in responses if item.controlled == "response"]
     if not levels:
         kinds = ", ".join(sorted({item.controlled for item in responses})) or "no levels"
         raise IdentificationError(
-            f"responses: none is response-controlled ({kinds} given); a fit of one linear mode per level needs a "
-            "constant response amplitude"
+            f"none is response-controlled ({kinds} given); a fit of one linear mode per level needs a "
+            "constant response amplitude",
+            field="responses",
         )
     fitted, refusals = _fitted(levels, phase_window_deg, complex_constant)
     left_out = len(responses) - len(levels)
@@ -151,8 +152,10 @@ def _used(level: FrequencyResponse, window_deg: float, name: str) -> NDArray[np.
     distinct = np.unique(level.frequency_hz[used]).size
     if distinct < _MIN_POINTS:
         raise IdentificationError(
-            f"{name}: points at {distinct} frequencies of {held.size} points have a lag of 0 to 180 deg and the response "
-            f"at its level within {100 * _LEVEL_TOLERANCE:g} %, needs at least {_MIN_POINTS}"
+            f"points at {distinct} frequencies of {held.size} points have a lag of 0 to 180 deg and the "
+            f"response at its level within {100 * _LEVEL_TOLERANCE:g} %",
+            where=name,
+            allowed=f"at least {_MIN_POINTS}",
         )
     return used
 
@@ -178,7 +181,7 @@ def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bo
     if mass < 0.0:
         a, mass, c, turn = -a, -mass, -c, -turn
     if a <= 0.0 or c <= 0.0:
-        raise IdentificationError(f"{name}: no damped resonance fits; check sign and reference of the phase")
+        raise IdentificationError("no damped resonance fits", where=name, hint="check sign and reference of the phase")
     w = float(np.sqrt(a / mass))
     z = float(c / (2.0 * mass * w))
     misfit = design @ np.array([a, mass, c]) - pair @ turn

@@ -69,8 +69,7 @@ class PredictionError:
 def error_table(errors: Iterable[PredictionError]) -> str:
     """Format a plain-text table, one line per prediction, errors in percent; raise `IdentificationError` if there are none."""
     rows = list(errors)
-    if not rows:
-        raise IdentificationError("errors: is empty, needs at least one comparison")
+    IdentificationError.raise_if(not rows, "is empty", field="errors", allowed="at least one comparison")
     width = max(len("prediction"), *(len(row.name) for row in rows))
     lines = [f"{'prediction':{width}}   peak %  frequency %  envelope %  range use  verdict"]
     for row in rows:
@@ -135,8 +134,7 @@ def compare(
     IdentificationError
         If prediction and reference have no point in common, or the channel was not predicted.
     """
-    if over not in get_args(Over):
-        raise IdentificationError(f"over: is '{over}', allowed are {', '.join(get_args(Over))}")
+    IdentificationError.unless_one_of("over", over, get_args(Over))
     order = MOTION_ORDER[reference.kind]
     scale = (2.0 * np.pi * prediction.frequency_hz) ** order
     amplitude = prediction.amplitude_m(channel) * scale
@@ -150,7 +148,7 @@ def compare(
     used &= np.isfinite(predicted)
     if not np.any(used):
         raise IdentificationError(
-            f"reference: no point in common with the prediction over {over}; check ranges and signs"
+            f"no point in common with the prediction over {over}; check ranges and signs", field="reference"
         )
     measured = np.abs(reference.response)
     notes = list(prediction.notes)

@@ -60,7 +60,9 @@ class SimulatedRun:
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
             if getattr(self, name).shape != (len(self.outputs),):
                 raise IdentificationError(
-                    f"{name}: shape {getattr(self, name).shape}, needs one for each of {len(self.outputs)} outputs"
+                    f"shape {getattr(self, name).shape}",
+                    field=name,
+                    allowed=f"one for each of {len(self.outputs)} outputs",
                 )
 
     @property
@@ -127,7 +129,9 @@ class ErrorSpectra:
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
             if getattr(self, name).shape != (len(self.outputs), self.frequency_hz.size):
                 raise IdentificationError(
-                    f"{name}: shape {getattr(self, name).shape}, needs ({len(self.outputs)}, {self.frequency_hz.size})"
+                    f"shape {getattr(self, name).shape}",
+                    field=name,
+                    allowed=f"({len(self.outputs)}, {self.frequency_hz.size})",
                 )
 
 
@@ -160,7 +164,9 @@ class OutputStretch:
             object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
             if getattr(self, name).shape != (len(self.outputs), self.time_s.size):
                 raise IdentificationError(
-                    f"{name}: shape {getattr(self, name).shape}, needs ({len(self.outputs)}, {self.time_s.size})"
+                    f"shape {getattr(self, name).shape}",
+                    field=name,
+                    allowed=f"({len(self.outputs)}, {self.time_s.size})",
                 )
 
 

@@ -107,7 +107,7 @@ def cut(section_at: Callable[[float], Section], force_n: float, lags_deg: Float,
     amplitude, several = _followed(sections, target, int(np.argmin(np.abs(lags_deg - 90.0))))
     on = np.flatnonzero(np.isfinite(amplitude))
     if not on.size:
-        raise IdentificationError(f"force_n: is {force_n:g} N, {_reach(sections)}")
+        raise IdentificationError(_reach(sections), field="force_n", value=force_n)
     sections, lags_deg, missing, amplitude = [sections[k] for k in on], lags_deg[on], _left(lags_deg, on), amplitude[on]
     omega = np.array([one.omega_at(u) for one, u in zip(sections, amplitude, strict=True)])
     variances = np.array([one.variances(u) for one, u in zip(sections, amplitude, strict=True)])

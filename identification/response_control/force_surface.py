@@ -60,7 +60,7 @@ class ForceSurface(Result):
         """Return one point per level at a phase lag; at phase resonance, the default, a backbone (`single_point_mode`)."""
         section = self.section(phase_lag_deg)
         if not section.omega.size:
-            raise IdentificationError(f"phase_lag_deg: is {phase_lag_deg:g}, no level was measured there")
+            raise IdentificationError("no level was measured there", field="phase_lag_deg", value=phase_lag_deg)
         force = np.exp(section.log_force + 1j * section.lag)
         amplitude = np.exp(section.log_amplitude)
         frequency = section.omega / (2.0 * np.pi)
@@ -83,7 +83,7 @@ class ForceSurface(Result):
             if scores[gap] >= worst:
                 worst, where = float(scores[gap]), float(np.exp(0.5 * (x[gap] + x[gap + 1])))
         if not np.isfinite(where):
-            raise IdentificationError(f"levels: no lag was measured at {LEAST_LEVELS} of them")
+            raise IdentificationError(f"no lag was measured at {LEAST_LEVELS} of them", field="levels")
         return where
 
     def constant_force(self, force_n: float, phase_lags_deg: ArrayLike | None = None) -> ConstantForceCurve:
@@ -103,7 +103,7 @@ class ForceSurface(Result):
         """
         lags = np.atleast_1d(np.asarray(_LAGS_DEG if phase_lags_deg is None else phase_lags_deg, dtype=np.float64))
         if lags.ndim != 1 or not np.all((lags > 0.0) & (lags < 180.0)) or np.any(np.diff(lags) <= 0.0):
-            raise IdentificationError("phase_lags_deg: allowed are rising lags between 0 and 180")
+            raise IdentificationError(field="phase_lags_deg", allowed="rising lags between 0 and 180")
         return cut(self.section, float(force_n), lags, self.specimen)
 
 
@@ -125,11 +125,11 @@ def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
     for response in responses:
         if response.controlled != "response":
             raise IdentificationError(
-                f"responses: '{response.label}' held {response.controlled}, must hold the response"
+                f"'{response.label}' held {response.controlled}, must hold the response", field="responses"
             )
     points = _by_level(responses)
     if len(points) < LEAST_LEVELS:
-        raise IdentificationError(f"responses: {len(points)} levels, needs at least {LEAST_LEVELS}")
+        raise IdentificationError(f"{len(points)} levels", field="responses", allowed=f"at least {LEAST_LEVELS}")
     specimen = responses[0].specimen
     raw = ForceSurface(_fits(points), specimen)
     ordered = sorted(points, key=lambda one: float(np.median(one.amplitude_m)))
@@ -162,7 +162,9 @@ def _fits(points: Sequence[LevelPoints]) -> tuple[LevelFit, ...]:
     fits.sort(key=lambda fit: fit.amplitude_m)
     for lower, upper in pairwise(fits):
         if upper.amplitude_m <= lower.amplitude_m * (1.0 + _SAME_LEVEL):
-            raise IdentificationError(f"responses: two levels have the same amplitude of {upper.amplitude_m:g} m")
+            raise IdentificationError(
+                f"two levels have the same amplitude of {upper.amplitude_m:g} m", field="responses"
+            )
     return tuple(fits)
 
 

@@ -88,14 +88,17 @@ def check_level(points: LevelPoints, name: str) -> None:
     """Raise `IdentificationError` if points are too few, at a single frequency, or on one side of resonance only."""
     omega = points.omega
     if omega.size < _LEAST_POINTS:
-        raise IdentificationError(f"{name}: {omega.size} points, needs at least {_LEAST_POINTS}")
+        raise IdentificationError(f"{omega.size} points", where=name, allowed=f"at least {_LEAST_POINTS}")
     if not np.ptp(omega) > 1e-9 * omega.max():
-        raise IdentificationError(f"{name}: all points at {omega[0] / (2.0 * np.pi):g} Hz, needs several frequencies")
+        raise IdentificationError(
+            f"all points at {omega[0] / (2.0 * np.pi):g} Hz", where=name, allowed="several frequencies"
+        )
     lags = np.degrees(np.angle(points.stiffness))
     if not np.any(lags >= 90.0) or not np.any((lags > 0.0) & (lags <= 90.0)):
         raise IdentificationError(
-            f"{name}: lags {lags.min():.0f} to {lags.max():.0f} deg of the displacement behind the force do not enclose "
-            f"90; measure on both sides of resonance, or check the polarity"
+            f"lags {lags.min():.0f} to {lags.max():.0f} deg of the displacement behind the force do not "
+            "enclose 90; measure on both sides of resonance, or check the polarity",
+            where=name,
         )
 
 

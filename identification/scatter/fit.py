@@ -79,12 +79,13 @@ def fit_with_scatter(
     same_channels(everything)
     named = [f"run {index + 1}" for index in range(len(everything))] if runs is None else list(runs)
     if len(named) != len(everything):
-        raise IdentificationError(f"runs: are {len(named)} names, needs {len(everything)}, one for each experiment")
+        raise IdentificationError(
+            f"are {len(named)} names", field="runs", allowed=f"{len(everything)}, one for each experiment"
+        )
     names = tuple(dict.fromkeys(named))
     if len(names) < 2:
-        raise IdentificationError("runs: is one, needs two at least to tell what changes from run to run")
-    if rounds < 2:
-        raise IdentificationError(f"rounds: is {rounds}, allowed is 2 or above")
+        raise IdentificationError("is one", field="runs", allowed="two at least to tell what changes from run to run")
+    IdentificationError.unless_at_least("rounds", rounds, 2)
     scale = _rms([one.counted_outputs for one in training])
     by_run = [[one for one, name in zip(everything, named, strict=True) if name == run] for run in names]
     found = fit(_loudest(training, named, scale), validation=())

@@ -78,8 +78,7 @@ class RunScatter(Result):
 
     def model_of(self, model: Scattered, run: str) -> Scattered:
         """Return the model of one of the runs. Raises `IdentificationError` if there is none of this name."""
-        if run not in self.runs:
-            raise IdentificationError(f"run: is '{run}', known are {', '.join(self.runs)}")
+        IdentificationError.unless_one_of("run", run, self.runs)
         return shifted(model, self.effects, self.shifts[self.runs.index(run)])
 
     def fresh(self, model: Scattered, count: int, seed: int = 0) -> Iterator[Scattered]:
@@ -107,8 +106,7 @@ class RunScatter(Result):
         """
         from scipy.special import ndtri  # only on use: it takes long to load
 
-        if not 0.0 < share < 1.0:
-            raise IdentificationError(f"share: is {share:g}, allowed is between 0 and 1")
+        IdentificationError.raise_if(not 0.0 < share < 1.0, field="share", value=share, allowed="between 0 and 1")
         ends = (0.5 - 0.5 * share, 0.5 + 0.5 * share)
         with threads() as count, ThreadPoolExecutor(count) as pool:
             runs = list(pool.map(lambda one: run_of(one, experiment), self.fresh(model, draws, seed)))

@@ -50,14 +50,15 @@ def effects_of(
     """
     wrong = [kind for kind in kinds if kind not in KINDS]
     if wrong or not kinds:
-        raise IdentificationError(f"kinds: are {', '.join(kinds) or 'none'}, allowed are {', '.join(KINDS)}")
+        raise IdentificationError(f"are {', '.join(kinds) or 'none'}", field="kinds", allowed=KINDS)
     band = excited_band(experiments) or (0.0, np.inf)
     frequency = np.abs(modes_of(model)) / (2.0 * np.pi)
     modes = [mode for mode, f in enumerate(frequency) if band[0] <= f <= band[1]]
     if not modes and set(kinds) != {"gain"}:
         found = ", ".join(f"{f:.4g}" for f in frequency) or "none"
         raise IdentificationError(
-            f"scatter: the model has modes at {found} Hz, none in the excited band of {band[0]:g} to {band[1]:g} Hz"
+            f"the model has modes at {found} Hz, none in the excited band of {band[0]:g} to {band[1]:g} Hz",
+            field="scatter",
         )
     of_modes = [Effect(kind, mode) for kind in kinds if kind != "gain" for mode in modes]
     return (*of_modes, *[Effect("gain")] * ("gain" in kinds))

@@ -75,7 +75,7 @@ class Phase:
 
     def __init__(self, record: Record) -> None:
         if record.size < 2:
-            raise IdentificationError(f"theta_rad: has {record.size} samples, needs one whole period")
+            raise IdentificationError(f"has {record.size} samples", field="theta_rad", allowed="one whole period")
         self._record = record
         self._only: Float | None = None
         """The phase of a record that is one chunk."""
@@ -90,7 +90,7 @@ class Phase:
             if np.any(still):
                 where = before + int(np.argmax(still))
                 raise IdentificationError(
-                    f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time"
+                    f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
                 )
             if stop - start == record.size:
                 self._only = theta

@@ -46,11 +46,13 @@ def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray
     array = finite_array("signals", signals, np.float64, 1 if np.ndim(signals) < 2 else 2)
     old, new = positive("rate_hz", rate_hz, "Hz"), positive("new_rate_hz", new_rate_hz, "Hz")
     if new > old:
-        raise IdentificationError(f"new_rate_hz: is {new:g} Hz, must be at most rate_hz = {old:g} Hz")
+        raise IdentificationError(field="new_rate_hz", value=new, allowed=f"at most rate_hz = {old:g} Hz")
     ratio = Fraction(new / old).limit_denominator(LARGEST_FACTOR)
     if ratio == 0 or abs(float(ratio) * old / new - 1.0) > 1e-12:
         raise IdentificationError(
-            f"new_rate_hz: is {new:g} Hz, its ratio to rate_hz = {old:g} Hz must be one of whole numbers up to {LARGEST_FACTOR}"
+            f"its ratio to rate_hz = {old:g} Hz must be one of whole numbers up to {LARGEST_FACTOR}",
+            field="new_rate_hz",
+            value=new,
         )
     if ratio == 1:
         return np.array(array)

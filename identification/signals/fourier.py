@@ -101,7 +101,9 @@ def periodic_vibration(
     data = finite_array("samples", values, np.float64, 2)
     if data.shape != (len(channels), theta.size):
         raise IdentificationError(
-            f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
+            f"shape {data.shape}",
+            field="samples",
+            allowed=f"({len(channels)}, {theta.size}): channels by samples of theta_rad",
         )
     return vibration_in(
         ArrayRecord(theta, data, gone),
@@ -131,8 +133,7 @@ def vibration_in(
     The memory that this takes does not grow with the length of the record.
     """
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
-    if harmonics < 1:
-        raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
+    IdentificationError.unless_at_least("harmonics", harmonics, 1)
     phase = Phase(record)
     frequency_hz, periods, count, warnings = _whole_periods(phase, record.size, rate_hz, harmonics)
     chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
@@ -166,14 +167,16 @@ def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
         return np.zeros(size, np.bool_)
     gone = finite_array("lost", lost, np.bool_, 1)
     if gone.size != size:
-        raise IdentificationError(f"lost: has {gone.size} values, needs {size}, one per sample")
+        raise IdentificationError(f"has {gone.size} values", field="lost", allowed=f"{size}, one per sample")
     _refuse_lost(int(gone.sum()), size)
     return gone
 
 
 def _refuse_lost(lost: int, size: int) -> None:
     if lost > _MOST_LOST * size:
-        raise IdentificationError(f"samples: {lost} of {size} were lost, allowed is up to {100.0 * _MOST_LOST:g} %")
+        raise IdentificationError(
+            f"{lost} of {size} were lost", field="samples", allowed=f"up to {100.0 * _MOST_LOST:g} %"
+        )
 
 
 def _per_channel(name: str, given: ArrayLike | None, channels: int) -> Float:
@@ -182,7 +185,7 @@ def _per_channel(name: str, given: ArrayLike | None, channels: int) -> Float:
         return np.zeros(channels)
     values = finite_array(name, given, np.float64, 1)
     if values.size != channels or np.any(values < 0.0):
-        raise IdentificationError(f"{name}: is {given}, needs {channels} numbers of 0 or above, one per channel")
+        raise IdentificationError(field=name, value=given, allowed=f"{channels} numbers of 0 or above, one per channel")
     return values
 
 
@@ -194,11 +197,14 @@ def _whole_periods(phase: Phase, size: int, rate_hz: float, harmonics: int) -> t
     covered = size * step / (2.0 * np.pi)
     periods = int(covered + step / (2.0 * np.pi) + 1e-6)
     if periods < 1:
-        raise IdentificationError(f"theta_rad: covers {covered:.3f} periods, needs at least one whole period")
+        raise IdentificationError(
+            f"covers {covered:.3f} periods", field="theta_rad", allowed="at least one whole period"
+        )
     needed = 2 * harmonics + 2
     if 2.0 * np.pi / step <= needed:
         raise IdentificationError(
-            f"harmonics: {harmonics} need more than {needed} samples per period, the record has {2 * np.pi / step:.2f}"
+            f"{harmonics} need more than {needed} samples per period, the record has {2 * np.pi / step:.2f}",
+            field="harmonics",
         )
     count = phase.samples_below(2.0 * np.pi * periods - 0.5 * step)
     warnings = []

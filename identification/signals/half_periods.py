@@ -50,7 +50,7 @@ def zero_crossings(signal: ArrayLike, *, sample_rate_hz: float, whole_periods: b
         before = before[value[before] < 0.0]
     if before.size < 2:
         upward = "upward " if whole_periods else ""
-        raise IdentificationError(f"signal: has {before.size} {upward}zero crossings, needs at least 2")
+        raise IdentificationError(f"has {before.size} {upward}zero crossings", field="signal", allowed="at least 2")
     share = value[before] / (value[before] - value[before + 1])
     crossing_s = (moved[before] + share * (moved[before + 1] - moved[before])) / rate_hz
     largest = np.maximum.reduceat(np.abs(value), before + 1)[:-1]

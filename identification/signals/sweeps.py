@@ -107,7 +107,7 @@ def force_drop_out(
     searched = resonance_hz if resonance_hz is not None else _sorted(start + edge, end - edge)
     off = float(np.mean([np.median(force[_within(frequency, band, "off_resonance_hz")]) for band in bands]))
     if not off > 0.0:
-        raise IdentificationError(f"force: is {off:g} N off resonance, must be above zero")
+        raise IdentificationError(f"is {off:g} N off resonance", field="force", allowed="above zero")
     near = np.flatnonzero(_within(frequency, searched, "resonance_hz"))
     lowest = int(near[np.argmin(force[near])])
     largest = lowest + int(np.argmax(force[lowest:]))
@@ -144,6 +144,7 @@ def _within(frequency: Float, band: Band, name: str) -> NDArray[np.bool_]:
     inside = (frequency >= band[0]) & (frequency <= band[1])
     if not inside.any():
         raise IdentificationError(
-            f"{name}: is {band[0]:g} to {band[1]:g} Hz, the sweep covers {frequency.min():.4g} to {frequency.max():.4g} Hz"
+            f"is {band[0]:g} to {band[1]:g} Hz, the sweep covers {frequency.min():.4g} to {frequency.max():.4g} Hz",
+            field=name,
         )
     return np.asarray(inside)

@@ -66,13 +66,19 @@ class Transient(Result):
             object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 1))
         object.__setattr__(self, "fundamentals", finite_array("fundamentals", self.fundamentals, np.complex128, 2))
         if self.frequency_hz.shape != self.time_s.shape:
-            raise IdentificationError(f"frequency_hz: {self.frequency_hz.size} values for {self.time_s.size} instants")
+            raise IdentificationError(
+                f"{self.frequency_hz.size} values for {self.time_s.size} instants", field="frequency_hz"
+            )
         if self.fundamentals.shape != (len(self.channels), self.time_s.size):
             raise IdentificationError(
-                f"fundamentals: shape {self.fundamentals.shape}, needs ({len(self.channels)}, {self.time_s.size})"
+                f"shape {self.fundamentals.shape}",
+                field="fundamentals",
+                allowed=f"({len(self.channels)}, {self.time_s.size})",
             )
         if not self.time_s.size or np.any(np.diff(self.time_s) <= 0.0):
-            raise IdentificationError(f"time_s: {self.time_s.size} instants, needs at least one, and rising ones")
+            raise IdentificationError(
+                f"{self.time_s.size} instants", field="time_s", allowed="at least one, and rising ones"
+            )
 
     def index(self, name: str) -> int:
         """Row of the channel called ``name``."""
@@ -132,14 +138,14 @@ def demodulate(
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if data.shape != (len(channels), theta.size):
         raise IdentificationError(
-            f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
+            f"shape {data.shape}",
+            field="samples",
+            allowed=f"({len(channels)}, {theta.size}): channels by samples of theta_rad",
         )
-    if periods < 1:
-        raise IdentificationError(f"periods: is {periods}, needs at least 1")
+    IdentificationError.unless_at_least("periods", periods, 1)
     shortest = 2.0 * np.pi / _largest_step(theta, periods)
     stride = max(1, int(shortest / _POINTS_PER_PERIOD)) if every is None else every
-    if stride < 1:
-        raise IdentificationError(f"every: is {every}, needs at least 1")
+    IdentificationError.raise_if(stride < 1, field="every", value=every, allowed="at least 1")
     reach = np.pi * periods
     once = _whole_windows(theta, slice(0, theta.size), reach)
     twice = _whole_windows(theta, once, reach)
@@ -158,15 +164,21 @@ def _largest_step(theta: Float, periods: int) -> float:
     steps = np.diff(theta)
     if np.any(steps <= 0.0):
         where = int(np.argmax(steps <= 0.0))
-        raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
+        raise IdentificationError(
+            f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
+        )
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
     needed = 2 * periods + 1
     if covered < needed:
-        raise IdentificationError(f"theta_rad: covers {covered:.2f} periods, needs {needed} with periods = {periods}")
+        raise IdentificationError(
+            f"covers {covered:.2f} periods", field="theta_rad", allowed=f"{needed} with periods = {periods}"
+        )
     per_period = 2.0 * np.pi / float(steps.max())
     if per_period < _MIN_SAMPLES_PER_PERIOD:
         raise IdentificationError(
-            f"theta_rad: {per_period:.2f} samples in the shortest period, needs at least {_MIN_SAMPLES_PER_PERIOD:g}"
+            f"{per_period:.2f} samples in the shortest period",
+            field="theta_rad",
+            allowed=f"at least {_MIN_SAMPLES_PER_PERIOD:g}",
         )
     return float(steps.max())
 

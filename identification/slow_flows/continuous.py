@@ -128,7 +128,7 @@ def continuous_backbone(
         If channels or mode shapes differ, the ramps have no common amplitudes, or levels lie beyond these.
     """
     if up.channels != down.channels or up.drive_mode_shape != down.drive_mode_shape:
-        raise IdentificationError("up, down: channels or drive_mode_shape differ")
+        raise IdentificationError("channels or drive_mode_shape differ", field="up, down")
     levels = _levels(up, down, levels_m, number)
     first = [_first_fits(flow, levels, bandwidth) for flow in (up, down)]
     noise = _noise([fits for _, fits in first])
@@ -182,15 +182,15 @@ class _Way:
 def _levels(up: SlowFlow, down: SlowFlow, levels_m: ArrayLike | None, number: int) -> Float:
     low = max(float(flow.amplitude_m.min()) for flow in (up, down))
     high = min(float(flow.amplitude_m.max()) for flow in (up, down))
-    if not low < high:
-        raise IdentificationError("up, down: the ramps have no amplitudes in common")
+    IdentificationError.raise_if(not low < high, "the ramps have no amplitudes in common", field="up, down")
     if levels_m is None:
-        if number < 1:
-            raise IdentificationError(f"number: is {number}, needs at least 1")
+        IdentificationError.unless_at_least("number", number, 1)
         return np.geomspace(low, high, number)
     levels: Float = finite_array("levels_m", levels_m, np.float64, 1)
     if not levels.size or levels.min() < low or levels.max() > high:
-        raise IdentificationError(f"levels_m: both ramps cover {low:.4g} to {high:.4g} m, {levels_m} was asked for")
+        raise IdentificationError(
+            f"both ramps cover {low:.4g} to {high:.4g} m, {levels_m} was asked for", field="levels_m"
+        )
     return levels
 
 
@@ -309,7 +309,7 @@ def _wide_enough(size: Float, level: float, bandwidth: float) -> float:
         width *= _WIDEN
         if width > _WIDEST:
             raise IdentificationError(
-                f"levels_m: fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly"
+                f"fewer than {_FEWEST_INSTANTS} instants near {np.exp(level):.4g} m; ramp more slowly", field="levels_m"
             )
     return width
 

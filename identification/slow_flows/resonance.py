@@ -76,8 +76,9 @@ def resonant_vibration(
     """
     if not stiffness > 0.0:
         raise IdentificationError(
-            f"samples: stiffness {stiffness:g} 1/s^2 at an amplitude of {amplitude_m:g} m gives no real modal frequency; "
-            "check the polarity of force and drive channel, and drive_mode_shape"
+            f"stiffness {stiffness:g} 1/s^2 at an amplitude of {amplitude_m:g} m gives no real modal "
+            "frequency; check the polarity of force and drive channel, and drive_mode_shape",
+            field="samples",
         )
     omega = float(np.sqrt(stiffness))
     harmonics, std = found.values.copy(), found.std.copy()

@@ -74,14 +74,18 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
     periods = float(part.phase_periods[-1] - part.phase_periods[0])
     if periods < _FEWEST_PERIODS:
         raise IdentificationError(
-            f"start_s, stop_s: {periods:.2f} periods between the first and the last instant, needs {_FEWEST_PERIODS:g}"
+            f"{periods:.2f} periods between the first and the last instant",
+            field="start_s, stop_s",
+            allowed=f"{_FEWEST_PERIODS:g}",
         )
     level = np.log(part.amplitude_m)
     change = float(np.ptp(level))
     if change > _LARGEST_CHANGE:
         raise IdentificationError(
-            f"start_s, stop_s: the amplitude changes by {100.0 * change:.0f} %, allowed is {100.0 * _LARGEST_CHANGE:g} %; "
-            "begin the point later"
+            f"the amplitude changes by {100.0 * change:.0f} %",
+            field="start_s, stop_s",
+            allowed=f"{100.0 * _LARGEST_CHANGE:g} %",
+            hint="begin the point later",
         )
     centre = float(np.mean(level))
     middle = part.phase_periods - np.mean(part.phase_periods)

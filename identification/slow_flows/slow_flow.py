@@ -88,8 +88,8 @@ class SlowFlow:
         inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
         if not inside.any():
             raise IdentificationError(
-                f"start_s, stop_s: no instant from {start_s:g} to {stop_s:g} s; there are some from {self.time_s[0]:g} to "
-                f"{self.time_s[-1]:g} s"
+                f"no instant from {start_s:g} to {stop_s:g} s; there are some from {self.time_s[0]:g} to {self.time_s[-1]:g} s",
+                field="start_s, stop_s",
             )
         return self.select(inside)
 
@@ -224,7 +224,9 @@ def slow_flow(
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
     if data.shape != (len(channels), theta.size):
         raise IdentificationError(
-            f"samples: shape {data.shape}, needs ({len(channels)}, {theta.size}): channels by samples of theta_rad"
+            f"shape {data.shape}",
+            field="samples",
+            allowed=f"({len(channels)}, {theta.size}): channels by samples of theta_rad",
         )
     delay_s = _skew(skew_samples, len(channels)) / rate_hz
     force, drive = find_role(channels, "force"), find_role(channels, "drive")
@@ -237,10 +239,10 @@ def slow_flow(
     found[: len(channels), :, 0] = amplitudes(theta, data, at, 0)[..., 0].real
     x, v, a = found[-5:-2, :, 1] - residual_m_n * found[[force, -2, -1], :, 1]
     if not np.all(np.abs(x) > 0.0):
-        raise IdentificationError("samples: the drive point does not move, nothing can be identified")
+        raise IdentificationError("the drive point does not move, nothing can be identified", field="samples")
     shape = float(drive_mode_shape)
     if not (np.isfinite(shape) and shape):
-        raise IdentificationError(f"drive_mode_shape: is {shape}, must be finite and not zero")
+        raise IdentificationError(field="drive_mode_shape", value=shape, allowed="finite and not zero")
     stiffness, rate = (shape**2 * found[force, :, 1] - a) / x, v / x
     periods = at / (2.0 * np.pi)
     fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods)
@@ -273,32 +275,34 @@ def _skew(skew_samples: ArrayLike | None, channels: int) -> Float:
         return np.zeros(channels)
     skew: Float = finite_array("skew_samples", skew_samples, np.float64, 1)
     if skew.size != channels:
-        raise IdentificationError(f"skew_samples: {skew.size} given for {channels} channels")
+        raise IdentificationError(f"{skew.size} given for {channels} channels", field="skew_samples")
     return skew
 
 
 def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_period: int) -> Float:
     """float[n]: equidistant phases at which the window is complete; raises `IdentificationError` for an unusable phase."""
-    if harmonics < 1:
-        raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
+    IdentificationError.unless_at_least("harmonics", harmonics, 1)
     if not fit_periods >= _MIN_FIT_PERIODS:
-        raise IdentificationError(f"fit_periods: is {fit_periods}, needs at least {_MIN_FIT_PERIODS:g}")
-    if points_per_period < 1:
-        raise IdentificationError(f"points_per_period: is {points_per_period}, needs at least 1")
+        raise IdentificationError(field="fit_periods", value=fit_periods, allowed=f"at least {_MIN_FIT_PERIODS:g}")
+    IdentificationError.unless_at_least("points_per_period", points_per_period, 1)
     steps = np.diff(theta)
     if np.any(steps <= 0.0):
         where = int(np.argmax(steps <= 0.0))
-        raise IdentificationError(f"theta_rad: does not rise from [{where}] to [{where + 1}], must rise with time")
+        raise IdentificationError(
+            f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
+        )
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
     if covered < WINDOW_PERIODS + fit_periods:
         raise IdentificationError(
-            f"theta_rad: covers {covered:.2f} periods, needs {WINDOW_PERIODS + fit_periods:g} with fit_periods = "
-            f"{fit_periods:g}"
+            f"covers {covered:.2f} periods",
+            field="theta_rad",
+            allowed=f"{WINDOW_PERIODS + fit_periods:g} with fit_periods = {fit_periods:g}",
         )
     needed = 2 * harmonics + 2
     if (per_period := 2.0 * np.pi / float(steps.max())) <= needed:
         raise IdentificationError(
-            f"harmonics: {harmonics} need more than {needed} samples per period, the record has {per_period:.2f}"
+            f"{harmonics} need more than {needed} samples per period, the record has {per_period:.2f}",
+            field="harmonics",
         )
     half = np.pi * WINDOW_PERIODS
     count = int((theta[-1] - theta[0] - 2.0 * half) / (2.0 * np.pi) * points_per_period)

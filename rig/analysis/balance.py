@@ -63,4 +63,4 @@ def configuration_errors() -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise ConfigurationError(str(error)) from error
+        raise ConfigurationError.of(error) from error

@@ -30,14 +30,13 @@ def level_range(balance: Balance, by: By, lowest: float | None, highest: float |
     high = positive(f"to_{unit}", highest)
     low = positive(f"from_{unit}", _LOWEST_RATIO * high if lowest is None else lowest)
     if low >= high:
-        raise ConfigurationError(f"from_{unit} = {low:g}: allowed is less than to_{unit} = {high:g}")
+        raise ConfigurationError(field=f"from_{unit}", value=low, allowed=f"less than to_{unit} = {high:g}")
     return np.geomspace(low, high, checked_points(points, 2))
 
 
 def checked_points(points: int, least: int) -> int:
     """Return ``points`` if it lies within the allowed range; raise `ConfigurationError` otherwise."""
-    if not least <= points <= _MAX_POINTS:
-        raise ConfigurationError(f"points = {points}: allowed is {least} to {_MAX_POINTS}")
+    ConfigurationError.unless_between("points", points, least, _MAX_POINTS)
     return points
 
 

@@ -124,8 +124,7 @@ def subject_of(bench: Bench | str | Path, near_hz: float | None = None) -> Subje
 
 def positive(name: str, value: float) -> float:
     """Return ``value`` if it is a finite number above zero; raise `ConfigurationError` otherwise."""
-    if not 0.0 < value < np.inf:
-        raise ConfigurationError(f"{name} = {value:g}: allowed is a number above 0")
+    ConfigurationError.raise_if(not 0.0 < value < np.inf, field=name, value=value, allowed="a number above 0")
     return value
 
 

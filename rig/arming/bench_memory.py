@@ -19,6 +19,7 @@ from rig.bench import Bench
 from rig.errors import RecordingError
 from rig.system.text_files import read_text
 from rig.system.whole_file import whole_file
+from vibrolock.errors import InputError
 
 LARGEST_BYTES = 1_000_000
 
@@ -119,7 +120,7 @@ def _check_from(table: dict[str, Any]) -> RememberedCheck:
 def _check_time(at: str) -> None:
     """Raise `ValueError` or `TypeError` for a text that is not a time, or a time without time zone."""
     if datetime.fromisoformat(at).tzinfo is None:
-        raise ValueError(f"at = {at!r}: has no time zone")
+        raise InputError("has no time zone", field="at", value=at)
 
 
 def remember(bench: Bench, **changes: Any) -> None:

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from vibrolock.errors import InputError
+
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedScale:
@@ -26,7 +28,7 @@ class CheckedScale:
         for name in ("frequency_hz", "damping_ratio", "acceleration_per_newton", "acceleration_per_volt"):
             value = getattr(self, name)
             if not (isinstance(value, int | float) and 0.0 < value < math.inf):
-                raise ValueError(f"{name} = {value!r}: allowed is above 0")
+                raise InputError(field=name, value=value, allowed="above 0")
 
     @property
     def newtons_per_volt(self) -> float:

@@ -5,7 +5,9 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from typing import Any, Protocol
+from typing import Protocol
+
+from pydantic import JsonValue
 
 from rig.arming.run_facts import user_name
 from rig.bench import Bench
@@ -18,7 +20,7 @@ BESIDE = {"name", "description", "arming"}
 class _Table(Protocol):
     """A plan or a bench."""
 
-    def model_dump(self, *, mode: str, exclude: set[str]) -> dict[str, Any]:
+    def model_dump(self, *, mode: str, exclude: set[str]) -> dict[str, JsonValue]:
         """Return its keys as plain data."""
 
 
@@ -42,7 +44,7 @@ class Rehearsed:
     """Probability of a trip."""
     trips_at_most: float
     """Upper end of its 95 % interval."""
-    foreseen: Mapping[str, Any]
+    foreseen: Mapping[str, JsonValue]
     """What it foresees, point by point (`rig.rehearsal.forecast`)."""
 
 
@@ -52,7 +54,7 @@ def subject_digest(plan: _Table, bench: _Table) -> str:
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def rehearsal_facts(plan: _Table, bench: Bench, rehearsed: Rehearsed | None, override: str) -> dict[str, Any]:
+def rehearsal_facts(plan: _Table, bench: Bench, rehearsed: Rehearsed | None, override: str) -> dict[str, JsonValue]:
     """Return what a recording keeps of a rehearsal: empty without one.
 
     Where the bench states ``arming.largest_trip_probability``, a rehearsal of this plan on this bench is needed whose
@@ -65,7 +67,7 @@ def rehearsal_facts(plan: _Table, bench: Bench, rehearsed: Rehearsed | None, ove
         raise NotArmed(
             f"bench {bench.name}: {against}; nothing has moved (`override_rehearsal` = why it may run all the same)"
         )
-    out: dict[str, Any] = {} if rehearsed is None else asdict(rehearsed)
+    out: dict[str, JsonValue] = {} if rehearsed is None else asdict(rehearsed)
     if against:
         out["overridden"] = {"against": against, "why": override, "by": user_name()}
     return out

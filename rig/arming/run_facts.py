@@ -4,7 +4,6 @@ import getpass
 import os
 from dataclasses import dataclass, fields
 from datetime import date
-from typing import Any
 
 from rig.bench import Bench
 from rig.errors import ConfigurationError
@@ -30,9 +29,9 @@ class About:
         texts = [(name, value) for name, value in vars(self).items() if isinstance(value, str)]
         for name, text in [*texts, *(("note", note) for note in self.notes)]:
             if text and not text.isprintable():
-                raise ConfigurationError(f"{name} = {text!r}: allowed is printable text in one line")
+                raise ConfigurationError(field=name, value=text, allowed="printable text in one line")
 
-    def facts(self) -> dict[str, Any]:
+    def facts(self) -> dict[str, str | list[str]]:
         """Return the facts as they are recorded."""
         return {**vars(self), "operator": self.operator or user_name(), "notes": list(self.notes)}
 

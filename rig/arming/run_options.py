@@ -93,8 +93,8 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         if self.seed is not None and not 0 <= self.seed <= LARGEST_SEED:
-            raise ConfigurationError(f"seed = {self.seed}: allowed is 0 to 2**63 - 1")
+            raise ConfigurationError(field="seed", value=self.seed, allowed="0 to 2**63 - 1")
         if not self.override_rehearsal.isprintable():
             raise ConfigurationError(
-                f"`override_rehearsal` = {self.override_rehearsal!r}: allowed is printable text in one line"
+                field="override_rehearsal", value=self.override_rehearsal, allowed="printable text in one line"
             )

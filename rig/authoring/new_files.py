@@ -12,7 +12,6 @@ from rig.authoring.schemas import schema_of
 from rig.bench.configuration import Table, read_toml
 from rig.errors import ConfigurationError
 from rig.system.whole_file import whole_file
-from vibrolock.printable import shown
 
 BENCH_OF_DRIVER = "box-bench.toml"
 
@@ -99,8 +98,7 @@ def _plan(kind: str, bench: str | None) -> Table:
     from rig.bench.configuration import shipped_names
     from rig.campaigns.kinds import KINDS
 
-    if kind not in KINDS:
-        raise ConfigurationError(f"kind = {shown(kind)}: allowed is {', '.join(map(repr, KINDS))}")
+    ConfigurationError.unless_one_of("kind", kind, KINDS)
     folder = Path(str(resources.files("rig.campaigns"))) / "shipped"
     tables = [(name, read_toml(folder / f"{name}.toml")) for name in shipped_names(folder)]
     found = [(name, table) for name, table in tables if table["kind"] == kind]

@@ -10,7 +10,6 @@ from pydantic import AliasChoices, BaseModel
 from rig.authoring.changes import Loosened, reachable, requirements
 from rig.authoring.draft7 import DRAFT, Schema, draft7, plain
 from rig.errors import ConfigurationError
-from vibrolock.printable import shown
 
 
 def schema_names() -> tuple[str, ...]:
@@ -22,8 +21,7 @@ def schema_names() -> tuple[str, ...]:
 
 def schema_of(name: str) -> Schema:
     """Return the schema of that name (`schema_names`); raise `ConfigurationError` for another name."""
-    if name not in schema_names():
-        raise ConfigurationError(f"WHAT = {shown(name)}: allowed is {', '.join(schema_names())}")
+    ConfigurationError.unless_one_of("WHAT", name, schema_names())
     named = {"bench": bench_schema, "rig": rig_schema, "plan": plan_schema, "sensors": sensors_schema}
     return named.get(name, lambda: plan_schema(name))()
 

@@ -11,7 +11,7 @@ from rig.bench.configuration import Configured, Table, find_toml, merged, read_t
 from rig.bench.cross_checks import refuse
 from rig.bench.sensors import with_sensors
 from rig.errors import ConfigurationError
-from vibrolock.printable import shown
+from vibrolock.errors import InputError
 
 HIGHEST_PART = 0.45
 """Highest frequency of the output, over the sample rate; chosen: a tenth below Nyquist."""
@@ -127,7 +127,7 @@ class EmergencyStop(Configured):
     @model_validator(mode="after")
     def _one_way(self) -> Self:
         if (self.above_v is None) == (self.below_v is None):
-            raise ValueError("above_v, below_v: allowed is exactly one of the two")
+            raise InputError(field="above_v, below_v", allowed="exactly one of the two")
         return self
 
 
@@ -176,33 +176,36 @@ class Bench(Configured):
         names = [channel.name for channel in self.channels]
         for role in ("force", "drive"):
             count = sum(channel.role == role for channel in self.channels)
-            if count != 1:
-                raise ValueError(f"channels: {count} with role {role!r}, allowed is exactly 1")
+            InputError.raise_if(count != 1, f"{count} with role {role!r}", field="channels", allowed="exactly 1")
         doubled = sorted({name for name in names if names.count(name) > 1})
         if doubled:
-            raise ValueError(f"channels: the name {doubled[0]!r} is used twice")
+            raise InputError(f"the name {doubled[0]!r} is used twice", field="channels")
         if self.limits.voltage_v > self.output_range_v:
-            raise ValueError(
-                f"limits.voltage_v = {self.limits.voltage_v:g}: allowed is up to output_range_v = {self.output_range_v:g}"
+            raise InputError(
+                field="limits.voltage_v",
+                value=self.limits.voltage_v,
+                allowed=f"up to output_range_v = {self.output_range_v:g}",
             )
         if self.limits.frequency_hz[1] > HIGHEST_PART * self.sample_rate_hz:
-            raise ValueError(
-                f"limits.frequency_hz = {list(self.limits.frequency_hz)}: allowed is up to {HIGHEST_PART:g} of "
-                f"sample_rate_hz, {HIGHEST_PART * self.sample_rate_hz:g} Hz"
+            raise InputError(
+                field="limits.frequency_hz",
+                value=list(self.limits.frequency_hz),
+                allowed=f"up to {HIGHEST_PART:g} of sample_rate_hz, {HIGHEST_PART * self.sample_rate_hz:g} Hz",
             )
         stop = self.emergency_stop
         if stop is not None and stop.channel not in {
             channel.name for channel in self.channels if channel.role == "monitor"
         }:
-            raise ValueError(
-                f"emergency_stop.channel = {stop.channel!r}: allowed is the name of a channel with role 'monitor'"
+            raise InputError(
+                field="emergency_stop.channel", value=stop.channel, allowed="the name of a channel with role 'monitor'"
             )
         for channel in self.channels:
             limit = self.limits.force_n if channel.role == "force" else self.limits.acceleration_m_s2
             if channel.role != "monitor" and limit > channel.range_in_unit:
-                raise ValueError(
-                    f"limits: {limit:g} {channel.unit} is beyond the range of channel {channel.name!r}, "
-                    f"allowed is up to {channel.range_in_unit:g} {channel.unit}"
+                raise InputError(
+                    f"{limit:g} {channel.unit} is beyond the range of channel {channel.name!r}",
+                    field="limits",
+                    allowed=f"up to {channel.range_in_unit:g} {channel.unit}",
                 )
         return self
 
@@ -246,12 +249,12 @@ def load_bench(name_or_path: str | Path) -> Bench:
     try:
         table = table if sensors is None else with_sensors(table, Path(str(sensors)))
     except ConfigurationError as error:
-        raise ConfigurationError(f"{name_or_path}: {error}") from None
+        raise ConfigurationError.of(error, where=name_or_path) from None
     bench = validated(Bench, table, str(name_or_path))
     try:
         refuse(bench)
     except ConfigurationError as error:
-        raise ConfigurationError(f"{name_or_path}: {error}") from None
+        raise ConfigurationError.of(error, where=name_or_path) from None
     return bench
 
 
@@ -261,19 +264,21 @@ def _with_base(name_or_path: str | Path, over: tuple[Path, ...]) -> Table:
     table = read_toml(path)
     if (sensors := table.get("sensors")) is not None:
         if not isinstance(sensors, str) or not sensors.endswith(".toml"):
-            raise ConfigurationError(f"{name_or_path}: sensors = {shown(sensors)}: allowed is the path of a .toml file")
+            raise ConfigurationError(
+                where=name_or_path, field="sensors", value=sensors, allowed="the path of a .toml file"
+            )
         table["sensors"] = str(path.parent / sensors)
     base = table.pop("base", None)
     if base is None:
         return table
     if isinstance(base, str) and base.endswith(".toml"):
         if path.resolve() in over:
-            raise ConfigurationError(f"{name_or_path}: base = {base!r}: the files start from each other")
+            raise ConfigurationError("the files start from each other", where=name_or_path, field="base", value=base)
         return _changed(_with_base(path.parent / base, (*over, path.resolve())), table)
     if base not in shipped_benches():
         allowed = ", ".join(shipped_benches())
         raise ConfigurationError(
-            f"{name_or_path}: base = {shown(base)}: allowed is {allowed}, or a .toml file beside this one"
+            where=name_or_path, field="base", value=base, allowed=f"{allowed}, or a .toml file beside this one"
         )
     return _changed(_with_base(base, over), table)
 

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from rig.bench.configuration import Configured
 from rig.bench.data_sheet import volts_per_unit
-from vibrolock.printable import shown
+from vibrolock.errors import InputError
 
 if TYPE_CHECKING:
     from pydantic.json_schema import JsonSchemaValue
@@ -29,7 +29,7 @@ def check_day(name: str, text: str) -> None:
     try:
         date.fromisoformat(text or "2000-01-01")
     except ValueError:
-        raise ValueError(f"{name} = {text!r}: allowed is a day as YYYY-MM-DD") from None
+        raise InputError(field=name, value=text, allowed="a day as YYYY-MM-DD") from None
 
 
 class Role(IntEnum):
@@ -121,44 +121,52 @@ class Channel(Configured):
         if not sheet and sheet in (None, ""):
             if gain or inverted:
                 what = "amplifier_gain" if gain else "inverted"
-                raise ValueError(f"{what}: allowed is beside `sensitivity`; sensitivity_v_per_unit holds gain and sign")
+                raise InputError(
+                    field=what, allowed="beside `sensitivity`", hint="sensitivity_v_per_unit holds gain and sign"
+                )
             return {**table, "unit": unit}
         if not isinstance(sheet, str) or not isinstance(gain or "", str):
             key, value = ("amplifier_gain", gain) if isinstance(sheet, str) else ("sensitivity", sheet)
-            raise ValueError(f"{key} = {shown(value)}: allowed is a text with number and unit, such as '100 mV/g'")
+            raise InputError(field=key, value=value, allowed="a text with number and unit, such as '100 mV/g'")
         volts, of = volts_per_unit(sheet, gain or "")
         if unit and of != unit:
-            raise ValueError(
-                f"sensitivity = {sheet!r}: is per {of}, the channel is in {unit}: allowed is one per {unit}"
+            raise InputError(
+                f"is per {of}, the channel is in {unit}", field="sensitivity", value=sheet, allowed=f"one per {unit}"
             )
         volts = -volts if inverted is True else volts
         given = table.get("sensitivity_v_per_unit", volts)
         if isinstance(given, float) and not math.isclose(given, volts, rel_tol=SAME):
-            raise ValueError(
-                f"sensitivity_v_per_unit = {given:g}: sensitivity = {sheet!r} makes it {volts:.6g}; allowed is one of the two"
+            raise InputError(
+                f"sensitivity = {sheet!r} makes it {volts:.6g}",
+                field="sensitivity_v_per_unit",
+                value=given,
+                allowed="one of the two",
             )
         return {**table, "unit": of, "sensitivity_v_per_unit": volts}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.sensitivity_v_per_unit == 0.0:
-            raise ValueError("sensitivity_v_per_unit = 0: allowed is any number but 0")
+            raise InputError(field="sensitivity_v_per_unit", value=0, allowed="any number but 0")
         if not self.unit:
-            raise ValueError(
-                "unit: is missing, which a channel with role 'monitor' needs: allowed is its physical unit"
+            raise InputError(
+                "is missing, which a channel with role 'monitor' needs", field="unit", allowed="its physical unit"
             )
         if self.loopback and self.role != "monitor":
-            raise ValueError(f"loopback: allowed is a channel with role 'monitor', {self.name!r} has {self.role!r}")
+            raise InputError(
+                field="loopback", allowed=f"a channel with role 'monitor', {self.name!r} has {self.role!r}"
+            )
         if self.mode_shape is not None and self.role != "response":
-            raise ValueError(
-                f"mode_shape: allowed is a channel with role 'response', {self.name!r} has {self.role!r}; that of the drive "
-                "point is specimen.drive_mode_shape"
+            raise InputError(
+                field="mode_shape",
+                allowed=f"a channel with role 'response', {self.name!r} has {self.role!r}",
+                hint="that of the drive point is specimen.drive_mode_shape",
             )
         for name in ("calibrated", "calibration_due"):
             check_day(name, getattr(self, name))
         wanted = UNITS.get(self.role, self.unit)
         if self.unit != wanted:
-            raise ValueError(f"unit = {self.unit!r}: a channel with role {self.role!r} is in {wanted!r}")
+            raise InputError(f"a channel with role {self.role!r} is in {wanted!r}", field="unit", value=self.unit)
         return self
 
     @property

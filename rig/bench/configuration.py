@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from rig.bench.vetting import objection_to
+from rig.bench.vetting import refuse_absurd
 from rig.errors import ConfigurationError
 from rig.system.text_files import read_text
 from vibrolock.described import Described
-from vibrolock.printable import shown
 
 Table = dict[str, object]
 """A table of a TOML file, before a model has validated it."""
@@ -75,7 +74,7 @@ def find_toml(name_or_path: str | Path, folder: Path, what: str) -> Path:
             nearest = get_close_matches(str(name_or_path)[:100], names, n=3, cutoff=0.0)
             allowed = f"one of those that `rig list` shows, such as {', '.join(nearest)},"
         raise ConfigurationError(
-            f"{what} = {shown(str(name_or_path))}: there is no such {what}; allowed is {allowed} or a .toml file"
+            f"there is no such {what}", field=what, value=str(name_or_path), allowed=f"{allowed} or a .toml file"
         )
     return folder / f"{name_or_path}.toml"
 
@@ -92,47 +91,44 @@ def read_toml(path: Path) -> Table:
     text = read_text(path, LARGEST_TOML_BYTES)
     for number, line in enumerate(text.split("\n"), 1):
         if line.count(".") > MOST_DOTS and any(part.count(".") > MOST_DOTS for part in line.split(",")):
-            raise ConfigurationError(f"{path}: line {number}: a key has more than {MOST_DOTS} parts, allowed are fewer")
+            raise ConfigurationError(
+                f"line {number}: a key has too many parts", where=path, allowed=f"up to {MOST_DOTS}"
+            )
     try:
         table = tomllib.loads(text)
     except RecursionError:
         raise ConfigurationError(f"{path}: is nested too deeply for a TOML file of ours") from None
     except ValueError as error:  # also a number of more digits than Python reads
         raise ConfigurationError(f"{path}: is not TOML: {error}") from None
-    _refuse_absurd(table, str(path))
+    refuse_absurd(table, str(path))
     return table
-
-
-def _refuse_absurd(table: object, source: str) -> None:
-    if (fault := objection_to(table)) is not None:
-        raise ConfigurationError(f"{source}: {fault}")
 
 
 def validated(model: type[Model], table: Mapping[str, object], source: str) -> Model:
     """Build a model from a table; raise `ConfigurationError` naming path, value and allowed values of each fault."""
-    _refuse_absurd(table, source)
+    refuse_absurd(table, source)
     try:
         if model.model_config.get("strict"):
             return model.model_validate(table)
         # Via JSON, whose strict mode accepts a list as a tuple and 1 as 1.0, but no text or boolean as a number.
         return model.model_validate_json(json.dumps(table, default=str), strict=True)
     except ValidationError as error:
-        raise ConfigurationError(f"{source}: {explain(error, model)}") from None
+        raise invalid(error, model, where=source) from None
     except (ArithmeticError, MemoryError) as error:
         why = f"{type(error).__name__}: {error}"
         raise ConfigurationError(
-            f"{source}: cannot be computed with, a number is far too large or small ({why})"
+            f"cannot be computed with, a number is far too large or small ({why})", where=source
         ) from None
 
 
-def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """Return the faults of a validation error in one line; if there are many, only the first few."""
+def invalid(error: ValidationError, model: type[BaseModel], where: str = "") -> ConfigurationError:
+    """Return the faults of a validation error, the first with its parts; if there are many, only the first few."""
     count = error.error_count()
     details = error.errors(include_url=False)[: 4 * MOST_FAULTS]
     keys = _keys(model)
     faults = [_fault(detail, keys) for detail in details if not _follows(detail, details)][:MOST_FAULTS]
     more = [f"and {count - len(faults)} more"] if count > len(details) or len(faults) == MOST_FAULTS < count else []
-    return "; ".join(faults + more)
+    return ConfigurationError.of(faults[0], where=where, further=(*faults[1:], *more))
 
 
 def _follows(detail: "ErrorDetails", details: "list[ErrorDetails]") -> bool:
@@ -148,33 +144,33 @@ def _closest(key: str, keys: set[str]) -> list[str]:
     return sorted(one for one, like in zip(found, likeness, strict=True) if like >= max(likeness) - AS_CLOSE)
 
 
-def _fault(detail: "ErrorDetails", keys: set[str]) -> str:
-    path = ""
+def _fault(detail: "ErrorDetails", keys: set[str]) -> ConfigurationError:
+    field = ""
     for part in detail["loc"]:
         if isinstance(part, int):
-            path += f"[{part}]"
+            field += f"[{part}]"
         elif part in keys or (part == detail["loc"][-1] and detail["type"] != "value_error"):
             # Otherwise it is the discriminator of a union, which is not part of the path.
-            path += f".{part}" if path else str(part)
-    message = detail["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    if detail["type"] == "extra_forbidden":
-        close = _closest(str(detail["loc"][-1])[:100], keys)
-        return f"{path}: unknown key" + (f", did you mean {' or '.join(close)}?" if close else "")
-    if detail["type"] == "missing":
-        return f"{path}: is missing"
-    if detail["type"] == "value_error":
-        return f"{path}: {message}" if path else message
-    if detail["type"].startswith("union_tag"):
-        of, allowed = (
-            detail["ctx"]["discriminator"].strip("'"),
-            detail["ctx"].get("expected_tags", "one of those listed"),
-        )
-        tag = detail["ctx"].get("tag")
-        return f"{path}.{of} = {shown(tag)}: allowed is {allowed}" if tag is not None else f"{path}.{of}: is missing"
-    if detail["type"] in ("too_short", "too_long"):
-        bound, count = ("least", "min_length") if detail["type"] == "too_short" else ("most", "max_length")
-        message = f"at {bound} {detail['ctx'][count]} of them"
-    return f"{path} = {shown(detail['input'])}: allowed is {message}".replace("a valid tuple", "a list")
+            field += f".{part}" if field else str(part)
+    kind, context = detail["type"], detail.get("ctx", {})
+    if kind == "extra_forbidden":
+        close = " or ".join(_closest(str(detail["loc"][-1])[:100], keys))
+        return ConfigurationError(f"unknown key{close and f', did you mean {close}?'}", field=field)
+    if kind == "missing":
+        return ConfigurationError("is missing", field=field)
+    if kind == "value_error":
+        return ConfigurationError.of(context["error"], within=field)
+    if kind.startswith("union_tag"):
+        field, tag = f"{field}.{context['discriminator'].strip(chr(39))}", context.get("tag")
+        if tag is None:
+            return ConfigurationError("is missing", field=field)
+        return ConfigurationError(field=field, value=tag, allowed=context.get("expected_tags", "one of those listed"))
+    allowed = detail["msg"].removeprefix("Input should be ").replace("a valid tuple", "a list")
+    if kind in ("too_short", "too_long"):
+        bound, length = ("least", "min_length") if kind == "too_short" else ("most", "max_length")
+        allowed = f"at {bound} {context[length]} of them"
+    given = detail["input"]
+    return ConfigurationError("is None" if given is None else "", field=field, value=given, allowed=allowed)
 
 
 def _keys(model: object) -> set[str]:

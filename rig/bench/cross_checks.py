@@ -6,7 +6,6 @@ caution: a finding of ``rig check``, and a line before a person arms. The bench 
 that old files stay readable.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rig.errors import ConfigurationError
@@ -27,69 +26,47 @@ RANGES = {
 """Plausible ranges of a channel in its unit: every sensor lies inside, a wrong exponent usually outside."""
 
 
-@dataclass(frozen=True)
-class Objection:
-    """An inconsistency between numbers of a bench."""
-
-    field: str
-    """Key of the bench that is at fault."""
-    value: float
-    """Value of the key, in ``unit``."""
-    unit: str
-    """Unit of the value."""
-    allowed: str
-    """Allowed values."""
-    why: str
-    """Consequence of the present value."""
-    refused: bool
-    """Whether the bench must not run; otherwise the objection is a caution."""
-
-    @property
-    def line(self) -> str:
-        """The objection as one line of text."""
-        number = f"{self.value:g} {self.unit}".strip()
-        return f"{self.field} = {number}: {self.why}; allowed is {self.allowed}"
+class Caution(ConfigurationError):  # noqa: N818 (said, not raised)
+    """An inconsistency between numbers of a bench, with which it may run."""
 
 
-def objections(bench: "Bench") -> tuple[Objection, ...]:
+def objections(bench: "Bench") -> tuple[ConfigurationError, ...]:
     """Return all objections to a bench, refusals first."""
     found = [*_ranges(bench), *_block(bench), *_ramp(bench), *_drops(bench)]
-    return tuple(sorted(found, key=lambda one: not one.refused))
+    return tuple(sorted(found, key=lambda one: isinstance(one, Caution)))
 
 
 def refuse(bench: "Bench") -> None:
-    """Raise `ConfigurationError`, naming field, value and allowed values, if the bench must not run."""
-    lines = [one.line for part in (_ranges, _block, _ramp) for one in part(bench) if one.refused]
-    if lines:
-        raise ConfigurationError("; ".join(lines))
+    """Raise `ConfigurationError` if the bench must not run."""
+    if refusals := [one for one in objections(bench) if not isinstance(one, Caution)]:
+        raise ConfigurationError.of(refusals[0], further=refusals[1:])
 
 
 def cautions(bench: "Bench") -> tuple[str, ...]:
     """Return the cautions that a person should read before arming, one line each."""
-    return tuple(one.line for one in objections(bench) if not one.refused)
+    return tuple(str(one) for one in objections(bench) if isinstance(one, Caution))
 
 
-def _ranges(bench: "Bench") -> list[Objection]:
-    out = []
+def _ranges(bench: "Bench") -> list[ConfigurationError]:
+    out: list[ConfigurationError] = []
     for index, channel in enumerate(bench.channels):
         scale = abs(channel.sensitivity_v_per_unit)
         low, high = RANGES[channel.role]
         if channel.range_v > high * scale or channel.range_v < low * scale:
             out.append(
-                Objection(
-                    f"channels[{index}].sensitivity_v_per_unit",
-                    channel.sensitivity_v_per_unit,
-                    f"V per {channel.unit}",
-                    f"{channel.range_v / high:.3g} to {channel.range_v / low:.3g}, of either sign",
+                ConfigurationError(
                     f"with range_v = {channel.range_v:g} channel {channel.name!r} would reach beyond {high:g} {channel.unit}, "
                     f"or less than {low:g}, which no sensor for role {channel.role!r} does",
-                    refused=True,
+                    field=f"channels[{index}].sensitivity_v_per_unit",
+                    value=channel.sensitivity_v_per_unit,
+                    unit=f"V per {channel.unit}",
+                    allowed=f"{channel.range_v / high:.3g} to {channel.range_v / low:.3g}, of either sign",
                 )
             )
     return out
 
 
-def _block(bench: "Bench") -> list[Objection]:
+def _block(bench: "Bench") -> list[ConfigurationError]:
     """Check the block length: limits are not checked within a block. A block of one sample is always accepted."""
     block_s = bench.block / bench.sample_rate_hz
     if bench.block == 1:
@@ -98,16 +75,16 @@ def _block(bench: "Bench") -> list[Objection]:
         most = max(1, int(LONGEST_BLOCK_S * bench.sample_rate_hz))
         why = f"lasts {block_s:.3g} s at {bench.sample_rate_hz:g} samples/s, and so late a limit acts"
         allowed = f"1 to {most} ({LONGEST_BLOCK_S:g} s)"
-        return [Objection("block", bench.block, "", allowed, why, refused=True)]
+        return [ConfigurationError(why, field="block", value=bench.block, allowed=allowed)]
     if block_s > bench.limits.lost_s:
         most = max(1, int(bench.limits.lost_s * bench.sample_rate_hz))
         why = f"lasts {block_s:.3g} s, and so late a limit acts; one lost block is beyond limits.lost_s and trips"
         allowed = f"1 to {most} with limits.lost_s = {bench.limits.lost_s:g}"
-        return [Objection("block", bench.block, "", allowed, why, refused=False)]
+        return [Caution(why, field="block", value=bench.block, allowed=allowed)]
     return []
 
 
-def _ramp(bench: "Bench") -> list[Objection]:
+def _ramp(bench: "Bench") -> list[ConfigurationError]:
     """Check the ramp-down time: a ramp shorter than a period of the vibration excites the specimen like a step."""
     least_s = 1.0 / bench.specimen.linear_frequency_hz
     ramp_s = bench.limits.ramp_down_s
@@ -115,12 +92,12 @@ def _ramp(bench: "Bench") -> list[Objection]:
         return []
     why = "shorter than a period of the specimen, such a ramp is a step, which excites it"
     allowed = f"from {least_s:.3g} s, 1/specimen.linear_frequency_hz, to 60 s"
-    return [Objection("limits.ramp_down_s", ramp_s, "s", allowed, why, refused=True)]
+    return [ConfigurationError(why, field="limits.ramp_down_s", value=ramp_s, unit="s", allowed=allowed)]
 
 
-def _drops(bench: "Bench") -> list[Objection]:
+def _drops(bench: "Bench") -> list[ConfigurationError]:
     """Check the limits: the multiple at which the output drops to 0 V should be within the range of the channels."""
-    out = []
+    out: list[ConfigurationError] = []
     for field, roles in (("force_n", ("force",)), ("acceleration_m_s2", ("drive", "response"))):
         narrowest: Channel = min((c for c in bench.channels if c.role in roles), key=lambda c: c.range_in_unit)
         shown = bench.limits.overload_fraction * narrowest.range_in_unit
@@ -132,5 +109,5 @@ def _drops(bench: "Bench") -> list[Objection]:
             f"{narrowest.name!r} shows up to {shown:.4g} {narrowest.unit} (overload_fraction of its range)"
         )
         allowed = f"up to {shown / OVERTRAVEL_FACTOR:.3g} {narrowest.unit} for a drop that can be seen"
-        out.append(Objection(f"limits.{field}", limit, narrowest.unit, allowed, why, refused=False))
+        out.append(Caution(why, field=f"limits.{field}", value=limit, unit=narrowest.unit, allowed=allowed))
     return out

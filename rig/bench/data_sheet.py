@@ -5,6 +5,7 @@ from fractions import Fraction
 
 from identification import IdentificationError
 from identification.mapping import si_of
+from vibrolock.errors import InputError
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _VOLTS = {"V": Fraction(1), "mV": Fraction(1, 1000), "uV": Fraction(1, 1_000_000)}  # in V
@@ -34,13 +35,18 @@ def volts_per_unit(sensitivity: str, amplifier_gain: str = "") -> tuple[float, s
     """
     per_unit, output, unit = _sensor(sensitivity)
     if output in _CHARGES and not amplifier_gain:
-        raise ValueError(f"amplifier_gain: is missing, sensitivity = {sensitivity!r} is a charge: allowed is {_GAIN}")
+        raise InputError(
+            f"is missing, sensitivity = {sensitivity!r} is a charge", field="amplifier_gain", allowed=_GAIN
+        )
     if amplifier_gain:
         gain, taken = _amplifier(amplifier_gain)
         if (taken in _CHARGES) != (output in _CHARGES):
             wanted = "'10 mV/pC'" if output in _CHARGES else "'10' or '10 V/V'"
-            raise ValueError(
-                f"amplifier_gain = {amplifier_gain!r}: sensitivity = {sensitivity!r}, allowed is such as {wanted}"
+            raise InputError(
+                f"sensitivity = {sensitivity!r}",
+                field="amplifier_gain",
+                value=amplifier_gain,
+                allowed=f"such as {wanted}",
             )
     else:
         gain = Fraction(1)
@@ -55,8 +61,7 @@ def _sensor(text: str) -> tuple[Fraction, str, str]:
         scale, si = _si(text, after)
         return number * _OUTPUTS[before] / scale, before, si
     quantity, _, volt = unit.rpartition("/")
-    if volt not in _VOLTS:
-        raise ValueError(f"sensitivity = {text!r}: allowed is {_SENSITIVITY}")
+    InputError.raise_if(volt not in _VOLTS, field="sensitivity", value=text, allowed=_SENSITIVITY)
     scale, si = _si(text, quantity)
     return _VOLTS[volt] / (number * scale), volt, si
 
@@ -65,15 +70,14 @@ def _amplifier(text: str) -> tuple[Fraction, str]:
     """Return volts per volt or per pC, and what the amplifier takes."""
     number, unit = _quantity("amplifier_gain", text, _GAIN)
     given, _, taken = (unit or "V/V").partition("/")
-    if given not in _VOLTS or taken not in _OUTPUTS:
-        raise ValueError(f"amplifier_gain = {text!r}: allowed is {_GAIN}")
+    InputError.raise_if(given not in _VOLTS or taken not in _OUTPUTS, field="amplifier_gain", value=text, allowed=_GAIN)
     return number * _VOLTS[given] / _OUTPUTS[taken], taken
 
 
 def _quantity(key: str, text: str, allowed: str) -> tuple[Fraction, str]:
     found = _QUANTITY.fullmatch(text)
     if found is None or not _LEAST <= abs(float(found[1])) <= _MOST:
-        raise ValueError(f"{key} = {text!r}: allowed is {allowed}")
+        raise InputError(field=key, value=text, allowed=allowed)
     unit = "".join(found[2].split())
     for old, new in _SPELLINGS:
         unit = unit.replace(old, new)
@@ -85,5 +89,5 @@ def _si(text: str, quantity: str) -> tuple[Fraction, str]:
     try:
         si, scale = si_of(bare, f"sensitivity = {text!r}: the quantity")
     except IdentificationError as error:
-        raise ValueError(str(error)) from None
+        raise InputError.of(error) from None
     return Fraction(str(scale)), "m/s^2" if si == "m/s2" else si

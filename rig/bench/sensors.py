@@ -12,6 +12,7 @@ from rig.bench.channels import DATE, check_day
 from rig.bench.configuration import Configured, Table, read_toml, validated
 from rig.bench.data_sheet import volts_per_unit
 from rig.errors import ConfigurationError
+from vibrolock.errors import InputError
 from vibrolock.printable import shown
 
 
@@ -41,13 +42,16 @@ class Sensor(Configured):
         for name in ("calibrated", "calibration_due"):
             check_day(name, getattr(self, name))
         if self.calibration_interval_months is not None and (self.calibration_due or not self.calibrated):
-            raise ValueError(
-                f"calibration_interval_months = {self.calibration_interval_months}: allowed is with `calibrated`, "
-                "and without `calibration_due`"
+            raise InputError(
+                field="calibration_interval_months",
+                value=self.calibration_interval_months,
+                allowed="with `calibrated`, and without `calibration_due`",
             )
         if self.calibrated and self.calibration_due and self.calibration_due < self.calibrated:
-            raise ValueError(
-                f"calibration_due = {self.calibration_due!r}: allowed is a day after calibrated = {self.calibrated!r}"
+            raise InputError(
+                field="calibration_due",
+                value=self.calibration_due,
+                allowed=f"a day after calibrated = {self.calibrated!r}",
             )
         return self
 
@@ -84,7 +88,9 @@ class SensorFile(Configured):
         numbers = [sensor.serial_number for sensor in self.sensors]
         for index, number in enumerate(numbers):
             if number in numbers[:index]:
-                raise ValueError(f"sensors[{index}].serial_number = {number!r}: is there twice, allowed is once")
+                raise InputError(
+                    "is there twice", field=f"sensors[{index}].serial_number", value=number, allowed="once"
+                )
         return self
 
 
@@ -116,13 +122,17 @@ def _completed(channel: object, index: int, sensors: dict[str, Sensor], path: Pa
         close = get_close_matches(number, sensors, n=1)
         hint = f", did you mean {close[0]!r}?" if close else ""
         raise ConfigurationError(
-            f"{field}: {path.name} has no such sensor{hint}; allowed is one of its serial numbers, or a sensitivity here"
+            f"{path.name} has no such sensor{hint}",
+            field=field,
+            allowed="one of its serial numbers, or a sensitivity here",
         )
     facts = sensors[number].of_channel()
     twice = [key for key in (*facts, "sensitivity_v_per_unit") if channel.get(key)]
     if twice:
         raise ConfigurationError(
-            f"channels[{index}].{twice[0]} = {shown(channel[twice[0]])}: {path.name} says it of sensor {number!r}; "
-            "allowed is one place"
+            f"{path.name} says it of sensor {number!r}",
+            field=f"channels[{index}].{twice[0]}",
+            value=channel[twice[0]],
+            allowed="one place",
         )
     return {**channel, **facts}

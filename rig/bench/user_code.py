@@ -24,8 +24,10 @@ def refuse_code(bench: Bench, source: str) -> None:
     """Raise `ConfigurationError` if a bench names code; ``source`` is the recording that holds the bench."""
     if code := named_code(bench):
         raise ConfigurationError(
-            f"{source}: bench: function = {code[0]!r}: is code that the recording names, and is not imported unless you "
-            "trust it: `trust_code`"
+            f"function = {code[0]!r}: is code that the recording names, and is not imported unless you trust "
+            "it: `trust_code`",
+            where=source,
+            field="bench",
         )
 
 

@@ -4,8 +4,10 @@ Models can then rely on numbers whose squares do not overflow, on texts without 
 """
 
 from collections.abc import Iterator
+from math import isfinite
 from unicodedata import category
 
+from rig.errors import ConfigurationError
 from vibrolock.printable import shown
 
 DEEPEST = 16
@@ -20,13 +22,20 @@ LONGEST_TEXT = 10_000
 """Longest text, characters; chosen: some pages of remarks."""
 
 
-def objection_to(table: object) -> str | None:
-    """Return path and fault of the first value that is not allowed; None if all values are allowed."""
+def refuse_absurd(table: object, source: str) -> None:
+    """Raise `ConfigurationError` for the first value that is not allowed in any table."""
     for path, depth, value in _values(table):
-        fault = _fault(value) if depth <= DEEPEST else f"is nested too deeply: allowed are up to {DEEPEST} levels"
-        if fault is not None:
-            return f"{path} {fault}".strip()
-    return None
+        ConfigurationError.raise_if(
+            depth > DEEPEST, "is nested too deeply", where=source, field=path, allowed=f"up to {DEEPEST} levels"
+        )
+        for key in value if isinstance(value, dict) else ():
+            if not isinstance(key, str) or len(key) > LONGEST_KEY or _moves_the_cursor(key):
+                what = f"printable names of up to {LONGEST_KEY} characters"
+                raise ConfigurationError(f"holds the key {shown(key)}", where=source, field=path, allowed=what)
+        if (allowed := _violated(value)) is not None:
+            # A number of many bits has more digits than Python prints.
+            at_fault = f"{value.bit_length()} bits" if isinstance(value, int) else value
+            raise ConfigurationError(where=source, field=path, value=at_fault, allowed=allowed)
 
 
 def _values(table: object) -> Iterator[tuple[str, int, object]]:
@@ -46,34 +55,16 @@ def _values(table: object) -> Iterator[tuple[str, int, object]]:
         left += reversed(items)
 
 
-def _fault(value: object) -> str | None:
-    """Return the fault of one value, or None."""
-    if isinstance(value, dict):
-        wrong = next((key for key in value if not isinstance(key, str) or not _is_a_key(key)), None)
-        what = f"a printable name of up to {LONGEST_KEY} characters"
-        return None if wrong is None else f"holds the key {shown(wrong)}: allowed is {what}"
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
-        return f"= a number of {value.bit_length()} bits: allowed is up to {LARGEST_INTEGER}"
+def _violated(value: object) -> str | None:
+    """Return what is allowed in place of a value, or None if the value is allowed."""
+    if isinstance(value, int):
+        return f"up to {LARGEST_INTEGER}" if abs(value) > LARGEST_INTEGER else None
     if isinstance(value, float) and not (value == 0.0 or SMALLEST <= abs(value) <= LARGEST):
-        if value != value or abs(value) == float("inf"):
-            return f"= {value!r}: allowed is a finite number"
-        return f"= {value!r}: allowed is 0, or a size from {SMALLEST:g} to {LARGEST:g}"
-    if isinstance(value, str):
-        return _fault_of_text(value)
-    return None
-
-
-def _is_a_key(key: str) -> bool:
-    return len(key) <= LONGEST_KEY and not _moves_the_cursor(key)
-
-
-def _fault_of_text(text: str) -> str | None:
-    if len(text) > LONGEST_TEXT:
-        return f"= {shown(text)}: allowed are up to {LONGEST_TEXT} characters"
-    if not text.isprintable() and _moves_the_cursor("".join(text.split())):
-        return f"= {shown(text)}: holds a control character, allowed is printable text"
+        return f"0, or a size from {SMALLEST:g} to {LARGEST:g}" if isfinite(value) else "a finite number"
+    if isinstance(value, str) and len(value) > LONGEST_TEXT:
+        return f"up to {LONGEST_TEXT} characters"
+    if isinstance(value, str) and not value.isprintable() and _moves_the_cursor("".join(value.split())):
+        return "printable text, without control characters"
     return None
 
 

@@ -9,7 +9,6 @@ from rig.bench.configuration import find_toml, read_toml, shipped_names, validat
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
-from vibrolock.printable import shown
 
 
 def _folder() -> Path:
@@ -35,7 +34,7 @@ def plan_from(table: Mapping[str, object], source: str) -> Plan:
     """Build a plan of any kind from its table; raise `ConfigurationError` that names the error and the ``source``."""
     kind = table.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise ConfigurationError(f"{source}: kind = {shown(kind)}: allowed is {', '.join(map(repr, KINDS))}")
+        raise ConfigurationError(where=source, field="kind", value=kind, allowed=KINDS)
     table = {FORMER_KEYS.get(key, key): value for key, value in table.items()}
     return validated(KINDS[kind].plan, table, source)
 

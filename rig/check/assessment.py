@@ -118,7 +118,7 @@ def checked_scale(path: Path, bench: Bench) -> CheckedScale:
 
 def _limits(bench: Bench) -> list[Finding]:
     """Warn of entries of the bench that are inconsistent."""
-    return [Finding("limits", "", "warn", one.value, one.unit, one.allowed, one.line) for one in objections(bench)]
+    return [Finding("limits", "", "warn", one.value, one.unit, one.allowed, str(one)) for one in objections(bench)]
 
 
 def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> list[Finding]:

@@ -86,8 +86,9 @@ def _plan(bench: Bench, name: str, level_rms_v: float, silent_s: float) -> Multi
     samples = round(bench.sample_rate_hz * LINES / linear)
     if samples < 4.0 * LINES or not lowest < linear < highest:
         raise ConfigurationError(
-            f"specimen.linear_frequency_hz = {linear:g} Hz: allowed is inside limits.frequency_hz and up to a quarter of "
-            f"sample_rate_hz, {0.25 * bench.sample_rate_hz:g} Hz"
+            field="specimen.linear_frequency_hz",
+            value=linear,
+            allowed=f"inside limits.frequency_hz and up to a quarter of sample_rate_hz, {0.25 * bench.sample_rate_hz:g} Hz",
         )
     return MultisinePlan(
         bench=name,

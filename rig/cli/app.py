@@ -128,15 +128,13 @@ def _complain(line: str, status: int) -> int:
 
 def _one_line(error: Exception) -> str:
     """Return the error in one line. For an error from other code, include its type."""
-    from identification import IdentificationError
-    from rig.errors import DaqError, NotArmed, RigError
+    from rig.errors import DaqError, NotArmed
     from rig.text.message_pages import where_explained
+    from vibrolock.errors import StatedError
 
-    text = str(error)
-    if isinstance(error, DaqError | NotArmed):
-        text = f"{text} ({where_explained([type(error).__name__])})"
-    if isinstance(error, RigError | IdentificationError):
-        return with_flags(text, app)
+    if isinstance(error, StatedError):
+        page = f" ({where_explained([type(error).__name__])})" if isinstance(error, DaqError | NotArmed) else ""
+        return with_flags(error, app, sys.argv[1:]) + page
     if isinstance(error, OSError) and error.filename is not None:
         return f"{os.fsdecode(error.filename)}: cannot be used ({error.strerror})"
-    return f"unexpected {type(error).__name__}: {text} (run again with --debug for the details)"
+    return f"unexpected {type(error).__name__}: {error} (run again with --debug for the details)"

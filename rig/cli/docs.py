@@ -38,7 +38,9 @@ def docs(
     hits = found(words, asked)
     if not hits:
         near = ", ".join(closest(words, asked))
-        raise ConfigurationError(f"WORD = {asked!r}: nothing of this name" + (f"; closest: {near}" if near else ""))
+        raise ConfigurationError(
+            f"nothing of this name{(f'; closest: {near}' if near else '')}", field="WORD", value=asked
+        )
     for hit in hits:
         _print(hit, folder)
     if folder is None:

@@ -73,7 +73,7 @@ def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], out
     from rig.errors import ConfigurationError
 
     if of_the_matrix and not matrix:
-        raise ConfigurationError(f"{of_the_matrix[0]}: allowed with --matrix alone")
+        raise ConfigurationError("allowed with --matrix alone", where=of_the_matrix[0])
     if output is not None and not (matrix or daq is not None):
         raise ConfigurationError(f"-o {output}: allowed with --matrix or --daq")
     if output is not None and output.suffix not in (".toml", ".json"):

@@ -73,7 +73,7 @@ def _identify(kind: str, values: dict[str, Any]) -> None:
     given = given_in(values, known[kind].options if kind in known else None, output)
     keep_existing([*files, *given.get("validation", ())], output, overwrite or "resume" in given)
     if kind not in known:
-        raise ConfigurationError(f"`kind` = {kind!r}: allowed are {', '.join(known)}")
+        raise ConfigurationError(field="kind", value=kind, allowed=known)
     options = known[kind].options(**given)
     with escalating() as signals:
         lines = FitLines(signals.check)

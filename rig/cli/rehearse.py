@@ -67,7 +67,7 @@ def rehearse_(
         seed=seed,
     )
     if output is None:
-        raise ConfigurationError("`output`: a file is wanted")
+        raise ConfigurationError("a file is wanted", field="output")
     if twin is not None:
         _write_twin(subject, twin, output, overwrite)
         return
@@ -107,10 +107,10 @@ def _check_outputs(
     keep_existing(list(subject.sources), output, overwrite)
     if improve is not None:
         if improve.suffix != ".toml":
-            raise ConfigurationError(f"`improve` = {improve}: plans are written as .toml")
+            raise ConfigurationError("plans are written as .toml", field="improve", value=improve)
         if improve.with_suffix(".h5").absolute() == output.absolute():
             raise ConfigurationError(
-                f"`improve` = {improve}: its own rehearsal would be written to {output}; choose another name"
+                f"its own rehearsal would be written to {output}; choose another name", field="improve", value=improve
             )
         keep_existing([], improve, overwrite)
         keep_existing([], improve.with_suffix(".h5"), overwrite)

@@ -67,22 +67,21 @@ def new(
     """A commented file to begin with, every key explained, and its schema for the editor beside it."""
     from rig.authoring.new_files import new_driver, new_file
     from rig.errors import ConfigurationError
-    from vibrolock.printable import shown
 
     if what == "mapping":
         _mapping(files or [], output, format_, overwrite)
         return
     if files or format_:
-        raise ConfigurationError(f"{'FILES' if files else '`format`'}: is for a mapping, `rig new mapping FILE`")
+        raise ConfigurationError("is for a mapping, `rig new mapping FILE`", field="FILES" if files else "`format`")
     if what == "driver":
         new_driver(output, overwrite)
         print(f"{output}: take it apart and put your device in its place (docs/tutorials/a-driver.md)")
         return
     if what not in ("bench", "plan", "rig", "sensors"):
-        raise ConfigurationError(f"WHAT = {shown(what)}: allowed is bench, plan, rig, sensors, driver or mapping")
+        raise ConfigurationError(field="WHAT", value=what, allowed="bench, plan, rig, sensors, driver or mapping")
     if source is None and (shaker or trust_code):
         raise ConfigurationError(
-            f"`{'shaker' if shaker else 'trust_code'}`: is for a rig that begins with a model, `source`"
+            "is for a rig that begins with a model, `source`", field="shaker" if shaker else "trust_code"
         )
     table = None if source is None else _identified(what, source, bench, shaker, trust_code)
     beside = new_file(
@@ -101,8 +100,9 @@ def _mapping(files: list[Path], output: Path, format_: str, overwrite: bool) -> 
     from rig.errors import ConfigurationError
     from rig.exchange.proposal.proposal import proposed_mapping
 
-    if not files:
-        raise ConfigurationError("FILE: is missing; `rig new mapping FILE` looks into a file of time data")
+    ConfigurationError.raise_if(
+        not files, "is missing", field="FILE", hint="`rig new mapping FILE` looks into a file of time data"
+    )
     text, missing = proposed_mapping(files, format_)
     written({output: text}, overwrite)
     left = f"; fill in {' and '.join(missing)}" if missing else ""
@@ -117,10 +117,10 @@ def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_c
     from rig.results.structured.virtual_bench import bench_like, structured_bench, structured_model
 
     if what != "rig":
-        raise ConfigurationError(f"`source` = {source}: a model becomes a rig, allowed is `rig new rig`")
+        raise ConfigurationError("a model becomes a rig", field="source", value=source, allowed="`rig new rig`")
     if bench is None:
         raise ConfigurationError(
-            "`bench`: is missing, a bench or a recording of one, whose limits, sensors and exciter the rig has"
+            "is missing, a bench or a recording of one, whose limits, sensors and exciter the rig has", field="bench"
         )
     model = structured_model(source, trust_code=trust_code)
     return structured_bench(model, bench_like(bench, trust_code=trust_code), shaker=shaker)

@@ -1,7 +1,7 @@
 """Areas of a page for parts of a figure that differ in kind; on a narrow page they stand below one another."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from rig.drawing.page import NARROW_IN
 from rig.drawing.style import height_is_free, rc
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 _PANEL_IN = 1.65
 
@@ -24,7 +24,7 @@ def broad(times: float = 3.5) -> float:
     return float(times * rc("lines.linewidth"))
 
 
-def areas(page: "Figure", panels: Sequence[int], sizes: Sequence[float], *, beside: bool = False) -> list[Any]:
+def areas(page: "Figure", panels: Sequence[int], sizes: Sequence[float], *, beside: bool = False) -> "list[SubFigure]":
     """Give an area (a subfigure) for each part of a figure, from top to bottom, or ``beside`` one another.
 
     ``sizes`` are the relative heights (or widths) of the areas. On a narrow page, areas are below one another and as tall as

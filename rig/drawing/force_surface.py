@@ -1,7 +1,7 @@
 """Figure of a response-controlled test: quasi-linear responses by level, and curves at constant force cut from them."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,10 +14,23 @@ from rig.drawing.style import COLOURS, REJECTED, engineering, plain_log, shade, 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.typing import ColorType
 
 _CURVES = 4
 _SECTIONS_DEG = (30.0, 90.0, 150.0)
 _MOST_NAMED = 8
+
+
+class MeasuredSurface(Protocol):
+    """A force surface with the responses of which it was made."""
+
+    @property
+    def responses(self) -> Sequence[FrequencyResponse]:
+        """Responses at levels of held displacement."""
+
+    @property
+    def surface(self) -> ForceSurface:
+        """The surface through them."""
 
 
 def draw_force_surface(
@@ -52,8 +65,8 @@ def draw_force_surface(
     title(page, text or f"{specimen}: response-controlled test, {len(levels)} levels")
 
 
-def draw_measured_surface(page: "Figure", measured: Any) -> None:
-    """Draw a force surface from a file: ``measured`` has ``responses`` and ``surface``."""
+def draw_measured_surface(page: "Figure", measured: MeasuredSurface) -> None:
+    """Draw a force surface from a file."""
     draw_force_surface(page, measured.responses, measured.surface)
 
 
@@ -65,14 +78,14 @@ def _name(response: FrequencyResponse, levels: list[float], scale: float, unit: 
 
 
 def _points(
-    size: "Axes", lag: "Axes", response: FrequencyResponse, scale: float, colour: Any, name: str | None
+    size: "Axes", lag: "Axes", response: FrequencyResponse, scale: float, colour: "ColorType", name: str | None
 ) -> None:
     receptance = scale * response.amplitude_m / response.force_n
     size.plot(response.frequency_hz, receptance, ".", color=colour, label=name)
     lag.plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour)
 
 
-def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: Any) -> None:
+def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: "ColorType") -> None:
     """Draw the response of a level as fitted by the surface."""
     x = np.linspace(-1.0, 1.0, 81)
     frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -98,7 +98,7 @@ def grid(
     sharex: bool | Literal["none", "all", "row", "col"] = False,
     height_ratios: Sequence[float] | None = None,
     down_columns: bool = False,
-) -> np.ndarray[Any, Any]:
+) -> np.ndarray:
     """Give panels in rows and columns, object[rows, columns] of axes, arranged as the page allows.
 
     On a page as narrow as a paper's column the panels stand below one another, row by row or (``down_columns``) column by

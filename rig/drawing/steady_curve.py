@@ -1,6 +1,6 @@
 """Curves of predicted steady vibrations: stable and unstable parts, extrapolation, and where and why a curve ends."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from rig.drawing.areas import broad
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.typing import ColorType
 
 BEYOND = 1.0
 """Range use above which a model extrapolates."""
@@ -21,7 +22,7 @@ _EDGE = "the range of the model ends"
 
 
 def draw_curve(
-    axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: Any, label: str | None = None
+    axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: "ColorType", label: str | None = None
 ) -> None:
     """Draw every branch separately; unstable parts are dotted, parts beyond the identified range have a broad shade.
 
@@ -40,7 +41,7 @@ def draw_curve(
             axis.plot(response.frequency_hz[on], beyond, color=colour, lw=broad(), alpha=0.25)
 
 
-def draw_ends(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: Any) -> None:
+def draw_ends(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: "ColorType") -> None:
     """Mark by a square where a curve ends within the figure."""
     ends = ends_within(response)
     axis.plot(response.frequency_hz[ends], values[ends], "s", color=colour)

@@ -42,7 +42,7 @@ class Preset:
     """Width of the page; None: that of each figure."""
     height_mm: float | None = None
     """Height of the page; None: what the panels need."""
-    rc: Mapping[str, Any] = field(default_factory=dict)
+    rc: Mapping[str, object] = field(default_factory=dict)
     """Settings of matplotlib."""
 
 
@@ -88,7 +88,7 @@ PRESETS = {
 }
 """The looks by name: ``screen`` (each figure at its own size), ``paper`` (one column, 85 mm), ``slide`` (16:9, 1920 x 1080)."""
 
-_COMMON: dict[str, Any] = {
+_COMMON: dict[str, object] = {
     "font.size": 9,
     "legend.fontsize": 8,
     "axes.titlesize": 9,
@@ -118,7 +118,7 @@ _page_mm: list[float | None] = [None, None]
 
 def restyle(
     preset: str | Path = "screen",
-    rc: Mapping[str, Any] | None = None,
+    rc: Mapping[str, object] | None = None,
     *,
     size_mm: tuple[float, float | None] | None = None,
 ) -> None:

@@ -46,12 +46,14 @@ def make_daq(bench: Bench, seed: int = 0) -> DAQ:
     found = _shipped() if name in _shipped() else _found()
     if name not in found:
         raise ConfigurationError(
-            f"driver.name = {name!r}: there is no such driver; installed are {', '.join(sorted(found)) or 'none'}"
+            f"there is no such driver; installed are {', '.join(sorted(found)) or 'none'}",
+            field="driver.name",
+            value=name,
         )
     try:
         driver: Callable[[Bench, int], object] = found[name].load()
     except (ImportError, AttributeError) as error:
-        raise ConfigurationError(f"driver.name = {name!r}: its code cannot be imported: {error}") from error
+        raise ConfigurationError(f"its code cannot be imported: {error}", field="driver.name", value=name) from error
     try:
         daq = driver(bench, seed)
     except RigError:
@@ -59,5 +61,5 @@ def make_daq(bench: Bench, seed: int = 0) -> DAQ:
     except Exception as error:
         raise as_daq_error(error) from error
     if not isinstance(daq, DAQ):
-        raise ConfigurationError(f"driver.name = {name!r}: {found[name].value} is not a rig.daq.DAQ")
+        raise ConfigurationError(f"{found[name].value} is not a rig.daq.DAQ", field="driver.name", value=name)
     return daq

@@ -110,7 +110,7 @@ class Firmware:
             self.child.wait()
         said = _text(self.child.stderr) or "it said nothing"
         if self.child.returncode == BAD_DESCRIPTION:
-            return ConfigurationError(f"firmware: refuses to be this device: {said}")
+            return ConfigurationError(f"refuses to be this device: {said}", field="firmware")
         return DaqDisconnected(f"firmware: the program has ended by itself, status {self.child.returncode}: {said}")
 
     def end(self) -> dict[str, int]:

@@ -68,9 +68,7 @@ class Wiring:
         for key, given in {"flip": flip, "dead": dead, "swap": tuple(name for pair in swap for name in pair)}.items():
             for name in given:
                 if name not in names:
-                    raise ConfigurationError(
-                        f"{key} = {name!r}: there is no such channel, allowed is {', '.join(names)}"
-                    )
+                    raise ConfigurationError("there is no such channel", field=key, value=name, allowed=names)
         at = {name: index for index, name in enumerate(names)}
         self._order = np.arange(len(names))
         for first, second in swap:
@@ -97,7 +95,7 @@ class VirtualPlant:
     def __init__(self, bench: Bench, seed: int = 0, wiring: Wiring | None = None) -> None:
         if bench.driver.name != "virtual":
             raise ConfigurationError(
-                f"driver.name = {bench.driver.name!r}: allowed is 'virtual', for what is emulated is a virtual rig"
+                field="driver.name", value=bench.driver.name, allowed="'virtual', for what is emulated is a virtual rig"
             )
         options: Mapping[str, object] = {
             key: value for key, value in bench.driver.options.items() if key not in ("queue_blocks", "delay_samples")
@@ -194,10 +192,10 @@ def check_log(path: Path) -> None:
             with path.open("rb") as stream:
                 start = stream.read(100)
     except OSError as error:
-        raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
+        raise ConfigurationError(f"cannot be written: {error.strerror}", field="log_output", value=str(path)) from error
     if start and not _LOGGED.match(start):
         raise ConfigurationError(
-            f"log_output = {str(path)!r}: exists already and is no log of an emulator; choose another name"
+            "exists already and is no log of an emulator; choose another name", field="log_output", value=str(path)
         )
 
 
@@ -217,7 +215,9 @@ class LoggedPlant:
             # open as long as the device lives
             self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         except OSError as error:
-            raise ConfigurationError(f"log_output = {str(path)!r}: cannot be written: {error.strerror}") from error
+            raise ConfigurationError(
+                f"cannot be written: {error.strerror}", field="log_output", value=str(path)
+            ) from error
         self._is_full = False
         self._first = 0
 

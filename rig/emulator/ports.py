@@ -114,9 +114,11 @@ def _name(link: Path, path: str) -> None:
             target = link.readlink()
             if target != Path(path) and (link.exists() or target.parent != Path(path).parent):
                 raise ConfigurationError(
-                    f"link = {str(link)!r}: leads to {target} already; end the emulator there, or remove the link"
+                    f"leads to {target} already; end the emulator there, or remove the link",
+                    field="link",
+                    value=str(link),
                 )
             link.unlink()
         link.symlink_to(path)
     except OSError as error:
-        raise ConfigurationError(f"link = {str(link)!r}: cannot be made: {error.strerror}") from error
+        raise ConfigurationError(f"cannot be made: {error.strerror}", field="link", value=str(link)) from error

@@ -45,7 +45,9 @@ def is_for_arm(path: Path) -> bool:
             head = file.read(20)
     except OSError as error:
         raise ConfigurationError(
-            f"firmware = {str(path)!r}: cannot be read: {error.strerror}; `make -C firmware` builds firmware/build/host"
+            f"cannot be read: {error.strerror}; `make -C firmware` builds firmware/build/host",
+            field="firmware",
+            value=str(path),
         ) from error
     return head[:4] == b"\x7fELF" and int.from_bytes(head[18:20], "little") == ARM_MACHINE
 
@@ -84,11 +86,13 @@ def _image(path: Path, settings: EmulatorSettings, held: ExitStack) -> Running:
     import tty
 
     if settings.wire != "serial":
-        raise ConfigurationError(f"wire = {settings.wire!r}: allowed with an image for ARM is 'serial'")
+        raise ConfigurationError("allowed with an image for ARM is 'serial'", field="wire", value=settings.wire)
     if not settings.lockstep:
         raise ConfigurationError("lockstep = False: allowed with an image for ARM is True, for QEMU's time is not real")
     if shutil.which(QEMU) is None:
-        raise ConfigurationError(f"firmware = {str(path)!r}: is for ARM and runs in {QEMU}; install that package")
+        raise ConfigurationError(
+            f"is for ARM and runs in {QEMU}", field="firmware", value=str(path), hint="install that package"
+        )
     folder = Path(held.enter_context(TemporaryDirectory(prefix="vibrolock-")))
     from_structure, to_structure = folder / "from-structure", folder / "to-structure"
     for fifo in (from_structure, to_structure):
@@ -169,7 +173,7 @@ def _child(command: list[str], passed: tuple[int, ...] = ()) -> "Iterator[subpro
             start_new_session=True,
         )
     except OSError as error:
-        raise ConfigurationError(f"firmware = {command[0]!r}: cannot be run: {error.strerror}") from error
+        raise ConfigurationError(f"cannot be run: {error.strerror}", field="firmware", value=command[0]) from error
     with child:
         try:
             yield child

@@ -10,6 +10,7 @@ from rig.bench import Bench
 from rig.bench.configuration import Configured
 from rig.emulator.faults import Faults
 from rig.wire.can.frames import DATA_BIT_RATE_HZ, BusTiming
+from vibrolock.errors import InputError
 
 
 class EmulatorSettings(Configured):
@@ -63,17 +64,17 @@ class EmulatorSettings(Configured):
     def _consistent(self) -> Self:
         unknown = sorted(set(self.faults) - set(asdict(Faults())))
         if unknown:
-            raise ValueError(f"faults: {unknown[0]!r}: allowed is {', '.join(asdict(Faults()))}")
+            raise InputError(f"{unknown[0]!r}", field="faults", allowed=asdict(Faults()))
         if self.wire == "serial" and self.interface is not None:
-            raise ValueError(f"interface = {self.interface!r}: a serial device has none")
+            raise InputError("a serial device has none", field="interface", value=self.interface)
         if self.interface not in (None, "slcan") and self.channel is None:
-            raise ValueError(f"channel: is missing, interface {self.interface!r} has several")
+            raise InputError(f"is missing, interface {self.interface!r} has several", field="channel")
         if self.firmware is not None:
             self._allowed_with_a_firmware()
         return self
 
     def _allowed_with_a_firmware(self) -> None:
         if self.faults:
-            raise ValueError(f"faults: {min(self.faults)!r}: a firmware has none; allowed is no fault")
+            raise InputError(f"{min(self.faults)!r}: a firmware has none", field="faults", allowed="no fault")
         if self.interface not in (None, "slcan"):
-            raise ValueError(f"interface = {self.interface!r}: allowed with a firmware is 'slcan'")
+            raise InputError("allowed with a firmware is 'slcan'", field="interface", value=self.interface)

@@ -16,7 +16,7 @@ def taken_apart(value: object) -> Contents:
         if isinstance(value, known.type):
             return known.apart(value)
     names = ", ".join(known.name for known in exchanges())
-    raise IdentificationError(f"{type(value).__name__}: is not exchanged; what is: {names}")
+    raise IdentificationError("is not exchanged", field=type(value).__name__, hint=f"what is: {names}")
 
 
 def put_together(kind: str, arrays: Arrays, attributes: Attributes) -> Any:
@@ -26,5 +26,5 @@ def put_together(kind: str, arrays: Arrays, attributes: Attributes) -> Any:
             try:
                 return known.together(arrays, attributes)
             except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-                raise IdentificationError(f"{kind}: does not fit together ({error})") from None
-    raise IdentificationError(f"kind: is '{kind}', known are {', '.join(known.name for known in exchanges())}")
+                raise IdentificationError(f"does not fit together ({error})", field=kind) from None
+    raise IdentificationError(field="kind", value=kind, allowed=[known.name for known in exchanges()])

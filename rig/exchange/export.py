@@ -25,7 +25,6 @@ from rig.results.kinds import KINDS
 from rig.results.time_data.series import TimeData
 from rig.system.whole_file import whole_file
 from rig.text.contents import Contents
-from vibrolock.printable import shown
 
 DATA = ("results", "time")
 """Choices of data to take from a recording."""
@@ -51,7 +50,7 @@ def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) 
         If the file cannot be read, or does not contain such points or data.
     """
     if data not in DATA:
-        raise ConfigurationError(f"`data` = {data!r}: allowed is {' or '.join(DATA)}")
+        raise ConfigurationError(field="data", value=data, allowed=f"{' or '.join(DATA)}")
     kind = kind_of(path)
     if kind in CAMPAIGNS:
         with Recording(path) as recording:
@@ -100,9 +99,9 @@ def export_file(
     try:
         found = [taken_apart(value) for value in read_objects(source, data, points)]
     except IdentificationError as error:
-        raise RecordingError(f"{source}: {error}") from None
+        raise RecordingError.of(error, where=source) from None
     if item and not 1 <= item <= len(found):
-        raise RecordingError(f"`item` = {item}: {source} holds 1 to {len(found)}")
+        raise RecordingError(f"{source} holds 1 to {len(found)}", field="item", value=item)
     chosen = [found[item - 1]] if item else found
     loose = next((one for one in chosen if not one.rows), None)
     if loose is not None and format_ != "mat":
@@ -116,7 +115,7 @@ def export_file(
 def write_contents(items: list[Contents], output: Path, format_: str, encoding: str = "") -> None:
     """Write contents in a format, a universal file in an encoding. The file is written completely or not at all."""
     if encoding and (encoding not in ENCODINGS or format_ != "uff"):
-        raise ConfigurationError(f"`encoding` = {shown(encoding)}: allowed is {' or '.join(ENCODINGS)}, of format uff")
+        raise ConfigurationError(field="encoding", value=encoding, allowed=f"{' or '.join(ENCODINGS)}, of format uff")
     with whole_file(output) as part:
         try:
             if format_ == "uff":

@@ -11,7 +11,6 @@ from rig.exchange.child_reading import NAMES, NOT_OURS, PROPOSAL, ImportFailed, 
 from rig.exchange.file_data import FileData, StoredObject
 from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.sources import format_of, read_data
-from vibrolock.printable import shown
 
 if TYPE_CHECKING:
     import identification as i
@@ -86,7 +85,7 @@ def import_file(
 
     form = format_of(path, format_, "`format`")
     if units not in ("", "labels", "file", "si"):
-        raise ConfigurationError(f"`units` = {units!r}: allowed is labels, file or si")
+        raise ConfigurationError(field="units", value=units, allowed="labels, file or si")
     try:
         if mapping is not None:
             return _read_with(mapping, path, form, units)
@@ -94,17 +93,17 @@ def import_file(
     except ImportFailed as error:
         if str(path) in str(error):
             raise
-        raise ImportFailed(f"{path}: {error}") from None
+        raise ImportFailed.of(error, where=path) from None
     except IdentificationError as error:
         fit = "" if mapping is None else f" does not fit {mapping}"
-        raise ImportFailed(f"{path}{fit}: {error}") from None
+        raise ImportFailed.of(error, where=f"{path}{fit}") from None
 
 
 def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> "tuple[i.FrequencyResponse, ...]":
     """Read stepped-sine frequency responses from a MAT file (up to version 7), in SI; errors are as for `import_file`."""
     found = import_file(Path(mat_path), "mat", Path(mapping_path))
     if not isinstance(found, tuple):
-        raise ConfigurationError(f"{mapping_path}: kind: allowed is {_DEFAULT_KIND}")
+        raise ConfigurationError(where=mapping_path, field="kind", allowed=_DEFAULT_KIND)
     return found
 
 
@@ -126,7 +125,7 @@ def import_sep005(series: Sequence[Mapping[str, object]], mapping: str | Path) -
     try:
         return _mapped(data_of_series(series), read_mapping(mapping), {})
     except IdentificationError as error:
-        raise ImportFailed(f"the series do not fit {mapping}: {error}") from None
+        raise ImportFailed.of(error, where=f"the series do not fit {mapping}") from None
 
 
 def read_mapping(path: str | Path) -> "AnyMapping":
@@ -146,7 +145,7 @@ def read_mapping(path: str | Path) -> "AnyMapping":
     table = read_toml(Path(path))
     kind = table.get("kind", _DEFAULT_KIND)
     if not isinstance(kind, str) or kind not in kinds:
-        raise ConfigurationError(f"{path}: kind = {shown(kind)}: allowed is {', '.join(kinds)}")
+        raise ConfigurationError(where=path, field="kind", value=kind, allowed=kinds)
     return validated(kinds[kind], table, str(path))
 
 
@@ -210,7 +209,9 @@ def _check_units(data: FileData, mapping: "AnyMapping", files: Mapping[str, File
             continue
         if si_of(channel.unit, channel.name) != known:
             raise ImportFailed(
-                f"channels.{channel.name}.unit = '{channel.unit}': the file's own units make it {given}; write that"
+                f"the file's own units make it {given}; write that",
+                field=f"channels.{channel.name}.unit",
+                value=channel.unit,
             )
 
 

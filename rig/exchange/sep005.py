@@ -12,7 +12,6 @@ from rig.exchange.child_reading import ImportFailed
 from rig.exchange.file_data import ChannelFacts, FileData
 from rig.system.text_files import read_text
 from vibrolock.arrays import Float
-from vibrolock.printable import shown
 
 _LARGEST_JSON_BYTES = 500_000_000  # largest file that is read, bytes; chosen
 _MAX_RATE_HZ = 1e100  # largest sample rate, Hz; chosen: any number with which one can still calculate
@@ -55,7 +54,7 @@ def data_of_series(series: Sequence[Mapping[str, object]]) -> FileData:
         except IdentificationError:
             unit, factor = "", 1.0
         if units.setdefault(name, unit) != unit:
-            raise ImportFailed(f"series[{number}].unit_str = {given!r}: {name} was in {units[name]!r} before")
+            raise ImportFailed(f"{name} was in {units[name]!r} before", field=f"series[{number}].unit_str", value=given)
         records.setdefault(name, []).append(_data(one, number) * factor)
     columns = {name: np.column_stack([r[: min(map(len, found))] for r in found]) for name, found in records.items()}
     channels = {name: ChannelFacts(name=name, unit=unit, in_si=True) for name, unit in units.items() if unit}
@@ -64,7 +63,7 @@ def data_of_series(series: Sequence[Mapping[str, object]]) -> FileData:
 
 def _text(one: Mapping[str, object], key: str, number: int) -> str:
     if not isinstance(value := one.get(key), str):
-        raise ImportFailed(f"series[{number}].{key} = {shown(value)}: allowed is a text")
+        raise ImportFailed(field=f"series[{number}].{key}", value=value, allowed="a text")
     return value
 
 
@@ -91,7 +90,7 @@ def _rate(one: Mapping[str, object], number: int) -> float:
             )
         fs = 1.0 / step
     if isinstance(fs, bool) or not isinstance(fs, int | float | np.number) or not 0.0 < fs < _MAX_RATE_HZ:
-        raise ImportFailed(f"series[{number}].fs = {shown(fs)}: allowed is a number above 0")
+        raise ImportFailed(field=f"series[{number}].fs", value=fs, allowed="a number above 0")
     return float(fs)
 
 

@@ -29,8 +29,7 @@ EXPORTS = ("mat", "uff", "csv")
 def format_of(path: Path, given: str, option: str, known: tuple[str, ...] = tuple(FORMATS)) -> str:
     """Return the given format, or else the one for the suffix of ``path``; raise `ConfigurationError` if it is unknown."""
     if given:
-        if given not in known:
-            raise ConfigurationError(f"{option} = {given!r}: allowed is {', '.join(known)}")
+        ConfigurationError.unless_one_of(option, given, known)
         return given
     for name in known:
         if path.suffix.lower() in FORMATS[name]:
@@ -58,7 +57,7 @@ def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout |
         If the file cannot be read.
     """
     if layout is not None and format_ != "csv":
-        raise ConfigurationError(f"csv: is for CSV files, {path} is read as {format_}")
+        raise ConfigurationError(f"is for CSV files, {path} is read as {format_}", field="csv")
     if format_ == "uff":
         return time_data_in(read_uff(path), units)
     if layout is not None:

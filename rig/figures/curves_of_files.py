@@ -59,7 +59,7 @@ def curves_of(path: Path, view: View) -> Curves:
         with Recording(path) as recording:
             return RECORDED[kind][1](recording, view)
     except IdentificationError as error:
-        raise IdentificationError(f"{path}: {error}") from None
+        raise IdentificationError.of(error, where=path) from None
     except RecordingError as error:
         text = str(error)
         raise error if text.startswith(str(path)) else RecordingError(f"{path}: {text}") from None

@@ -19,7 +19,7 @@ class Results:
         self._path = Path(path).absolute()
         if self._path.exists() and not _is_result(self._path):
             raise pytest.UsageError(f"--rig-result {path}: exists already and is no such result; choose another name")
-        self._subject: dict[str, Any] = {}
+        self._subject: dict[str, object] = {}
         self._started = datetime.now(UTC).isoformat(timespec="seconds")
         self._tests: dict[str, dict[str, Any]] = {}
 
@@ -59,7 +59,7 @@ def _is_result(path: Path) -> bool:
         return False
 
 
-def _reason(why: Any) -> str:
+def _reason(why: object) -> str:
     """One line: what a skip says, what an exception says, or all there is."""
     if isinstance(why, tuple):
         return str(why[2])

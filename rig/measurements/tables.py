@@ -121,8 +121,7 @@ def selected_rows(
 
     Arguments and errors are those of `telemetry`.
     """
-    if every < 1:
-        raise RecordingError(f"`every` = {every}: allowed is from 1")
+    RecordingError.unless_at_least("every", every, 1)
     number, first, end = _stretch(recording, part, point)
     stored = recording.parts[number]
     rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
@@ -143,18 +142,18 @@ def _stretch(recording: Recording, part: int | None, point: int | None) -> tuple
         count = len(recording.parts)
         number = (count if part is None else part) - 1
         if not 0 <= number < count:
-            raise RecordingError(f"`part` = {part}: {recording.path} has {count} parts, counted from 1")
+            raise RecordingError(f"{recording.path} has {count} parts, counted from 1", field="part", value=part)
         return number, 0, recording.parts[number].n_rows
     table = recording.latest.get(point - 1)
     if table is None:
         raise RecordingError(
-            f"`point` = {point}: {recording.path} has {', '.join(str(n + 1) for n in recording.latest)}"
+            f"{recording.path} has {', '.join(str(n + 1) for n in recording.latest)}", field="point", value=point
         )
     number = int(table["part"])
     if part is not None and part != number + 1:
-        raise RecordingError(f"`part` = {part}: point {point} is in part {number + 1}")
+        raise RecordingError(f"point {point} is in part {number + 1}", field="part", value=part)
     if table.get("first_sample") is None or table.get("end_sample") is None:
-        raise RecordingError(f"`point` = {point}: it was not recorded ({table['reason']})")
+        raise RecordingError(f"it was not recorded ({table['reason']})", field="point", value=point)
     return number, int(table["first_sample"]), int(table["end_sample"])  # numbers of rows
 
 
@@ -166,7 +165,7 @@ def _variables(
     scalars = {column.name: column for column in part.columns if column.name != "inputs"}
     known = [*channels, *(name for name in scalars if name not in channels)]
     if unknown := [name for name in columns or () if name not in known]:
-        raise RecordingError(f"`columns` = {unknown[0]!r}: there are {', '.join(known)}")
+        raise RecordingError(f"there are {', '.join(known)}", field="columns", value=unknown[0])
     wanted = known if columns is None else list(dict.fromkeys(columns))
     read = range(rows.start, max(rows.start, rows.stop))
     inputs = part.rows("inputs", read.start, read.stop)[::every] if channels.keys() & set(wanted) else None

@@ -29,9 +29,7 @@ def from_files(certificate: Path, key: Path | None) -> tuple[ssl.SSLContext, str
         return context, fingerprint(certificate.read_text(encoding="ascii"))
     except (OSError, ValueError) as error:  # SSLError is an OSError
         named = f"`certificate` = {certificate}" + (f", `key` = {key}" if key is not None else "")
-        raise ConfigurationError(
-            f"{named}: {error_text(error)}; allowed are a certificate and its key as PEM"
-        ) from error
+        raise ConfigurationError(error_text(error), where=named, allowed="a certificate and its key as PEM") from error
 
 
 def _no_password() -> bytes:

@@ -58,11 +58,13 @@ class Address:
 
     def __post_init__(self) -> None:
         if not 0 <= self.port <= 65535:
-            raise ConfigurationError(f"`port` = {self.port}: allowed is 0 to 65535, 0 for a free one")
+            raise ConfigurationError(field="port", value=self.port, allowed="0 to 65535, 0 for a free one")
         if self.key is not None and self.certificate is None:
-            raise ConfigurationError(f"`key` = {self.key}: wants `certificate` as well")
+            raise ConfigurationError("wants `certificate` as well", field="key", value=self.key)
         if not self.bind or (self._number is not None and self._number.is_unspecified):
-            raise ConfigurationError(f"`bind` = {self.bind!r}: allowed is one address of this machine, not all at once")
+            raise ConfigurationError(
+                field="bind", value=self.bind, allowed="one address of this machine, not all at once"
+            )
 
     @property
     def _number(self) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
@@ -92,7 +94,9 @@ class Address:
             family, kind, protocol, _, address = found[0]
             listening = socket.socket(family, kind, protocol)
         except (OSError, UnicodeError) as error:
-            raise ConfigurationError(f"`bind` = {self.bind!r}: is no address of this machine ({error})") from error
+            raise ConfigurationError(
+                f"is no address of this machine ({error})", field="bind", value=self.bind
+            ) from error
         try:
             if os.name == "posix":  # a port that was closed just now may be used again; elsewhere this means any port
                 listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -24,6 +24,7 @@ from rig.monitor.recorded_part import PlanOfPart, RecordedPart
 from rig.monitor.shown import fundamentals_of
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode
+from vibrolock.errors import InputError
 
 FASTEST = 1000.0
 """Largest speed of a replay, times the clock; chosen."""
@@ -48,7 +49,7 @@ class Replay:
         self._recording = Recording(path)
         try:
             if not 0.0 < speed <= FASTEST:
-                raise RecordingError(f"`speed` = {speed:g}: allowed is above 0, up to {FASTEST:g}")
+                raise RecordingError(field="speed", value=speed, allowed=f"above 0, up to {FASTEST:g}")
             self._prepare(path)
         except BaseException:
             self._recording.close()
@@ -133,7 +134,7 @@ class Replay:
     def set_speed(self, speed: float) -> None:
         """Go on ``speed`` times as fast as the clock; RecordingError if that is not allowed."""
         if not 0.0 < speed <= FASTEST:
-            raise RecordingError(f"`speed` = {speed:g}: allowed is above 0, up to {FASTEST:g}")
+            raise RecordingError(field="speed", value=speed, allowed=f"above 0, up to {FASTEST:g}")
         with self._lock:
             self._at_s, self._since_s = self._now_s(), None if self._since_s is None else time.monotonic()
             self.speed = speed
@@ -152,7 +153,7 @@ class Replay:
         elif action in ("pause", "play"):
             (self.pause if action == "pause" else self.play)()
         else:
-            raise ValueError(f"{action!r}: pause, play, seek or speed is wanted")
+            raise InputError("pause, play, seek or speed is wanted", field=f"{action!r}")
 
     def request_stop(self, cause: str) -> None:
         """Refuse by `RecordingError`: nothing moves."""

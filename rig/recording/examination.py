@@ -98,7 +98,7 @@ def _check_storage(dataset: "h5py.Dataset", dtype: np.dtype) -> None:
     if dataset.is_virtual or dataset.external:
         raise RecordingError(f"{dataset.name} keeps its values in another file; allowed are values of its own")
     if dataset.shape is None or dtype.kind not in "biufcSO":
-        raise RecordingError(f"{dataset.name} is {dtype}; numbers or texts are wanted")
+        raise RecordingError("numbers or texts are wanted", field=dataset.name, value=dtype)
     if dtype.kind == "O" and h5py.check_string_dtype(dtype) is None:
         raise RecordingError(f"{dataset.name} holds lists or references; numbers or texts are wanted")
     if dataset.size == 0:

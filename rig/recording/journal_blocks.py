@@ -49,7 +49,9 @@ class JournalBlocks:
             if second is None or second.kind is not BlockKind.HEADER:
                 if not size:
                     raise RecordingError(f"{self.path}: {EMPTY}") from None
-                raise RecordingError(f"{self.path}: not a readable journal; at its beginning: {error}") from error
+                raise RecordingError.of(
+                    error, where=f"{self.path}: not a readable journal; at its beginning"
+                ) from error
             return replace(second, gap=Gap(second.start, second.sequence, f"{error} (at byte 0)"))
 
     @property

@@ -52,7 +52,7 @@ def reading(path: Path) -> Iterator[None]:
     except RecordingError as error:
         if str(error).startswith(f"{path}: "):
             raise
-        raise RecordingError(f"{path}: damaged: {error}") from error
+        raise RecordingError.of(error, where=f"{path}: damaged") from error
     except (OSError, LookupError, RuntimeError, ValueError, TypeError, AttributeError, MemoryError) as error:
         raise RecordingError(f"{path}: damaged: cannot be read ({error_text(error)})") from error
 

@@ -8,7 +8,6 @@ from typing import Protocol
 
 from rig.errors import RecordingError
 from rig.recording.stored import End, Event, Information, StoredPoint
-from vibrolock.printable import shown
 
 LARGEST_NUMBER = 1e100
 """A finite number beyond it is no measurement; its square could be no number any more."""
@@ -43,7 +42,7 @@ def check_stored_values(part: _Told, where: str) -> None:
     }
     for name, table in tables.items():
         for key, value, allowed in _faults(table, name):
-            raise RecordingError(f"{where}: {key} = {shown(value)}: allowed is {allowed}")
+            raise RecordingError(where=where, field=key, value=value, allowed=allowed)
     for number, event in enumerate(part.events):
         if event.get("what") == "telemetry" and not all(
             event.get(key) is not None for key in ("row", "sample", "stride")

@@ -146,7 +146,7 @@ def roots() -> tuple[type[BaseModel], ...]:
     return (*(campaign.plan for campaign in KINDS.values()), *(tables()[name] for name in others))
 
 
-def parts_of(kind: Any) -> set[type[BaseModel]]:
+def parts_of(kind: object) -> set[type[BaseModel]]:
     """Return a model and all models that its fields may hold, at any depth."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         return {kind}.union(*(parts_of(field.annotation) for field in kind.model_fields.values()))
@@ -172,7 +172,7 @@ def keys_of(table: str) -> tuple[Key, ...]:
     )
 
 
-def _tables_in(kind: Any) -> tuple[str, ...]:
+def _tables_in(kind: object) -> tuple[str, ...]:
     """Return the names of the tables that a field holds itself, not those inside them."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         return tuple(name for name, model in tables().items() if model is kind)
@@ -183,7 +183,7 @@ def _in_one_line(text: str) -> str:
     return " ".join(text.split()).replace("``", "`")
 
 
-def _default(value: Any) -> str:
+def _default(value: object) -> str:
     """Return a default as TOML has it; empty for what is absent or a table of its own."""
     if value is None or isinstance(value, dict) or value in ("", []):
         return ""

@@ -6,6 +6,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from rig.bench.configuration import Configured, read_toml, validated
+from vibrolock.errors import InputError
 
 
 class Hypotheses(Configured):
@@ -65,11 +66,11 @@ class Hypotheses(Configured):
             raise ValueError(f"hardening + softening = {total:g}: allowed is up to 1, a twin has one spring at most")
         for name, value in self:
             if isinstance(value, tuple) and not 0.0 < value[0] <= value[1]:
-                raise ValueError(f"{name} = {list(value)}: allowed is two numbers above 0, the lower one first")
+                raise InputError(field=name, value=list(value), allowed="two numbers above 0, the lower one first")
         for name in ("shift", "joint_shift"):
             highest = getattr(self, name)[1]
             if highest >= 0.5:
-                raise ValueError(f"{name} = {list(getattr(self, name))}: allowed is below 0.5")
+                raise InputError(field=name, value=list(getattr(self, name)), allowed="below 0.5")
         return self
 
 

@@ -83,9 +83,10 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
         _plant(found, bench, plant, _ratios(plan, bench))
     if found.responses is None and not (found.exciter and found.shape):
         raise ConfigurationError(
-            f"`sources`: nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of "
-            "`rig tune` or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a virtual bench may "
-            "rehearse by itself with `exact`"
+            f"nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of "
+            "`rig tune` or `rig check`, or both an exciter and linear modes, or a plan with [plant]; a "
+            "virtual bench may rehearse by itself with `exact`",
+            field="sources",
         )
     channels = [channel.name for channel in bench.channels if channel.role == "response"]
     facts = bench.specimen
@@ -116,20 +117,26 @@ def _add(found: _Evidence, bench: Bench, name: str, source: object) -> None:
         found.sources.append(f"{name}: frequency and damping over the amplitude, {source.amplitude_m.size} levels")
     else:
         raise ConfigurationError(
-            f"`sources` = {name}: holds a {type(source).__name__}; allowed are a recording of a multisine, linear modes, an "
-            "exciter, a nonlinear mode"
+            f"holds a {type(source).__name__}",
+            field="sources",
+            value=name,
+            allowed="a recording of a multisine, linear modes, an exciter, a nonlinear mode",
         )
 
 
 def _recording(found: _Evidence, bench: Bench, name: str, recording: Recording) -> None:
     if recording.kind != "multisine":
-        raise ConfigurationError(f"`sources` = {name}: is a recording of kind {recording.kind}; allowed is a multisine")
+        raise ConfigurationError(
+            f"is a recording of kind {recording.kind}", field="sources", value=name, allowed="a multisine"
+        )
     by_level = spectra(recording)
     level = list(by_level)[-1]
     measured = by_level[level]
     names = _names(bench)
     if missing := [one for one in names if one not in [channel.name for channel in measured.channels]]:
-        raise ConfigurationError(f"`sources` = {name}: has no channel {missing[0]!r} of the bench {bench.name}")
+        raise ConfigurationError(
+            f"has no channel {missing[0]!r} of the bench {bench.name}", field="sources", value=name
+        )
     matrix = best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
     inside = _inside(bench, matrix.frequency_hz)
     found.responses = _thinned(
@@ -187,8 +194,9 @@ def _start_from(found: _Evidence, bench: Bench, responses: Responses) -> None:
         )
     except ValueError as error:
         raise ConfigurationError(
-            f"`sources`: the responses of the bench {bench.name} show no mode near {bench.specimen.linear_frequency_hz:g} Hz: "
-            f"{error}"
+            f"the responses of the bench {bench.name} show no mode near "
+            f"{bench.specimen.linear_frequency_hz:g} Hz: {error}",
+            field="sources",
         ) from None
     _plant_start(found, plant)
 

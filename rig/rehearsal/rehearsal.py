@@ -124,10 +124,8 @@ class RehearsalRequest:
     """Whether harmonic balance of each twin is wanted."""
 
     def __post_init__(self) -> None:
-        if not 1 <= self.draws <= MAX_DRAWS:
-            raise ConfigurationError(f"`draws` = {self.draws}: allowed is 1 to {MAX_DRAWS}")
-        if self.seed < 0:
-            raise ConfigurationError(f"`seed` = {self.seed}: allowed is 0 or more")
+        ConfigurationError.unless_between("draws", self.draws, 1, MAX_DRAWS)
+        ConfigurationError.unless_at_least("seed", self.seed, 0)
         self.plan.check(self.bench)
 
     def twin(self, number: int) -> Twin:

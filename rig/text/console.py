@@ -6,7 +6,6 @@ import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from vibrolock.printable import printable
 
@@ -47,12 +46,12 @@ def collected() -> Iterator[list[str | PrintedTable]]:
         collector.take_lines()
 
 
-def print_json(value: Mapping[str, Any]) -> None:
+def print_json(value: Mapping[str, object]) -> None:
     """Print one JSON document on standard output; numbers that are not finite become null."""
     print(json.dumps(_finite(value), indent=2))
 
 
-def _finite(value: Any) -> Any:
+def _finite(value: object) -> object:
     if isinstance(value, Mapping):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -58,10 +58,12 @@ class Tick:
             _check_harmonics(law, bench, segments, loop_delay_samples)
             law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, shape)
         except ValueError as error:
-            raise ConfigurationError(f"controller.{error}") from None
+            raise ConfigurationError.of(error, within="controller") from None
         if loop_delay_samples < 1.0:
             raise ConfigurationError(
-                f"loop_delay_samples = {loop_delay_samples:g}: an output shows at the next sample at the earliest"
+                "an output shows at the next sample at the earliest",
+                field="loop_delay_samples",
+                value=loop_delay_samples,
             )
         lag_rad = float(law_record["frequency"]["target_lag_rad"][0])
         table, outcomes = segment_table(

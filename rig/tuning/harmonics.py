@@ -31,14 +31,15 @@ class HarmonicsChoice:
 
 def check_highest(bench: Bench, highest: int) -> None:
     """Raise `ConfigurationError` unless the bench's limits let a multisine reach beyond the highest harmonic."""
-    if not 2 <= highest <= MOST_HARMONICS:
-        raise ConfigurationError(f"`harmonics` = {highest}: allowed is 2 to {MOST_HARMONICS}")
+    ConfigurationError.unless_between("harmonics", highest, 2, MOST_HARMONICS)
     needed, allowed = band_for(bench, highest), bench.limits.frequency_hz[1]
     if needed > allowed:
         linear = bench.specimen.linear_frequency_hz
         raise ConfigurationError(
-            f"`harmonics` = {highest}: the multisine would reach {needed:.4g} Hz, the bench {bench.name} allows up to "
-            f"{allowed:g} Hz, enough for {max(1, int(allowed / linear - EXAMINED_BAND))}"
+            f"the multisine would reach {needed:.4g} Hz, the bench {bench.name} allows up to {allowed:g} Hz, "
+            f"enough for {max(1, int(allowed / linear - EXAMINED_BAND))}",
+            field="harmonics",
+            value=highest,
         )
 
 

@@ -159,8 +159,10 @@ def choose_levels(
     highest = LIMIT_FRACTION * reach if to_m is None else to_m
     if highest > reach:
         raise ConfigurationError(
-            f"`to_m` = {highest:g} m: allowed is up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the "
-            f"linear plant (it would need {needed_v(plant, highest):.3g} V)"
+            field="to_m",
+            value=highest,
+            allowed=f"up to {reach:.3g} m, where {limit} of the bench {bench.name} ends the linear plant (it would "
+            f"need {needed_v(plant, highest):.3g} V)",
         )
     if not 0.0 < first < highest:
         raise ConfigurationError(

@@ -195,5 +195,7 @@ def _on_samples(bench: Bench, resolution_hz: float) -> float:
     """Return the resolution nearest to the wanted one whose period is a whole number of samples."""
     samples = round(bench.sample_rate_hz / resolution_hz)
     if samples < 2:
-        raise ConfigurationError(f"specimen.linear_frequency_hz: too high for {bench.sample_rate_hz:g} samples/s")
+        raise ConfigurationError(
+            f"too high for {bench.sample_rate_hz:g} samples/s", field="specimen.linear_frequency_hz"
+        )
     return bench.sample_rate_hz / samples

@@ -232,9 +232,11 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
     offset = facts.linear_frequency_hz / measured_hz - 1.0
     if abs(offset) > MAX_OFFSET:
         raise TuningError(
-            f"specimen.linear_frequency_hz = {facts.linear_frequency_hz:g} Hz: the mode that answers lies at "
-            f"{measured_hz:.4g} Hz, the bench is {100.0 * offset:+.1f} % off, allowed is {100.0 * MAX_OFFSET:g} %; correct "
-            "the bench, or see whether it is another mode"
+            f"the mode that answers lies at {measured_hz:.4g} Hz, the bench is {100.0 * offset:+.1f} % off",
+            field="specimen.linear_frequency_hz",
+            value=facts.linear_frequency_hz,
+            allowed=f"{100.0 * MAX_OFFSET:g} %",
+            hint="correct the bench, or see whether it is another mode",
         )
     if abs(offset) > MIN_NOTED_HZ:
         out.append(

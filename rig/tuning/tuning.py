@@ -59,14 +59,12 @@ class TuningRequest:
     """Highest harmonic of the force that the plan controls; the multisine then reaches beyond it. None: none is controlled."""
 
     def __post_init__(self) -> None:
-        if self.law not in get_args(LawName):
-            raise ConfigurationError(f"`law` = {self.law!r}: allowed is {', '.join(get_args(LawName))}")
+        ConfigurationError.unless_one_of("law", self.law, get_args(LawName))
         if self.level_rms_v is not None and not self.level_rms_v > 0.0:
             raise ConfigurationError(f"`level_rms_v` = {self.level_rms_v:g} V RMS: allowed is above 0")
-        if self.points < 1:
-            raise ConfigurationError(f"`points` = {self.points}: allowed is 1 or more")
+        ConfigurationError.unless_at_least("points", self.points, 1)
         if self.from_m is not None and self.to_m is not None and self.from_m >= self.to_m:
-            raise ConfigurationError(f"`from_m` = {self.from_m:g} m: allowed is below `to_m` = {self.to_m:g} m")
+            raise ConfigurationError(field="from_m", value=self.from_m, allowed=f"below `to_m` = {self.to_m:g} m")
 
     def check(self, bench: Bench) -> None:
         """Raise `ConfigurationError` for levels and harmonics beyond what the bench allows."""
@@ -78,7 +76,10 @@ class TuningRequest:
         for name, level in (("from_m", self.from_m), ("to_m", self.to_m)):
             if level is not None and not 0.0 < level <= allowed_m:
                 raise ConfigurationError(
-                    f"`{name}` = {level:g} m: the bench {bench.name} allows above 0 and up to {allowed_m:.3g} m{why}"
+                    f"the bench {bench.name} allows above 0 and up to {allowed_m:.3g} m{why}",
+                    field=name,
+                    value=level,
+                    unit="m",
                 )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from simulators.virtual_rig import VirtualRig
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 
 Held = Literal["force", "force-rms", "response", "voltage"]
 Quantity = Literal["fundamental", "rms"]
@@ -31,7 +32,7 @@ _MOVES_A_SITE = 0.01
 def held_force(quantity: Quantity) -> Held:
     """Return the name of the condition that holds a force, by its fundamental or its RMS."""
     if quantity not in ("fundamental", "rms"):
-        raise ValueError(f"quantity = {quantity!r}: allowed is fundamental or rms")
+        raise InputError(field="quantity", value=quantity, allowed="fundamental or rms")
     return "force" if quantity == "fundamental" else "force-rms"
 
 
@@ -100,7 +101,7 @@ def positive(name: str, values: ArrayLike) -> Float:
     """Return ``values`` as a row; raise `ValueError` unless all are finite and above zero."""
     array = _row(name, values)
     for value in array[~((array > 0.0) & np.isfinite(array))]:
-        raise ValueError(f"{name} = {value:g}: allowed is above 0")
+        raise InputError(field=name, value=value, allowed="above 0")
     return array
 
 
@@ -114,7 +115,7 @@ def levels(
         return "voltage", positive("voltages_v", voltages_v)
     if amplitudes_m is not None and forces_n is None and voltages_v is None:
         return "response", positive("amplitudes_m", amplitudes_m)
-    raise ValueError("forces_n, voltages_v, amplitudes_m: several or none given, allowed is one of them")
+    raise InputError("several or none given", field="forces_n, voltages_v, amplitudes_m", allowed="one of them")
 
 
 def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Float:
@@ -122,9 +123,9 @@ def lags_rad(name: str, values: ArrayLike, *, rising: bool = False) -> Float:
     array = _row(name, values)
     lowest, highest = _LAG_LIMITS_DEG
     for value in array[~((array >= lowest) & (array <= highest))]:
-        raise ValueError(f"{name} = {value:g}: allowed is {lowest:g} to {highest:g}")
+        raise InputError(field=name, value=value, allowed=f"{lowest:g} to {highest:g}")
     if rising and not np.all(np.diff(array) > 0.0):
-        raise ValueError(f"{name}: not rising, allowed are lags each above the one before")
+        raise InputError("not rising", field=name, allowed="lags each above the one before")
     return np.radians(array)
 
 
@@ -132,12 +133,13 @@ def checked_harmonics(harmonics: int, samples: int) -> tuple[int, int]:
     """Return harmonics and samples after a check; the samples must resolve the highest harmonic and products of the sites."""
     for name, value in (("harmonics", harmonics), ("samples", samples)):
         if not isinstance(value, int | np.integer):
-            raise ValueError(f"{name} = {value!r}: allowed is a whole number")
-    if harmonics < 1:
-        raise ValueError(f"harmonics = {harmonics}: allowed is at least 1")
+            raise InputError(field=name, value=value, allowed="a whole number")
+    InputError.unless_at_least("harmonics", harmonics, 1)
     if samples < _SAMPLES_PER_HARMONIC * (harmonics + 1):
-        raise ValueError(
-            f"samples = {samples}: allowed is at least {_SAMPLES_PER_HARMONIC * (harmonics + 1)} for {harmonics} harmonics"
+        raise InputError(
+            field="samples",
+            value=samples,
+            allowed=f"at least {_SAMPLES_PER_HARMONIC * (harmonics + 1)} for {harmonics} harmonics",
         )
     return harmonics, samples
 
@@ -160,7 +162,7 @@ def _row(name: str, values: ArrayLike) -> Float:
     try:
         array = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError):
-        raise ValueError(f"{name} = {values!r}: allowed is a number, or one row of numbers") from None
+        raise InputError(field=name, value=values, allowed="a number, or one row of numbers") from None
     if array.ndim != 1 or array.size == 0:
-        raise ValueError(f"{name}: shape {array.shape}, allowed is one row of at least one number")
+        raise InputError(f"shape {array.shape}", field=name, allowed="one row of at least one number")
     return array

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrolock.arrays import Complex
+from vibrolock.errors import InputError
 
 ForceHarmonics = int | Mapping[int, complex]
 """Controlled harmonics of the force: the highest one, all from the second on being zero, or each with its value ``c_h``."""
@@ -69,14 +70,16 @@ def _ratios(force_harmonics: ForceHarmonics, harmonics: int) -> dict[int, comple
     """Return the values of the controlled harmonics after a check."""
     if isinstance(force_harmonics, Mapping):
         for order, ratio in force_harmonics.items():
-            _check_order("force_harmonics: harmonic ", order, harmonics)
+            _check_order("force_harmonics: harmonic", order, harmonics)
             if not (isinstance(ratio, Number) and np.isfinite(complex(ratio))):
-                raise ValueError(f"force_harmonics[{order}] = {ratio!r}: allowed is a finite number, real or complex")
+                raise InputError(
+                    field=f"force_harmonics[{order}]", value=ratio, allowed="a finite number, real or complex"
+                )
         return {int(order): complex(ratio) for order, ratio in force_harmonics.items()}
-    _check_order("force_harmonics = ", force_harmonics, harmonics)
+    _check_order("force_harmonics", force_harmonics, harmonics)
     return dict.fromkeys(range(2, force_harmonics + 1), 0j)
 
 
-def _check_order(name: str, order: object, harmonics: int) -> None:
+def _check_order(field: str, order: object, harmonics: int) -> None:
     if not isinstance(order, int | np.integer) or isinstance(order, bool) or not 2 <= order <= harmonics:
-        raise ValueError(f"{name}{order!r}: allowed is 2 to {harmonics}, the highest harmonic computed")
+        raise InputError(field=field, value=order, allowed=f"2 to {harmonics}, the highest harmonic computed")

@@ -10,6 +10,7 @@ from simulators.plant.assembly import LinearPlant
 from simulators.plant.compilation import phi_matrices
 from simulators.virtual_rig import VirtualRig
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,8 +55,8 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
     frequencies = positive("frequencies_hz", frequencies_hz)
     plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz
     if held and np.max(frequencies) >= 0.5 * rate_hz:
-        raise ValueError(
-            f"frequencies_hz = {np.max(frequencies):g}: allowed is below {0.5 * rate_hz:g}, half the sample rate"
+        raise InputError(
+            field="frequencies_hz", value=np.max(frequencies), allowed=f"below {0.5 * rate_hz:g}, half the sample rate"
         )
     s = np.asarray(2j * np.pi * frequencies, dtype=np.complex128)
     states = _held_states(plant, s, 1.0 / rate_hz) if held else _states(plant.dynamics, plant.voltage_column, s)

@@ -20,6 +20,7 @@ from simulators.analysis.force_control import ForceHarmonics
 from simulators.analysis.paths import HARMONICS, SAMPLES, ModePaths
 from simulators.analysis.responses import PeriodicResponses
 from simulators.virtual_rig import VirtualRig
+from vibrolock.errors import InputError
 
 RESONANCE_DEG = -90.0
 _FROM_BELOW_TO_ABOVE = (-175.0, -5.0)
@@ -78,12 +79,12 @@ def phase_resonance_backbone(
     """
     held, values = levels(forces_n, voltages_v, amplitudes_m)
     if excitation not in ("exciter", "pure-sine"):
-        raise ValueError(f"excitation = {excitation!r}: allowed is exciter or pure-sine")
+        raise InputError(field="excitation", value=excitation, allowed="exciter or pure-sine")
     held_as = held_force(quantity)
     if excitation == "pure-sine" and held == "voltage":
-        raise ValueError("voltages_v: allowed with excitation = 'exciter', a pure sine has forces_n")
+        raise InputError("allowed with excitation = 'exciter', a pure sine has forces_n", field="voltages_v")
     if excitation == "pure-sine" and force_harmonics is not None:
-        raise ValueError("force_harmonics: allowed with excitation = 'exciter', a pure sine has none")
+        raise InputError("allowed with excitation = 'exciter', a pure sine has none", field="force_harmonics")
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
     paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics, pure_sine=excitation == "pure-sine")
     goals = [Conditions(held_as if held == "force" else held, float(level), "lag", lag) for level in values]
@@ -170,7 +171,7 @@ def constant_displacement_response(
     """
     amplitude = float(positive("amplitude_m", [amplitude_m])[0])
     if phase_lags_deg is not None and frequencies_hz is not None:
-        raise ValueError("phase_lags_deg, frequencies_hz: both given, allowed is one of them")
+        raise InputError("both given", field="phase_lags_deg, frequencies_hz", allowed="one of them")
     paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics)
     if frequencies_hz is not None:
         omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 from vibrolock.results import Result
 
 
@@ -85,8 +86,7 @@ class PeriodicResponses(Result):
     def force_harmonic_ratio(self, harmonic: int) -> Float:
         """Return ``|F_h / F_1|`` [n]; raise `ValueError` if the harmonic was not computed."""
         highest = self.force_harmonics_n.shape[1] - 1
-        if not 0 <= harmonic <= highest:
-            raise ValueError(f"harmonic = {harmonic}: allowed is 0 to {highest}")
+        InputError.unless_between("harmonic", harmonic, 0, highest)
         return np.asarray(np.abs(self.force_harmonics_n[:, harmonic] / self.force_harmonics_n[:, 1]))
 
 

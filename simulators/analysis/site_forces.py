@@ -13,6 +13,7 @@ from simulators.analysis.responses import HysteresisLoop, PeriodicResponses
 from simulators.plant.sites import local_sites
 from simulators.virtual_rig import VirtualRig
 from vibrolock.arrays import Complex, Float
+from vibrolock.errors import InputError
 
 _RELATIVE_STEP = 6e-6
 """Half step of the central differences relative to the motion's amplitude, near the cube root of the rounding error."""
@@ -117,7 +118,7 @@ def hysteresis_loops(
     """Return the loops of all friction joints of ``rig`` at one point of its responses, in the order of ``rig.friction``."""
     n_point, _, n_harmonic = responses.site_harmonics.shape
     if not -n_point <= point < n_point:
-        raise ValueError(f"point = {point}: allowed is {-n_point} to {n_point - 1}")
+        raise InputError(field="point", value=point, allowed=f"{-n_point} to {n_point - 1}")
     series, sites = Series(n_harmonic - 1, samples), SiteForces(rig)
     coefficients = series.to_real(responses.site_harmonics[point])
     first = sites.n_site - len(rig.friction)

@@ -18,6 +18,7 @@ from simulators.sites.elements import Clearance, Element, Magnet
 from simulators.sites.friction import FrictionSite
 from simulators.structures.structure import Structure
 from vibrolock.arrays import Float
+from vibrolock.errors import InputError
 
 LARGEST_STEP = 0.5
 """Largest product of the integration step and the angular frequency of the stiffest element on the structure's modes. A contact
@@ -161,9 +162,10 @@ def computable(parts: str) -> Iterator[None]:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             yield
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        raise ValueError(
-            f"{parts}: cannot be computed with these numbers ({type(error).__name__}: {error}); one of them is far too large "
-            "or too small beside the others"
+        raise InputError(
+            f"cannot be computed with these numbers ({type(error).__name__}: {error}); one of them is far "
+            "too large or too small beside the others",
+            field=parts,
         ) from None
 
 
@@ -171,9 +173,9 @@ def check_elements(elements: Sequence[Element], plant: LinearPlant) -> None:
     """Raise `ValueError` if an element's coordinate does not move or a stop lies beyond a magnet."""
     for i, element in enumerate(elements):
         if element.at == element.to:
-            raise ValueError(f"elements[{i}].to = {element.to!r}: allowed is another point than at")
+            raise InputError(field=f"elements[{i}].to", value=element.to, allowed="another point than at")
         if not np.any(plant.site_rows[i]):
-            raise ValueError(f"elements[{i}].at = {element.at!r}: allowed is a point that moves")
+            raise InputError(field=f"elements[{i}].at", value=element.at, allowed="a point that moves")
         if isinstance(element, Clearance):
             for magnet in (other for other in elements if isinstance(other, Magnet)):
                 if (magnet.at, magnet.to) == (element.at, element.to):
@@ -186,18 +188,16 @@ def _check_stop(i: int, stop: Clearance, magnet: Magnet) -> None:
         gaps["other_gap_m"] = stop.other_gap_m
     for name, gap_m in gaps.items():
         if gap_m >= magnet.gap_m:
-            message = f"allowed is below {magnet.gap_m:g}, where the magnet at {magnet.at!r} touches"
-            raise ValueError(f"elements[{i}].{name} = {gap_m:g}: {message}")
+            allowed = f"below {magnet.gap_m:g}, where the magnet at {magnet.at!r} touches"
+            raise InputError(field=f"elements[{i}].{name}", value=gap_m, allowed=allowed)
 
 
 def check_plant(plant: LinearPlant) -> None:
     """Raise `ValueError` if the linear plant does not return to rest."""
     stiffness = np.linalg.eigvalsh(plant.modal_stiffness)
     if stiffness[0] < -1e-9 * max(abs(stiffness)):
-        message = "allowed is no more than the structure has there"
-        raise ValueError(
-            f"elements: their linear stiffness takes {-stiffness[0]:.6g} s^-2 too much from a mode, {message}"
-        )
+        taken = f"their linear stiffness takes {-stiffness[0]:.6g} s^-2 too much from a mode"
+        raise InputError(taken, field="elements", allowed="no more than the structure has there")
     poles = np.linalg.eigvals(plant.dynamics)
     fastest = poles[np.argmax(poles.real)]
     if fastest.real > GROWTH * np.max(np.abs(poles)):
@@ -222,8 +222,9 @@ def check_step(elements: Sequence[Element], plant: LinearPlant, rate_hz: float, 
             needed = math.ceil(rate / (rate_hz * LARGEST_STEP))
             largest = LARGEST_STEP * rate_hz * substeps
             allowed = (largest if of_velocity else largest**2) / mobility
-            raise ValueError(
-                f"elements[{i}]: its slope of {element.steepest_n_m:.6g} {'N s/m' if of_velocity else 'N/m'} at "
-                f"{element.at!r} is too steep for {substeps} integration steps per sample, "
-                f"allowed is up to {allowed:.6g}, or converter.substeps of at least {needed}"
+            raise InputError(
+                f"its slope of {element.steepest_n_m:.6g} {('N s/m' if of_velocity else 'N/m')} at "
+                f"{element.at!r} is too steep for {substeps} integration steps per sample",
+                field=f"elements[{i}]",
+                allowed=f"up to {allowed:.6g}, or converter.substeps of at least {needed}",
             )

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive
+from vibrolock.errors import InputError
 
 TAPS = 6
 """Number of values from which a skewed channel is interpolated."""
@@ -47,9 +48,9 @@ class Sensor(Part):
     @model_validator(mode="after")
     def _placed(self) -> "Sensor":
         if self.kind == "acceleration" and self.at is None:
-            raise ValueError("at: is missing, an acceleration sensor sits on a named point")
+            raise InputError("is missing, an acceleration sensor sits on a named point", field="at")
         if self.kind == "force" and self.at is not None:
-            raise ValueError(f"at = {self.at!r}: allowed is none, a force sensor reads the stinger")
+            raise InputError(field="at", value=self.at, allowed="none, a force sensor reads the stinger")
         return self
 
 
@@ -91,26 +92,34 @@ class Converter(Part):
     @model_validator(mode="after")
     def _fits(self) -> "Converter":
         if self.substeps % self.oversampling:
-            raise ValueError(f"substeps = {self.substeps}: allowed is a multiple of oversampling = {self.oversampling}")
+            raise InputError(
+                field="substeps", value=self.substeps, allowed=f"a multiple of oversampling = {self.oversampling}"
+            )
         if self.anti_alias_hz >= 0.5 * self.sample_rate_hz:
             half_hz = 0.5 * self.sample_rate_hz
-            raise ValueError(f"anti_alias_hz = {self.anti_alias_hz:g}: allowed is below {half_hz:g}, half the rate")
+            raise InputError(
+                field="anti_alias_hz", value=self.anti_alias_hz, allowed=f"below {half_hz:g}, half the rate"
+            )
         if self.reconstruction_hz >= 0.5 * self.internal_rate_hz:
             half_hz = 0.5 * self.internal_rate_hz
-            raise ValueError(
-                f"reconstruction_hz = {self.reconstruction_hz:g}: allowed is below {half_hz:g}, half the internal rate"
+            raise InputError(
+                field="reconstruction_hz",
+                value=self.reconstruction_hz,
+                allowed=f"below {half_hz:g}, half the internal rate",
             )
         lowest_hz = LOWEST_CORNER * self.sample_rate_hz
         for name, corner_hz in (("anti_alias_hz", self.anti_alias_hz), ("reconstruction_hz", self.reconstruction_hz)):
             if 0.0 < corner_hz < lowest_hz:
-                raise ValueError(
-                    f"{name} = {corner_hz:g}: allowed is 0, or from {lowest_hz:g} on, {LOWEST_CORNER} of the rate"
+                raise InputError(
+                    field=name, value=corner_hz, allowed=f"0, or from {lowest_hz:g} on, {LOWEST_CORNER} of the rate"
                 )
         needed = max(2, math.ceil(LOWEST_INTERNAL_RATE_HZ / self.sample_rate_hz))
         if (self.anti_alias_hz or self.reconstruction_hz) and self.oversampling < needed:
-            raise ValueError(
-                f"oversampling = {self.oversampling}: allowed is at least {needed} with a filter, which has to run faster "
-                f"than the converter and at {LOWEST_INTERNAL_RATE_HZ:g} Hz or more"
+            raise InputError(
+                field="oversampling",
+                value=self.oversampling,
+                allowed=f"at least {needed} with a filter, which has to run faster than the converter and at "
+                f"{LOWEST_INTERNAL_RATE_HZ:g} Hz or more",
             )
         return self
 

@@ -14,6 +14,7 @@ from pydantic import Field, field_serializer, field_validator, model_validator
 from simulators.layout import N_NODE, N_PARAMETER
 from simulators.part import Part, Positive, Several
 from simulators.sites.functions import loaded, named, portable
+from vibrolock.errors import InputError
 
 VALID_SHARE_OF_GAP = 0.7
 LARGEST_FORCE_AT_REST_N = 1e-9
@@ -132,16 +133,16 @@ class _Table(LocalElement):
         z = np.array(self.deflection_m)
         if not (z[0] < 0.0 < z[-1] and 0.0 in self.deflection_m and np.all(np.diff(z) > 0.0)):
             shown = f"{z[0]:g} to {z[-1]:g}"
-            raise ValueError(
-                f"deflection_m = {shown}: allowed are rising numbers from below 0 to above 0, with 0 itself"
+            raise InputError(
+                field="deflection_m", value=shown, allowed="rising numbers from below 0 to above 0, with 0 itself"
             )
         return self
 
     def _check_length(self, name: str) -> None:
         values = getattr(self, name)
         if len(values) != len(self.deflection_m):
-            raise ValueError(
-                f"{name}: has {len(values)} values, allowed is {len(self.deflection_m)}, one per deflection_m"
+            raise InputError(
+                f"has {len(values)} values", field=name, allowed=f"{len(self.deflection_m)}, one per deflection_m"
             )
 
     @property
@@ -283,18 +284,21 @@ class User(LocalElement):
     @model_validator(mode="after")
     def _works(self) -> "User":
         if self.of == "velocity" and self.linear_n_m != 0.0:
-            raise ValueError(f"linear_n_m = {self.linear_n_m!r}: allowed is 0 where the element is of velocity")
+            raise InputError(field="linear_n_m", value=self.linear_n_m, allowed="0 where the element is of velocity")
         function = loaded(self.function)
         for z in (0.0, 1e-6, -1e-6):
             force_n = function(z, self.padded_parameters)
             if not abs(force_n) < float("inf"):
-                raise ValueError(
-                    f"function = {named(self.function)!r}: gives {force_n} at {z:g}, allowed is a finite force"
+                raise InputError(
+                    f"gives {force_n} at {z:g}", field="function", value=named(self.function), allowed="a finite force"
                 )
         at_rest_n = function(0.0, self.padded_parameters)
         if abs(at_rest_n) > LARGEST_FORCE_AT_REST_N:
-            raise ValueError(
-                f"function = {named(self.function)!r}: gives {at_rest_n:g} N at rest, allowed is 0: z counts from equilibrium"
+            raise InputError(
+                f"gives {at_rest_n:g} N at rest",
+                field="function",
+                value=named(self.function),
+                allowed="0: z counts from equilibrium",
             )
         return self
 

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import Quantity
+from vibrolock.errors import InputError
 from vibrolock.iwan import iwan_sliders
 
 
@@ -38,7 +39,9 @@ class JenkinsSite(_Site):
     @model_validator(mode="after")
     def _pairs(self) -> "JenkinsSite":
         if len(self.slip) != len(self.stiffness):
-            raise ValueError(f"slip: has {len(self.slip)} values, allowed is {len(self.stiffness)}, one per stiffness")
+            raise InputError(
+                f"has {len(self.slip)} values", field="slip", allowed=f"{len(self.stiffness)}, one per stiffness"
+            )
         return self
 
     @property

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vibrolock.errors import InputError
+
 _ARGUMENTS = (ctypes.c_double, ctypes.POINTER(ctypes.c_double))
 _PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, *_ARGUMENTS)
 _FUNCTION_POINTER: Any = _PROTOTYPE.__base__ or object  # base class of every C function object
@@ -55,10 +57,10 @@ def loaded(function: Any) -> Loaded:
     found = _imported(function) if isinstance(function, str) else function
     pointer: Any = getattr(found, "ctypes", found)  # of a numba cfunc
     if not isinstance(pointer, _FUNCTION_POINTER):
-        raise ValueError(f"{what}: is a {type(found).__name__}, {_ALLOWED}")
+        raise InputError(f"is a {type(found).__name__}, {_ALLOWED}", field=what)
     if pointer.restype is not ctypes.c_double or tuple(pointer.argtypes or ()) != _ARGUMENTS:
         shown = ", ".join(one.__name__ for one in pointer.argtypes or ())
-        raise ValueError(f"{what}: is {getattr(pointer.restype, '__name__', None)}({shown}), {_ALLOWED}")
+        raise InputError(f"is {getattr(pointer.restype, '__name__', None)}({shown}), {_ALLOWED}", field=what)
     address = int(ctypes.cast(pointer, ctypes.c_void_p).value or 0)
     _kept[address] = found
     return Loaded(address)
@@ -66,8 +68,7 @@ def loaded(function: Any) -> Loaded:
 
 def _imported(name: str) -> Any:
     module, colon, attribute = name.partition(":")
-    if not (colon and module and attribute):
-        raise ValueError(f"function = {name!r}: allowed is 'module:name'")
+    InputError.raise_if(not (colon and module and attribute), field="function", value=name, allowed="'module:name'")
     if (here := str(Path.cwd())) not in sys.path:
         sys.path.append(here)  # an installed command does not look there by itself
     known = module in sys.modules
@@ -76,7 +77,7 @@ def _imported(name: str) -> Any:
         function = getattr(imported, attribute)
     except (Exception, SystemExit) as error:  # the user's module may fail in any way, and may end itself
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise ValueError(f"function = {name!r}: {reason}; allowed is a function that can be imported") from None
+        raise InputError(reason, field="function", value=name, allowed="a function that can be imported") from None
     if not known:
         _LOG.info("function %s imported from %s", name, _shown(getattr(imported, "__file__", None)))
     return function

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from simulators.part import Part, Positive, Several
 from simulators.structures.beam import Lump, Quantity, Spring
 from vibrolock.arrays import Float
+from vibrolock.errors import InputError
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -82,19 +83,20 @@ class MeshedBeam(Part):
     def _fits(self) -> "MeshedBeam":
         for name, position_m in self.points_m.items():
             if not 0.0 <= position_m <= self.length_m:
-                raise ValueError(f"points_m.{name} = {position_m!r}: allowed is 0 to length_m = {self.length_m!r}")
+                raise InputError(
+                    field=f"points_m.{name}", value=position_m, allowed=f"0 to length_m = {self.length_m!r}"
+                )
         attached = {f"lumped_masses[{index}]": lumped.at for index, lumped in enumerate(self.lumped_masses)}
         attached |= {f"supports[{index}]": support.at for index, support in enumerate(self.supports)}
         for path, at in attached.items():
             if at not in self.points_m:
                 allowed = ", ".join(self.points_m) or "(no points are named)"
-                raise ValueError(f"{path}.at = {at!r}: allowed is one of {allowed}")
+                raise InputError(field=f"{path}.at", value=at, allowed=f"one of {allowed}")
         n_mode, most = len(self.damping_ratio), self._most_modes()
-        if n_mode > most:
-            raise ValueError(f"damping_ratio: has {n_mode} modes, allowed is 1 to {most}")
+        InputError.raise_if(n_mode > most, f"has {n_mode} modes", field="damping_ratio", allowed=f"1 to {most}")
         if self.frequency_hz is not None and len(self.frequency_hz) != n_mode:
-            raise ValueError(
-                f"frequency_hz: has {len(self.frequency_hz)} values, allowed is {n_mode}, one per damping_ratio"
+            raise InputError(
+                f"has {len(self.frequency_hz)} values", field="frequency_hz", allowed=f"{n_mode}, one per damping_ratio"
             )
         check_rising(self.frequency_hz or ())
         return self
@@ -139,4 +141,6 @@ def check_rising(frequencies_hz: Sequence[float]) -> None:
     """Raise `ValueError` if frequencies do not rise, because shapes and damping would then belong to other modes."""
     for index, (before_hz, next_hz) in enumerate(pairwise(frequencies_hz), start=1):
         if next_hz < before_hz:
-            raise ValueError(f"frequency_hz[{index}] = {next_hz:g}: allowed is from {before_hz:g} on, lowest first")
+            raise InputError(
+                field=f"frequency_hz[{index}]", value=next_hz, allowed=f"from {before_hz:g} on, lowest first"
+            )

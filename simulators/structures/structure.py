@@ -11,6 +11,7 @@ from simulators.structures.beam import BeamModes, Boundary, Quantity, beam_modes
 from simulators.structures.lap_joint import Interface, LapJointModes, LapMesh, Section, lap_joint_modes
 from simulators.structures.meshed import MeshedBeam, check_rising
 from vibrolock.arrays import Float
+from vibrolock.errors import InputError
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -81,15 +82,17 @@ class LapJointedBeam(MeshedBeam):
     @model_validator(mode="after")
     def _lap_fits(self) -> "LapJointedBeam":
         if not self.lap_length_m < self.length_m:
-            raise ValueError(f"lap_length_m = {self.lap_length_m!r}: allowed is less than length_m = {self.length_m!r}")
+            raise InputError(
+                field="lap_length_m", value=self.lap_length_m, allowed=f"less than length_m = {self.length_m!r}"
+            )
         first, last = (self.length_m - self.lap_length_m) / 2.0, (self.length_m + self.lap_length_m) / 2.0
         named = {f"sites_m.{name}": position_m for name, position_m in self.sites_m.items()}
         named |= {f"bolts_m[{index}]": position_m for index, position_m in enumerate(self.bolts_m)}
         for path, position_m in named.items():
             if not first <= position_m <= last:
-                raise ValueError(f"{path} = {position_m!r}: allowed is the lap, {first:.6g} to {last:.6g}")
+                raise InputError(field=path, value=position_m, allowed=f"the lap, {first:.6g} to {last:.6g}")
         if twice := sorted(set(self.sites_m) & set(self.points_m)):
-            raise ValueError(f"sites_m.{twice[0]}: is also in points_m, allowed is a name of its own")
+            raise InputError("is also in points_m", field=f"sites_m.{twice[0]}", allowed="a name of its own")
         return self
 
     @cached_property
@@ -120,7 +123,7 @@ class LapJointedBeam(MeshedBeam):
         if at in self.points_m:
             return self.modes.shape(self.points_m[at], quantity)
         if quantity != "deflection":
-            raise ValueError(f"quantity = {quantity!r}: allowed is 'deflection' at the friction site {at!r}")
+            raise InputError(field="quantity", value=quantity, allowed=f"'deflection' at the friction site {at!r}")
         return self.modes.slip(self.sites_m[at])
 
     def _most_modes(self) -> int:
@@ -145,7 +148,7 @@ class ModalStructure(Part):
         rows = {"damping_ratio": self.damping_ratio} | {f"shapes.{name}": row for name, row in self.shapes.items()}
         for name, row in rows.items():
             if len(row) != n_mode:
-                raise ValueError(f"{name}: has {len(row)} values, allowed is {n_mode}, one per frequency_hz")
+                raise InputError(f"has {len(row)} values", field=name, allowed=f"{n_mode}, one per frequency_hz")
         check_rising(self.frequency_hz)
         return self
 
@@ -162,7 +165,7 @@ class ModalStructure(Part):
     def shape(self, at: str, quantity: Quantity = "deflection") -> Float:
         """Return the shape [n_mode] given under a name; slopes and curvatures are given as separate shapes."""
         if quantity != "deflection":
-            raise ValueError(f"quantity = {quantity!r}: allowed is 'deflection' where the modes are given")
+            raise InputError(field="quantity", value=quantity, allowed="'deflection' where the modes are given")
         return np.array(self.shapes[at])
 
 

@@ -100,7 +100,7 @@ def read_rows(path: Path) -> list[Row]:
     except (OSError, ValueError) as error:
         raise ConfigurationError(f"{path}: cannot be read as rows of a matrix: {error}") from error
     if not isinstance(table, dict):
-        raise ConfigurationError(f"{path}: allowed is a table with the key `row`")
+        raise ConfigurationError(where=path, allowed="a table with the key `row`")
     return list(validated(_File, table, str(path)).row)
 
 

@@ -139,7 +139,7 @@ def _reference(
     for option in context.params:
         source = context.get_parameter_source(option)
         if option not in _OF_REFERENCES and source is not None and source.name != "DEFAULT":
-            raise ConfigurationError(f"`{option}`: is of the paper's campaign, not of {name}; leave it out")
+            raise ConfigurationError(f"is of the paper's campaign, not of {name}", field=option, hint="leave it out")
     if not models.isdecimal() or not int(models):
         raise ConfigurationError(f"`models` {models}: allowed is a number from 1")
     study = STUDIES[name]

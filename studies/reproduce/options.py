@@ -81,7 +81,7 @@ class Options:
                 if given:
                     raise ConfigurationError(f"`{name}` {getattr(self, name)}: is of PNLSS models; leave it out")
         if self.shifts and not self.scatter:
-            raise ConfigurationError("`shifts`: is for runs that differ; add `scatter`, or leave it out")
+            raise ConfigurationError("is for runs that differ", field="shifts", hint="add `scatter`, or leave it out")
         if self.input not in INPUTS:
             raise ConfigurationError(f"`input` {self.input}: allowed is {', '.join(INPUTS)}")
         for name in self.beside:

@@ -148,7 +148,7 @@ def test_scatter_comes_on_top_of_a_deviation() -> None:
     [
         ({"scatter": {"frequency": 0.5}}, "scatter.frequency"),
         ({"scatter": {"assembly": -1}}, "scatter.assembly"),
-        ({"deviation": {"frequency": [0.1]}}, "deviation.frequency: has 1 values, allowed is 4, one per mode, or none"),
+        ({"deviation": {"frequency": [0.1]}}, "deviation.frequency`?: has 1 values; allowed: 4, one per mode, or none"),
         ({"deviation": {"damping": [-1.0, 0, 0, 0]}}, "deviation.damping"),
     ],
 )

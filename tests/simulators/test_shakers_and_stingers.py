@@ -37,7 +37,7 @@ def test_a_shaker_replaces_that_of_a_specimen_and_single_keys_change_it():
 
 
 def test_an_unknown_shaker_is_refused_with_those_there_are():
-    with pytest.raises(ValidationError, match=r"shaker = 'v203': allowed is one of lds-v203, modal-shop-2100e11"):
+    with pytest.raises(ValidationError, match="`shaker` = 'v203'; allowed: lds-v203, modal-shop-2100e11"):
         Exciter(shaker="v203")
 
 
@@ -64,13 +64,13 @@ def test_the_geometry_that_the_paper_gives_is_the_stiffness_of_the_shipped_speci
 @pytest.mark.parametrize(
     ("keys", "fault"),
     [
-        ({"diameter_m": 1e-3, "length_m": 0.1}, "material: is missing"),
-        ({"material": "steel", "length_m": 0.1}, "diameter_m: is missing"),
+        ({"diameter_m": 1e-3, "length_m": 0.1}, "`?material`?: is missing"),
+        ({"material": "steel", "length_m": 0.1}, "`?diameter_m`?: is missing"),
         ({"material": "wood", "diameter_m": 1e-3, "length_m": 0.1}, "Input should be 'steel'"),
         ({"material": "steel", "diameter_m": -1e-3, "length_m": 0.1}, "greater than 0"),
         (
             {"material": "steel", "youngs_modulus_pa": 1e9, "diameter_m": 1e-3, "length_m": 0.1},
-            "allowed is this or material",
+            "allowed: this or material",
         ),
         ({}, "stiffness_n_m"),
     ],

@@ -7,7 +7,7 @@ import pytest
 
 from identification import IdentificationError
 from rig.errors import ConfigurationError
-from vibrolock.errors import InvalidValueError, StatedError, at_least
+from vibrolock.errors import InputError, StatedError, at_least, unit_of
 
 
 @pytest.mark.parametrize(
@@ -41,9 +41,7 @@ def test_parts_cross_to_another_process():
 
 
 def test_an_error_of_another_class_keeps_its_parts_and_gets_a_place():
-    error = ConfigurationError.of(
-        InvalidValueError(field="y", value=3, allowed="up to 2"), where="a.toml", within="x[0]"
-    )
+    error = ConfigurationError.of(InputError(field="y", value=3, allowed="up to 2"), where="a.toml", within="x[0]")
     assert str(error) == "a.toml: `x[0].y` = 3; allowed: up to 2"
     assert str(ConfigurationError.of(OSError("gone"), where="a.toml")) == "a.toml: gone"
 
@@ -64,5 +62,21 @@ def test_common_ranges_are_checked_in_a_line_and_nan_is_in_none():
         assert (raised.value.field, raised.value.allowed) == ("x", allowed)
 
 
+@pytest.mark.parametrize(
+    ("field", "unit"),
+    [
+        ("levels_v[3]", "V"),
+        ("limits.force_n", "N"),
+        ("rate_1_s", "1/s"),
+        ("stiffness_n_m", ""),
+        ("response_integral_per_s", ""),
+        ("modes", ""),
+    ],
+)
+def test_the_unit_of_a_field_follows_from_its_name(field, unit):
+    assert unit_of(field) == unit
+
+
 def test_another_name_may_stand_in_place_of_the_field():
-    assert StatedError("missing", field="band_hz").line("--band") == "--band: missing"
+    error = StatedError("missing", field="band_hz", further=[StatedError("too", field="modes")])
+    assert error.line(lambda one: {"band_hz": "--band"}.get(one.field, one.field)) == "--band: missing; modes: too"

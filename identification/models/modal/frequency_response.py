@@ -64,12 +64,10 @@ def mode_response(
     ExtrapolationError
         If the response needs more than ``largest_range_use`` times the largest modal amplitude identified.
     """
-    if force not in get_args(HeldForce):
-        raise IdentificationError(f"force: is '{force}', allowed are {', '.join(get_args(HeldForce))}")
-    if points < 20:
-        raise IdentificationError(f"points: is {points}, needs at least 20")
+    IdentificationError.unless_one_of("force", force, get_args(HeldForce))
+    IdentificationError.unless_at_least("points", points, 20)
     if not 0.0 < lowest_share < 1.0:
-        raise IdentificationError(f"lowest_share: is {lowest_share:g}, allowed is between 0 and 1")
+        raise IdentificationError(field="lowest_share", value=lowest_share, allowed="between 0 and 1")
     level = positive("force_n", force_n, "N")
     properties = ModalProperties.of(
         mode,
@@ -79,7 +77,7 @@ def mode_response(
     one = OneMode(properties, fundamental_of(mode, level, force))
     paths, notes = _branches(one, level)
     if not paths:
-        raise IdentificationError(f"force_n: is {level:g} N, too small for a response that can be told from rest")
+        raise IdentificationError("too small for a response that can be told from rest", field="force_n", value=level)
     if force == "rms":
         notes.append(
             "the force's harmonics per fundamental are those recorded at phase resonance, off resonance as well"
@@ -115,7 +113,9 @@ def fundamental_of(mode: NonlinearMode, level: float, force: str) -> Callable[[F
     q = np.where(np.isfinite(mode.modal_amplitude), mode.modal_amplitude, mode.amplitude_m * mode.apparent_mass_kg**0.5)
     known = np.isfinite(share) & np.isfinite(q)
     if not np.any(known) or mode.force_harmonics.shape[1] < 3:
-        raise IdentificationError("force: 'rms' needs a mode with recorded force harmonics; 'fundamental' does not")
+        raise IdentificationError(
+            "'rms' needs a mode with recorded force harmonics", field="force", hint="'fundamental' does not"
+        )
     order = np.argsort(q[known], kind="stable")
     q, share = q[known][order], share[known][order]
     return lambda at: np.asarray(np.sqrt(2.0) * level * np.interp(at, q, share))
@@ -129,8 +129,9 @@ def _branches(one: OneMode, level: float) -> tuple[list[Path], list[str]]:
     if opened is not None and (opened <= largest or not paths):
         advice = "measure higher levels" if np.isinf(one.properties.highest_q) else HIGHER_LEVELS
         raise ExtrapolationError(
-            f"force_n: {level:g} N drives the mode beyond {limit / largest:g} times the largest modal amplitude "
-            f"identified ({largest:g} kg^1/2 m); {advice}"
+            f"{level:g} N drives the mode beyond {limit / largest:g} times the largest modal amplitude "
+            f"identified ({largest:g} kg^1/2 m); {advice}",
+            field="force_n",
         )
     notes = []
     invented = [path.lowest for path in paths if path.lowest > largest] + ([] if opened is None else [opened])

@@ -91,8 +91,7 @@ class ModalProperties:
         IdentificationError
             If no level has amplitude, frequency and damping, or if w or z is not positive at a level.
         """
-        if damping not in _DAMPING_FIELD:
-            raise IdentificationError(f"damping: is '{damping}', allowed are {', '.join(_DAMPING_FIELD)}")
+        IdentificationError.unless_one_of("damping", damping, _DAMPING_FIELD)
         shape = 1.0 / np.sqrt(mode.apparent_mass_kg)
         q = np.where(np.isfinite(mode.modal_amplitude), mode.modal_amplitude, mode.amplitude_m / shape)
         z = getattr(mode, _DAMPING_FIELD[damping])
@@ -100,8 +99,10 @@ class ModalProperties:
         known = np.all(np.isfinite(table), axis=0)
         if not np.any(known):
             raise IdentificationError(
-                f"mode: no level has modal amplitude (or apparent mass), modal frequency and {_DAMPING_FIELD[damping]}; "
-                "identify it with mass-normalised shapes, and harmonics for the total power"
+                "no level has modal amplitude (or apparent mass), modal frequency and "
+                f"{_DAMPING_FIELD[damping]}; identify it with mass-normalised shapes, and harmonics for the "
+                "total power",
+                field="mode",
             )
         merged = _merged(table[:, known])
         return cls.from_levels(*merged, largest_range_use=largest_range_use)
@@ -122,13 +123,13 @@ class ModalProperties:
         z = finite_array("damping", damping, np.float64, 1)
         shape = finite_array("drive_shape", np.broadcast_to(drive_shape, q.shape), np.float64, 1)
         if not q.size or np.any(np.diff(q) <= 0.0):
-            raise IdentificationError("modal_amplitude: needs at least one level, each above the one before")
+            raise IdentificationError(field="modal_amplitude", allowed="at least one level, each above the one before")
         for name, values in (("modal_amplitude", q), ("omega_rad_s", omega), ("damping", z), ("drive_shape", shape)):
             if values.shape != q.shape:
-                raise IdentificationError(f"{name}: shape {values.shape} for {q.size} levels")
+                raise IdentificationError(f"shape {values.shape} for {q.size} levels", field=name)
             if np.any(values <= 0.0):
                 where = int(np.argmax(values <= 0.0))
-                raise IdentificationError(f"{name}: is {values[where]:g} at q = {q[where]:g}, must be above zero")
+                raise IdentificationError(f"is {values[where]:g} at q = {q[where]:g}", field=name, allowed="above zero")
         last = slice(min(int(np.searchsorted(q, _TAIL_FROM * q[-1])), max(q.size - _FEWEST_TAIL_LEVELS, 0)), None)
         squared = _slope(q[last] ** 2, omega[last] ** 2)
         tail = (

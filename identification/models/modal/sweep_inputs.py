@@ -71,7 +71,7 @@ class VoltageSweep:
         for name in ("start_hz", "stop_hz", "rate_hz_per_s", "level_v"):
             positive(name, getattr(self, name))
         if self.start_hz == self.stop_hz:
-            raise IdentificationError(f"stop_hz: is {self.stop_hz:g} Hz, must differ from start_hz")
+            raise IdentificationError("must differ from start_hz", field="stop_hz", value=self.stop_hz)
 
     @property
     def name(self) -> str:
@@ -115,8 +115,10 @@ def _instants(start_s: float, stop_s: float, highest_hz: float) -> Float:
     wanted = (stop_s - start_s) * highest_hz * _INSTANTS_PER_PERIOD
     if not 2.0 <= wanted <= _MOST_INSTANTS:
         raise IdentificationError(
-            f"sweep: {stop_s - start_s:g} s at up to {highest_hz:g} Hz make {wanted:.3g} instants, allowed are 2 to "
-            f"{_MOST_INSTANTS}; are there crossings of noise among the half periods?"
+            f"{stop_s - start_s:g} s at up to {highest_hz:g} Hz make {wanted:.3g} instants",
+            field="sweep",
+            allowed=f"2 to {_MOST_INSTANTS}",
+            hint="are there crossings of noise among the half periods?",
         )
     return np.linspace(start_s, stop_s, int(np.ceil(wanted)) + 1)
 
@@ -124,8 +126,7 @@ def _instants(start_s: float, stop_s: float, highest_hz: float) -> Float:
 def _even(source: Transient, amplitude: Complex, window_periods: int, origin: str) -> SweepInput:
     """Return a recorded sweep as it is if its instants are equidistant and dense enough, else interpolated by splines."""
     time_s, frequency = source.time_s, source.frequency_hz
-    if time_s.size < 4:
-        raise IdentificationError(f"sweep: has {time_s.size} instants, needs at least 4")
+    IdentificationError.raise_if(time_s.size < 4, f"has {time_s.size} instants", field="sweep", allowed="at least 4")
     steps = np.diff(time_s)
     enough = steps.max() * frequency.max() * _INSTANTS_PER_PERIOD < 1.25
     if enough and steps.max() - steps.min() <= _UNEVEN * steps.max():

@@ -171,8 +171,9 @@ def compare_sweep(prediction: SweepPrediction, sweep: Transient, *, name: str = 
     common = (sweep.time_s >= prediction.time_s[0]) & (sweep.time_s <= prediction.time_s[-1])
     if not common.any():
         raise IdentificationError(
-            f"sweep: lasts from {sweep.time_s[0]:g} to {sweep.time_s[-1]:g} s, the prediction from "
-            f"{prediction.time_s[0]:g} to {prediction.time_s[-1]:g} s"
+            f"lasts from {sweep.time_s[0]:g} to {sweep.time_s[-1]:g} s, the prediction from "
+            f"{prediction.time_s[0]:g} to {prediction.time_s[-1]:g} s",
+            field="sweep",
         )
     there, here = int(np.argmax(measured)), int(np.argmax(predicted))
     difference = np.interp(sweep.time_s[common], prediction.time_s, predicted) - measured[common]

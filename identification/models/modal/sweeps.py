@@ -104,11 +104,13 @@ def predict_sweep(
     assert isinstance(properties, ModalProperties)
     if exciter is None:
         if isinstance(sweep, VoltageSweep):
-            raise IdentificationError("sweep: is a voltage, which needs an exciter; give exciter")
+            raise IdentificationError("is a voltage", field="sweep", allowed="an exciter", hint="give exciter")
         given = force_input(sweep)
         return _integrate(properties, given, *_imposed(given), None, ())
     if isinstance(sweep, HalfPeriods):
-        raise IdentificationError("sweep: half periods of a force are imposed without an exciter; give exciter = None")
+        raise IdentificationError(
+            "half periods of a force are imposed without an exciter; give exciter = None", field="sweep"
+        )
     given = voltage_input(sweep, voltage)
     detuning = np.max(np.abs(2.0 * np.pi * given.frequency_hz - properties.omega_rad_s[0]))
     given = given.thinned(0.5 * _STEP_RAD / float(max(detuning, 1e-9)))

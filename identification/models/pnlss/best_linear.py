@@ -36,8 +36,9 @@ def periodic_ones(experiments: Sequence[Experiment]) -> tuple[list[Experiment], 
     claimed = [experiment for experiment in experiments if experiment.period_samples]
     if not claimed:
         raise IdentificationError(
-            "experiments: none is periodic, which the best linear approximation needs; add multisine periods "
-            "(period_samples), or give a linear model to begin from"
+            "none is periodic, which the best linear approximation needs; add multisine periods "
+            "(period_samples), or give a linear model to begin from",
+            field="experiments",
         )
     for index, experiment in enumerate(claimed):
         check_periodic(experiment, experiment.name or f"periodic one number {index + 1}")
@@ -121,8 +122,9 @@ def best_linear_responses(
     inputs, outputs = first.input_channels, first.output_channels
     if len(chosen) < len(inputs):
         raise IdentificationError(
-            f"experiments: {len(chosen)} periodic for {len(inputs)} inputs, needs one for each at least, with other phases "
-            "at every input"
+            f"{len(chosen)} periodic for {len(inputs)} inputs",
+            field="experiments",
+            allowed="one for each at least, with other phases at every input",
         )
     extra = len(chosen) % len(inputs)
     if extra:
@@ -177,17 +179,23 @@ def _excited(
     if band_hz is not None:
         lowest, highest = band_hz
         if not 0.0 <= lowest < highest:
-            raise IdentificationError(f"band_hz: is {lowest:g} to {highest:g}, needs two rising values from zero on")
+            raise IdentificationError(
+                f"is {lowest:g} to {highest:g}", field="band_hz", allowed="two rising values from zero on"
+            )
         inner &= (frequency_hz >= lowest * (1.0 - 1e-9)) & (frequency_hz <= highest * (1.0 + 1e-9))
     if not inner.any():
         raise IdentificationError(
-            f"band_hz: no line in {band_hz}, they are {frequency_hz[1]:g} Hz apart up to {frequency_hz[-1]:g} Hz"
+            f"no line in {band_hz}, they are {frequency_hz[1]:g} Hz apart up to {frequency_hz[-1]:g} Hz",
+            field="band_hz",
         )
     amplitude = np.sqrt(np.mean(np.abs(inputs.mean(axis=1)) ** 2, axis=0)) * inner
     largest = amplitude.max(axis=1)
     if np.any(largest == 0.0):
-        raise IdentificationError(f"inputs: input {int(np.argmin(largest)) + 1} is zero at all lines (dead channel)")
+        raise IdentificationError(
+            f"input {int(np.argmin(largest)) + 1} is zero at all lines (dead channel)", field="inputs"
+        )
     lines = np.all(amplitude >= _EXCITED * largest[:, None], axis=0)
-    if not lines.any():
-        raise IdentificationError("inputs: no line is excited at all of them; excite them at the same lines")
+    IdentificationError.raise_if(
+        not lines.any(), "no line is excited at all of them", field="inputs", hint="excite them at the same lines"
+    )
     return np.asarray(lines)

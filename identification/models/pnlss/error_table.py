@@ -136,12 +136,11 @@ class ErrorTable:
         only with the realisation left out. ``output`` is the output channel by name or number. Raises `IdentificationError`
         if it is unknown, or if there is no level.
         """
-        if not levels:
-            raise IdentificationError("levels: none given, needs one at least")
+        IdentificationError.raise_if(not levels, "none given", field="levels", allowed="one at least")
         names = [channel.name for channel in next(iter(levels.values()))[0].output_channels]
         index = names.index(output) if output in names else output
         if not isinstance(index, int) or not 0 <= index < len(names):
-            raise IdentificationError(f"output: is {output}, allowed are {', '.join(names)}")
+            raise IdentificationError(field="output", value=output, allowed=names)
         tests: list[ModelTest] = []
         for job in jobs:
             if job.name not in models:

@@ -50,7 +50,7 @@ def estimated_initial_state(model: PnlssModel, experiment: Experiment, *, sample
     """
     belongs(model, experiment, f"experiment{f' ({experiment.name})' if experiment.name else ''}")
     if not samples * len(model.outputs) >= model.states:
-        raise IdentificationError(f"samples: is {samples}, too few for {model.states} states")
+        raise IdentificationError(f"too few for {model.states} states", field="samples", value=samples)
     part = replace(experiment, period_samples=0)
     inputs, outputs = (
         np.where(rms > 0.0, rms, 1.0)

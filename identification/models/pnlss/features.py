@@ -92,31 +92,33 @@ class Features:
     limits: Float = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        if self.variables < 1:
-            raise IdentificationError(f"variables: is {self.variables}, needs at least 1")
+        IdentificationError.unless_at_least("variables", self.variables, 1)
         given = {"exponents": (self.exponents, self.variables), "weights": (self.weights, self.variables + 1)}
         for name, (values, width) in given.items():
             dtype = np.int64 if name == "exponents" else np.float64
             array = finite_array(name, np.reshape(values, (-1, width)) if np.size(values) == 0 else values, dtype, 2)
             if array.shape[1] != width:
-                raise IdentificationError(f"{name}: shape {array.shape}, needs {width} columns")
+                raise IdentificationError(f"shape {array.shape}", field=name, allowed=f"{width} columns")
             object.__setattr__(self, name, array)
         limits = np.full(self.variables, np.inf) if np.size(self.limits) == 0 else np.asarray(self.limits, dtype=float)
         if limits.shape != (self.variables,) or not np.all(limits > 0.0):
-            raise IdentificationError(f"limits: {limits}, needs {self.variables} values above zero")
+            raise IdentificationError(limits, field="limits", allowed=f"{self.variables} values above zero")
         object.__setattr__(self, "limits", read_only(limits, np.float64))
         functions = tuple(self.functions)
         object.__setattr__(self, "functions", () if set(functions) <= {"tanh"} else functions)
         unknown = [name for name in functions if name not in FUNCTIONS and not is_users(name)]
         if unknown or len(functions) not in (0, len(self.weights)):
             raise IdentificationError(
-                f"functions: are {', '.join(functions)} for {len(self.weights)} rows of weights, needs one of "
-                f"{', '.join(FUNCTIONS)} for each, or 'module:name' of your own"
+                f"are {', '.join(functions)} for {len(self.weights)} rows of weights",
+                field="functions",
+                allowed=f"one of {', '.join(FUNCTIONS)} for each, or 'module:name' of your own",
             )
         if np.any(self.exponents < 0) or np.any(self.exponents.sum(axis=1) < 2):
-            raise IdentificationError("exponents: have a negative power or a degree below 2, which is the linear part")
+            raise IdentificationError(
+                "have a negative power or a degree below 2, which is the linear part", field="exponents"
+            )
         if len({tuple(row) for row in self.exponents.tolist()}) < len(self.exponents):
-            raise IdentificationError("exponents: hold a monomial twice")
+            raise IdentificationError("hold a monomial twice", field="exponents")
 
     @classmethod
     def monomials(
@@ -130,11 +132,11 @@ class Features:
         chosen = list(range(states + inputs) if of is None else of)
         wrong = [j for j in chosen if not 0 <= j < states + inputs]
         if wrong:
-            raise IdentificationError(f"of: variable {wrong[0]}, allowed are 0 to {states + inputs - 1}")
+            raise IdentificationError(f"variable {wrong[0]}", field="of", allowed=f"0 to {states + inputs - 1}")
         rows = []
         for degree in sorted(set(degrees)):
             if degree < 2:
-                raise IdentificationError(f"degrees: {degree}, allowed are 2 and above; 1 is the linear part")
+                raise IdentificationError(degree, field="degrees", allowed="2 and above", hint="1 is the linear part")
             for picked in combinations_with_replacement(chosen, degree):
                 rows.append(np.bincount(np.array(picked), minlength=states + inputs))
         return cls(variables=states + inputs, exponents=np.array(rows, dtype=np.int64))
@@ -212,7 +214,7 @@ class Features:
         """
         size = np.asarray(scale, dtype=float)
         if size.shape != (self.variables,) or not np.all((size > 0.0) & np.isfinite(size)):
-            raise IdentificationError(f"scale: {size}, needs {self.variables} finite values above zero")
+            raise IdentificationError(size, field="scale", allowed=f"{self.variables} finite values above zero")
         weights = np.array(self.weights)
         weights[:, :-1] *= size
         factors = np.concatenate([np.prod(size**self.exponents, axis=1), np.ones(len(weights))])
@@ -231,7 +233,7 @@ class Features:
     def _points(self, v: ArrayLike) -> Float:
         array = finite_array("v", v, np.float64, 2)
         if array.shape[0] != self.variables:
-            raise IdentificationError(f"v: shape {array.shape}, needs {self.variables} rows")
+            raise IdentificationError(f"shape {array.shape}", field="v", allowed=f"{self.variables} rows")
         return np.ascontiguousarray(array.T)
 
 

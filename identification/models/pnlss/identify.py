@@ -97,7 +97,7 @@ def identify_pnlss(
     """
     chosen = FitSettings() if settings is None else settings
     if not isinstance(states, int | np.integer) or states < 1:
-        raise IdentificationError(f"states: is {states}, needs at least 1, whole")
+        raise IdentificationError(field="states", value=states, allowed="at least 1, whole")
     check_signals(experiments)
     inputs, outputs = experiments[0].input_channels, experiments[0].output_channels
     counts = _saturating(saturating, outputs)
@@ -110,7 +110,9 @@ def identify_pnlss(
         for own, which in zip(given, (powers, of_output), strict=True)
     )
     if any(own is not None and count for own, count in zip(given, counts, strict=True)):
-        raise IdentificationError("saturating: beside features of one's own; put saturating ones among those")
+        raise IdentificationError(
+            "beside features of one's own", field="saturating", hint="put saturating ones among those"
+        )
     check_enough(experiments, _parameters(states, len(inputs), len(outputs), phi, chi, counts))
     begin = linear_pnlss(experiments, states=states, linear=linear, band_hz=band_hz)
     if any(counts):
@@ -146,8 +148,7 @@ def _saturating(saturating: int | tuple[int, int], outputs: Sequence[Channel]) -
     else:
         at_once = any(c.role not in ("drive", "response") or c.motion == "acceleration" for c in outputs)
         counts = (saturating, saturating if at_once else 0)
-    if min(counts) < 0:
-        raise IdentificationError(f"saturating: is {saturating}, allowed is 0 and above")
+    IdentificationError.raise_if(min(counts) < 0, field="saturating", value=saturating, allowed="0 and above")
     return counts
 
 
@@ -191,5 +192,5 @@ def _chosen(variables: Variables, states: int, varying: Sequence[int]) -> list[i
     if variables == "states":
         return list(range(states))
     if isinstance(variables, str):
-        raise IdentificationError(f"variables: is '{variables}', allowed are all, states, or numbers of variables")
+        raise IdentificationError(field="variables", value=variables, allowed="all, states, or numbers of variables")
     return list(variables)

@@ -39,8 +39,7 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
     The eigenvalues of an unstable subspace model are reflected at the unit circle first. Raises `IdentificationError` if
     there are too few lines, or lines too close together, for this number of states, or if no candidate is found.
     """
-    if states < 1:
-        raise IdentificationError(f"states: is {states}, needs at least 1")
+    IdentificationError.unless_at_least("states", states, 1)
     best: StateSpaceFit | None = None
     refused = ""
     for rows in _block_rows(responses, states, sample_rate_hz):
@@ -55,7 +54,9 @@ def linear_start(responses: FrequencyResponseMatrix, states: int, *, sample_rate
         if best is None or found.cost[-1] < best.cost[-1]:
             best = found
     if best is None:
-        raise IdentificationError(f"states: {states} cannot be had of these responses ({refused}); ask for fewer")
+        raise IdentificationError(
+            f"{states} cannot be had of these responses ({refused})", field="states", hint="ask for fewer"
+        )
     return fit_state_space(responses, best.model, sample_rate_hz=sample_rate_hz, weighting="relative")
 
 
@@ -69,9 +70,11 @@ def _block_rows(responses: FrequencyResponseMatrix, states: int, sample_rate_hz:
     if most < fewest:
         low, high = responses.frequency_hz[[0, -1]]
         raise IdentificationError(
-            f"states: is {states}, but {lines} lines in {low:g} to {high:g} Hz at {sample_rate_hz:g} Hz with {outputs} "
-            f"outputs tell {max(most - 1, 0) * outputs} states at most; ask for fewer, excite a wider band or lower the "
-            "sample rate"
+            f"{lines} lines in {low:g} to {high:g} Hz at {sample_rate_hz:g} Hz with {outputs} outputs tell "
+            f"{max(most - 1, 0) * outputs} states at most; ask for fewer, excite a wider band or lower the "
+            "sample rate",
+            field="states",
+            value=states,
         )
     wanted = {fewest, states + 1, states + 2, 2 * states, 3 * states, 4 * states}
     return sorted({int(np.clip(rows, fewest, most)) for rows in wanted})
@@ -96,7 +99,7 @@ def with_independent_states(model: PnlssModel, experiments: Sequence[Experiment]
     states = np.hstack([model.simulate(e.inputs).states[:, e.counted_from :] for e in experiments])
     variance, directions = np.linalg.eigh(states @ states.T / states.shape[1])
     if not variance[-1] > 0.0:
-        raise IdentificationError("experiments: their inputs do not move the states of the linear model")
+        raise IdentificationError("their inputs do not move the states of the linear model", field="experiments")
     root = directions * np.sqrt(np.maximum(variance, _DEPENDENT * variance[-1]))  # x = root x'
     gramian = root.T @ _observability(model, experiments) @ root
     root = root @ np.linalg.eigh(0.5 * (gramian + gramian.T))[1][:, ::-1]
@@ -208,13 +211,15 @@ def _given(linear: StateSpace | PnlssModel, first: Experiment, states: int) -> P
     n, m, outputs = states, len(first.input_channels), len(first.output_channels)
     for name, part, shape in zip("abcd", matrices, ((n, n), (n, m), (outputs, n), (outputs, m)), strict=True):
         if np.shape(part) != shape:
-            raise IdentificationError(f"linear: {name} has shape {np.shape(part)}, needs {shape}")
+            raise IdentificationError(f"{name} has shape {np.shape(part)}", field="linear", allowed=f"{shape}")
     if isinstance(linear, PnlssModel) and abs(linear.sample_rate_hz / first.sample_rate_hz - 1.0) > 1e-9:
         raise IdentificationError(
-            f"linear: is of {linear.sample_rate_hz:g} Hz, the experiments of {first.sample_rate_hz:g} Hz"
+            f"is of {linear.sample_rate_hz:g} Hz, the experiments of {first.sample_rate_hz:g} Hz", field="linear"
         )
     if (radius := spectral_radius(matrices.a)) >= 1.0:
-        raise IdentificationError(f"linear: has an eigenvalue of magnitude {radius:.6g}, allowed is below 1 (stable)")
+        raise IdentificationError(
+            f"has an eigenvalue of magnitude {radius:.6g}", field="linear", allowed="below 1 (stable)"
+        )
     return PnlssModel.linear(
         matrices,
         sample_rate_hz=first.sample_rate_hz,

@@ -67,7 +67,7 @@ def linear_residual(model: PnlssModel, experiments: Sequence[Experiment], mobili
     try:
         spread = scipy.linalg.solve_discrete_are(model.a.T, model.c.T, moved, noise)
     except (np.linalg.LinAlgError, ValueError) as error:
-        raise IdentificationError(f"linear: its Kalman filter could not be computed ({error})") from None
+        raise IdentificationError(f"its Kalman filter could not be computed ({error})", field="linear") from None
     parts = [_smoothed(model, e, moved, noise, np.asarray(spread, dtype=float)) for e in experiments]
     return Residual(*(np.concatenate(rows, axis=-1) for rows in zip(*parts, strict=True)))
 

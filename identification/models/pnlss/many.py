@@ -99,36 +99,36 @@ def realisation_combinations(
         level or no model.
     """
     if most is not None and most < 1:
-        raise IdentificationError(f"most: is {most}, allowed are 1 and above, or None for all realisations")
+        raise IdentificationError(field="most", value=most, allowed="1 and above, or None for all realisations")
     if MIXED in levels or not levels:
         raise IdentificationError(
-            f"levels: {', '.join(levels) or 'none given'}; needs one at least, none called {MIXED}"
+            ", ".join(levels) or "none given", field="levels", allowed=f"one at least, none called {MIXED}"
         )
     for level, realisations in levels.items():
         if len(realisations) < _FEWEST:
             raise IdentificationError(
-                f"levels: {len(realisations)} realisations at {level}, needs {_FEWEST} at least: one to fit, one to choose the "
-                "iterate, one to test"
+                f"{len(realisations)} realisations at {level}",
+                field="levels",
+                allowed=f"{_FEWEST} at least: one to fit, one to choose the iterate, one to test",
             )
     sets = {level: {level: levels[level]} for level in levels} | ({MIXED: dict(levels)} if mixed else {})
     if not isinstance(models, int):
         unknown = [name for name in models if name not in sets]
         if unknown:
-            raise IdentificationError(f"models: there is no training set {unknown[0]}, known are {', '.join(sets)}")
+            raise IdentificationError(f"there is no training set {unknown[0]}", field="models", allowed=sets)
     jobs: list[ModelJob] = []
     for training_set, members in sets.items():
         count = models if isinstance(models, int) else models.get(training_set, 0)
         possible = max(len(r) * (len(r) - 1) for r in members.values())
         if not 0 <= count <= possible:
             raise IdentificationError(
-                f"models: {count} of {training_set}, allowed are 0 to {possible} different combinations"
+                f"{count} of {training_set}", field="models", allowed=f"0 to {possible} different combinations"
             )
         for k in range(count):
             job = _job(training_set, members, k, most)
             training, validation = (*job.training, *beside), (*job.validation, *beside_validation)
             jobs.append(replace(job, training=training, validation=validation))
-    if not jobs:
-        raise IdentificationError("models: are 0, needs one at least")
+    IdentificationError.raise_if(not jobs, "are 0", field="models", allowed="one at least")
     return tuple(jobs)
 
 
@@ -200,7 +200,7 @@ def identify_many(
     names = [job.name for job in given]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise IdentificationError(f"jobs: the name '{twice}' is there twice")
+        raise IdentificationError(f"the name '{twice}' is there twice", field="jobs")
     left = [job for job in given if job.name not in done]
     calls = (delayed(_outcome)(identify, job) for job in left)
     # A worker holds its present job and one more, and results are yielded at once: memory does not grow with the study.

@@ -110,11 +110,11 @@ class PnlssModel(Result):
         }
         for name, shape in expected.items():
             if getattr(self, name).shape != shape:
-                raise IdentificationError(f"{name}: shape {getattr(self, name).shape}, needs {shape}")
+                raise IdentificationError(f"shape {getattr(self, name).shape}", field=name, allowed=f"{shape}")
         for name, features in (("state_features", self.state_features), ("output_features", self.output_features)):
             if features.variables != n + m:
                 raise IdentificationError(
-                    f"{name}: are of {features.variables} variables, needs {n} states and {m} inputs"
+                    f"are of {features.variables} variables", field=name, allowed=f"{n} states and {m} inputs"
                 )
 
     @classmethod
@@ -205,7 +205,7 @@ class PnlssModel(Result):
         """
         limits = positive("factor", factor) * np.concatenate([self.state_range, self.input_range])
         if not np.all(np.isfinite(limits)):
-            raise IdentificationError("state_range: is unknown, so the states have no limits to be held at")
+            raise IdentificationError("is unknown, so the states have no limits to be held at", field="state_range")
         return replace(
             self,
             state_features=self.state_features.bounded(limits),
@@ -220,11 +220,11 @@ class PnlssModel(Result):
         """
         u = finite_array("inputs", inputs, np.float64, 2)
         if u.shape[0] != len(self.inputs):
-            raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
+            raise IdentificationError(f"shape {u.shape}", field="inputs", allowed=f"{len(self.inputs)} rows")
         begin = np.zeros(self.states) if initial_state is None else initial_state
         x0 = np.array(finite_array("initial_state", begin, np.float64, 1))
         if x0.size != self.states:
-            raise IdentificationError(f"initial_state: has {x0.size} values, needs {self.states}")
+            raise IdentificationError(f"has {x0.size} values", field="initial_state", allowed=self.states)
         x, y = np.empty((u.shape[1], self.states)), np.empty((u.shape[1], len(self.outputs)))
         m, tables = self.matrices, (self.state_features.table, self.output_features.table)
         count = simulate(m, *tables, np.ascontiguousarray(u.T), x0, self.bound, workspace(m), x, y)

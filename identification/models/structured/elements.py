@@ -65,8 +65,7 @@ class NonlinearElement:
             object.__setattr__(self, name, positive(f"element: {name}", getattr(self, name)))
         if self.largest is not None:
             object.__setattr__(self, "largest", float(self.largest))
-        if not self.laws:
-            raise IdentificationError("element: laws is empty, needs one at least")
+        IdentificationError.raise_if(not self.laws, "laws is empty", field="element", allowed="one at least")
 
     @property
     def phi(self) -> Float:

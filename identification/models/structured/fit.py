@@ -141,17 +141,18 @@ def fit_structured(
     first = experiments[0]
     if [channel.role for channel in first.input_channels] != ["force"]:
         names = ", ".join(f"{channel.name} ({channel.role})" for channel in first.input_channels)
-        raise IdentificationError(f"inputs: are {names}, needs one force alone")
+        raise IdentificationError(f"are {names}", field="inputs", allowed="one force alone")
     for number, experiment in enumerate(experiments):
         if experiment.initial_state != "zero":
             raise IdentificationError(
-                f"experiments[{number}].initial_state: is '{experiment.initial_state}', allowed is zero, a run from rest"
+                field=f"experiments[{number}].initial_state",
+                value=experiment.initial_state,
+                allowed="zero, a run from rest",
             )
     if steps is None:
         band = excited_band(experiments)
         steps = _LEAST if band is None else max(_LEAST, math.ceil(_PER_PERIOD * band[1] / first.sample_rate_hz))
-    if steps < 1:
-        raise IdentificationError(f"steps: is {steps}, allowed is 1 or above")
+    IdentificationError.unless_at_least("steps", steps, 1)
     wanted = tuple(elements) or (ElementPlan(tuple(laws)),)
     linear = linear_start(modes, first, steps)
     linear = replace(linear, training=tuple(e.name or f"experiment {i + 1}" for i, e in enumerate(experiments)))
@@ -159,7 +160,7 @@ def fit_structured(
     largest = _LARGEST_STATIC * max(float(np.sqrt(np.mean(one.inputs[0] ** 2))) for one in experiments)
     known = 0.0 if isinstance(support, bool) else float(support)
     if not 0.0 <= known < math.inf:
-        raise IdentificationError(f"support: is {known:g} N/m, allowed is 0 or above, True or False")
+        raise IdentificationError(f"is {known:g} N/m", field="support", allowed="0 or above, True or False")
     found, trials, evaluations, iterations = replace(linear, support_largest_n=largest, support_n_m=known), [], 0, 0
     kept: _Fitted | None = None
     for plan in wanted:

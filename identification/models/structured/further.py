@@ -50,11 +50,10 @@ class ElementPlan:
     def __post_init__(self) -> None:
         for name in ("laws", "between"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        if not self.laws:
-            raise IdentificationError("laws: is empty, needs one at least")
+        IdentificationError.raise_if(not self.laws, "is empty", field="laws", allowed="one at least")
         if len(self.between) > 2 or len(set(self.between)) < len(self.between):
             raise IdentificationError(
-                f"between: is {', '.join(self.between)}, allowed are one or two different outputs"
+                f"is {', '.join(self.between)}", field="between", allowed="one or two different outputs"
             )
 
 
@@ -69,8 +68,9 @@ def with_further_element(
     (`Law.tried`).
     """
     parts = [_Motion(model, one, measured_modes) for one in experiments if one.period_samples]
-    if not parts:
-        raise IdentificationError("experiments: none is periodic, needs one at least for the initial values")
+    IdentificationError.raise_if(
+        not parts, "none is periodic", field="experiments", allowed="one at least for the initial values"
+    )
     shapes = model.output_shapes[:, :measured_modes]
     directions = [model.place_of(plan.between) @ shapes] if plan.between else _directions(shapes)
     found = [

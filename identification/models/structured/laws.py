@@ -73,7 +73,7 @@ class Law:
             with np.errstate(all="ignore"):
                 allowed = np.all(np.isfinite(way.to(values)))
             if not allowed:
-                raise IdentificationError(f"{self.kind}: {name} is {values.tolist()}, allowed are {way.allowed}")
+                raise IdentificationError(f"{name} is {values.tolist()}", field=self.kind, allowed=way.allowed)
             if isinstance(getattr(self, name), (list, np.ndarray)):
                 object.__setattr__(self, name, tuple(values.tolist()))
 

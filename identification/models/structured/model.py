@@ -144,28 +144,32 @@ class StructuredModel(Result):
             ("direct", (outputs, inputs)),
         ):
             if getattr(self, name).shape != needed:
-                raise IdentificationError(f"{name}: shape {getattr(self, name).shape}, needs {needed}")
+                raise IdentificationError(f"shape {getattr(self, name).shape}", field=name, allowed=needed)
         for name in ("frequency_hz", "damping_ratio"):
             if not np.all(getattr(self, name) > 0.0):
                 raise IdentificationError(
-                    f"{name}: is {getattr(self, name).tolist()}, allowed are numbers above 0: the model must stay bounded"
+                    field=name,
+                    value=getattr(self, name).tolist(),
+                    allowed="numbers above 0: the model must stay bounded",
                 )
         highest = 0.5 * self.sample_rate_hz * self.steps
         if self.steps >= 1 and not np.all(self.frequency_hz < highest):
             raise IdentificationError(
-                f"frequency_hz: is {self.frequency_hz.tolist()}, allowed is below {highest:g}, half of the rate of the steps"
+                field="frequency_hz",
+                value=self.frequency_hz.tolist(),
+                allowed=f"below {highest:g}, half of the rate of the steps",
             )
         if not (modes and inputs and outputs):
-            raise IdentificationError("frequency_hz, inputs, outputs: a model needs one of each at least")
+            raise IdentificationError("a model needs one of each at least", field="frequency_hz, inputs, outputs")
         for number, element in enumerate(self.elements):
             if element.direction.shape != (modes,):
                 raise IdentificationError(
-                    f"elements[{number}].direction: shape {element.direction.shape}, needs {(modes,)}"
+                    f"shape {element.direction.shape}", field=f"elements[{number}].direction", allowed=f"{(modes,)}"
                 )
         if self.steps < 1 or self.support_n_m < 0.0:
             name = "steps" if self.steps < 1 else "support_n_m"
             least = 1 if self.steps < 1 else 0
-            raise IdentificationError(f"{name}: is {getattr(self, name)}, allowed is {least} or above")
+            raise IdentificationError(field=name, value=getattr(self, name), allowed=f"{least} or above")
 
     @property
     def omega(self) -> Float:
@@ -206,7 +210,7 @@ class StructuredModel(Result):
         """Return the motion from rest under ``inputs``, float[n_inputs, n]."""
         u = finite_array("inputs", inputs, np.float64, 2)
         if len(u) != len(self.inputs):
-            raise IdentificationError(f"inputs: shape {u.shape}, needs {len(self.inputs)} rows")
+            raise IdentificationError(f"shape {u.shape}", field="inputs", allowed=f"{len(self.inputs)} rows")
         return self.run([(self.system, 0, u.shape[1])], u, ends_of_steps(u, self.steps))
 
     def run(self, stretches: Sequence[tuple[System, int, int]], u: Float, ends: Float, counted_from: int = 0) -> Motion:

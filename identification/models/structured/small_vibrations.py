@@ -29,5 +29,7 @@ def small_vibrations(omega: Float, zeta: Float, elements: Sequence[NonlinearElem
     poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
     poles = poles[poles.imag > 0.0]
     if len(poles) < n or np.any(poles.real >= 0.0):
-        raise IdentificationError("elements: at rest a mode does not oscillate and fade; there are no small vibrations")
+        raise IdentificationError(
+            "at rest a mode does not oscillate and fade; there are no small vibrations", field="elements"
+        )
     return poles[np.argsort(np.abs(poles))], np.asarray(np.linalg.eigh(stiffness)[1])

@@ -85,8 +85,9 @@ def with_element(
     not found. Raises `IdentificationError` if no experiment is periodic.
     """
     periodic = [experiment for experiment in experiments if experiment.period_samples]
-    if not periodic:
-        raise IdentificationError("experiments: none is periodic, needs one at least for the initial values")
+    IdentificationError.raise_if(
+        not periodic, "none is periodic", field="experiments", allowed="one at least for the initial values"
+    )
     coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
     sizes = [np.sqrt(np.mean(np.abs(q) ** 2, axis=1)) for q, _, _ in coordinates]
     mode = int(np.argmax(np.max(sizes, axis=0)))

@@ -11,6 +11,7 @@ from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
+from vibrolock.errors import InputError
 
 
 class BackbonePlan(SettledPlan):
@@ -47,7 +48,7 @@ class BackbonePlan(SettledPlan):
     def _harmonics_possible(self) -> Self:
         loop = self.controller.harmonics
         if self.force_harmonics and loop is None:
-            raise ValueError("force_harmonics: need the table controller.harmonics, the loop that makes them")
+            raise InputError("need the table controller.harmonics, the loop that makes them", field="force_harmonics")
         for index, wanted in enumerate(self.force_harmonics):
             check_wanted(f"force_harmonics[{index}]", wanted, MOST_HARMONICS if loop is None else loop.highest)
         return self

@@ -168,8 +168,7 @@ def backbone_of(
 ) -> Backbone:
     """Return the accepted points of a recording as a backbone; raise `IdentificationError` if no point was accepted."""
     accepted = [point for point in without_repetition(points) if point.accepted]
-    if not accepted:
-        raise IdentificationError("points: none of the recording was accepted")
+    IdentificationError.raise_if(not accepted, "none of the recording was accepted", field="points")
     kinds = channels_from(channels)
     vibrations = tuple(vibration_from(point, kinds, phase_lag_target_deg) for point in accepted)
     return shape.backbone(vibrations, [point.direction for point in accepted], [point.repeat for point in accepted])

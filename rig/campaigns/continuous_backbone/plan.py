@@ -12,6 +12,7 @@ from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
+from vibrolock.errors import InputError
 
 
 class ContinuousBackbonePlan(LockedPlan):
@@ -55,7 +56,7 @@ class ContinuousBackbonePlan(LockedPlan):
     @model_validator(mode="after")
     def _in_metres(self) -> Self:
         if self.levels_m is None:
-            raise ValueError(f"{self.levels_key}: a continuous backbone goes by the response, allowed is levels_m")
+            raise InputError("a continuous backbone goes by the response", field=self.levels_key, allowed="levels_m")
         return self
 
     def targets(self) -> tuple[Target, ...]:
@@ -98,6 +99,8 @@ class ContinuousBackbonePlan(LockedPlan):
         allowed = bench.limits.displacement_m / max(self.ratios_to_drive(bench).values())
         if self.amplitude_law is AmplitudeLaw.RESPONSE and highest > allowed:
             raise ConfigurationError(
-                f"margin = {self.margin:g}: beyond the highest level it leads to {highest:g} m; the bench {bench.name} "
-                f"allows up to {allowed:.3g} m, where a channel reaches its {bench.limits.displacement_m:g} m"
+                f"beyond the highest level it leads to {highest:g} m; the bench {bench.name} allows up to "
+                f"{allowed:.3g} m, where a channel reaches its {bench.limits.displacement_m:g} m",
+                field="margin",
+                value=self.margin,
             )

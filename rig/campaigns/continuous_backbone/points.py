@@ -243,8 +243,7 @@ def continuous_backbones_of(
     for point in points:
         if point.accepted:
             repeats.setdefault(point.repeat, []).append(point)
-    if not repeats:
-        raise IdentificationError("points: none of the recording was accepted")
+    IdentificationError.raise_if(not repeats, "none of the recording was accepted", field="points")
     return tuple(_from_points(accepted, kinds, shape) for accepted in repeats.values())
 
 

@@ -11,6 +11,7 @@ from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
+from vibrolock.errors import InputError
 
 
 class DecayPlan(SettledPlan):
@@ -35,8 +36,8 @@ class DecayPlan(SettledPlan):
     @model_validator(mode="after")
     def _no_harmonics_loop(self) -> Self:
         if self.controller.harmonics is not None:
-            raise ValueError(
-                "controller.harmonics: not allowed with kind = 'decay', whose output is 0 V when it counts"
+            raise InputError(
+                "not allowed with kind = 'decay', whose output is 0 V when it counts", field="controller.harmonics"
             )
         return self
 

@@ -13,6 +13,7 @@ from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
+from vibrolock.errors import InputError
 
 FEWEST_PERIODS = 10
 """Fewest periods of a mean from which frequency and damping can be identified."""
@@ -71,17 +72,19 @@ class DwellPlan(SettledPlan):
     @model_validator(mode="after")
     def _one_length(self) -> Self:
         if (self.cycles is None) == (self.duration_s is None):
-            raise ValueError("cycles, duration_s: exactly one of the two is to be given")
+            raise InputError("exactly one of the two is to be given", field="cycles, duration_s")
         if len(self.levels) != 1:
-            raise ValueError(f"{self.levels_key}: {len(self.levels)} levels, allowed is exactly 1")
+            raise InputError(f"{len(self.levels)} levels", field=self.levels_key, allowed="exactly 1")
         lowest_hz = self.controller.frequency_window_hz[0]
         if self.mean_s * lowest_hz < FEWEST_PERIODS:
-            raise ValueError(
-                f"mean_s = {self.mean_s:g}: allowed is from {FEWEST_PERIODS / lowest_hz:.3g} s, "
-                f"{FEWEST_PERIODS} periods at the lowest frequency of the window"
+            raise InputError(
+                field="mean_s",
+                value=self.mean_s,
+                allowed=f"from {FEWEST_PERIODS / lowest_hz:.3g} s, {FEWEST_PERIODS} periods at the lowest frequency of "
+                "the window",
             )
         if self.duration_s is not None and self.duration_s < self.mean_s:
-            raise ValueError(f"duration_s = {self.duration_s:g}: allowed is from mean_s = {self.mean_s:g} s")
+            raise InputError(field="duration_s", value=self.duration_s, allowed=f"from mean_s = {self.mean_s:g} s")
         return self
 
     @property
@@ -137,6 +140,8 @@ class DwellPlan(SettledPlan):
         for name, limits in (("alarm", self.alarm), ("abort", self.abort)):
             if limits.damping is not None and drive_shape(bench, self.plant).value is None:
                 raise ConfigurationError(
-                    f"{name}.damping = {limits.damping:g}: the damping is unknown, for the bench {bench.name} has no "
-                    "specimen.drive_mode_shape and the plan no [plant]"
+                    f"the damping is unknown, for the bench {bench.name} has no specimen.drive_mode_shape and the "
+                    "plan no [plant]",
+                    field=f"{name}.damping",
+                    value=limits.damping,
                 )

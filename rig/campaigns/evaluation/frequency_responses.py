@@ -63,8 +63,7 @@ def passes_of(points: Iterable[Point[object]]) -> list[tuple[str, list[Point[obj
     for point in without_repetition(points):
         if point.accepted:
             passes.setdefault((point.level, point.direction, point.repeat, point.level_unit), []).append(point)
-    if not passes:
-        raise IdentificationError("points: none of the recording was accepted")
+    IdentificationError.raise_if(not passes, "none of the recording was accepted", field="points")
     return [
         (_label(level, unit, direction, repeat, [one for one in passes if one[0] == level]), accepted)
         for (level, direction, repeat, unit), accepted in passes.items()

@@ -59,8 +59,7 @@ def points_of(recording: Recording, result: type[object] | None = None) -> list[
 def accepted_points(recording: Recording, result: type[Result]) -> list[Point[Result]]:
     """Return the accepted points among those of `points_of`; raise `IdentificationError` if there are none."""
     accepted = [point for point in points_of(recording, result) if point.accepted]
-    if not accepted:
-        raise IdentificationError("points: none of the recording was accepted")
+    IdentificationError.raise_if(not accepted, "none of the recording was accepted", field="points")
     return accepted
 
 

@@ -11,6 +11,7 @@ from rig.campaigns.planning.plan import OpenLoopPlan, Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
+from vibrolock.errors import InputError
 
 LARGEST_WAVEFORMS = 100_000_000  # samples of all realisations, which are held in memory
 
@@ -60,7 +61,9 @@ class MultisinePlan(OpenLoopPlan):
         before: set[float] = set()
         for index, level in enumerate(self.levels_rms_v):
             if level in before:
-                raise ValueError(f"levels_rms_v[{index}] = {level:g}: allowed is each level once; see realisations")
+                raise InputError(
+                    field=f"levels_rms_v[{index}]", value=level, allowed="each level once", hint="see realisations"
+                )
             before.add(level)
         return self
 
@@ -82,7 +85,7 @@ class MultisinePlan(OpenLoopPlan):
                 grid_seed=self.phase_seed,
             )
         except IdentificationError as error:
-            raise ConfigurationError(str(error)) from None
+            raise ConfigurationError.of(error) from None
 
     @property
     def level_unit(self) -> str:
@@ -135,18 +138,23 @@ class MultisinePlan(OpenLoopPlan):
         most = LARGEST_WAVEFORMS // design.period_samples
         if most < 1:
             raise ConfigurationError(
-                f"resolution_hz = {self.resolution_hz:g} Hz: a period has {design.period_samples} samples at "
-                f"{bench.sample_rate_hz:g} samples/s; allowed are {LARGEST_WAVEFORMS}"
+                f"a period has {design.period_samples} samples at {bench.sample_rate_hz:g} samples/s",
+                field="resolution_hz",
+                value=self.resolution_hz,
+                allowed=LARGEST_WAVEFORMS,
             )
         if self.realisations > most:
             raise ConfigurationError(
-                f"realisations = {self.realisations}: allowed is up to {most} of {design.period_samples} samples, "
-                f"that of resolution_hz = {self.resolution_hz:g} Hz"
+                field="realisations",
+                value=self.realisations,
+                allowed=f"up to {most} of {design.period_samples} samples, that of resolution_hz = {self.resolution_hz:g} Hz",
             )
         crest = max(design.crest_factor(self.phase_seed, index) for index in range(self.realisations))
         for index, level in enumerate(self.levels_rms_v):
             if not 0.0 < level * crest <= bench.limits.voltage_v:
                 raise ConfigurationError(
-                    f"levels_rms_v[{index}] = {level:g} V: peaks reach {level * crest:.3g} V, the bench {bench.name} allows "
-                    f"above 0 and up to {bench.limits.voltage_v:g} V"
+                    f"peaks reach {level * crest:.3g} V, bench {bench.name}",
+                    field=f"levels_rms_v[{index}]",
+                    value=level,
+                    allowed=f"peaks above 0 and up to {bench.limits.voltage_v:g} V",
                 )

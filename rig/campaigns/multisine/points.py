@@ -132,14 +132,13 @@ def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarr
     design = plan.design(bench.sample_rate_hz)
     size = design.period_samples
     if rows.size < plan.periods * size:
-        raise IdentificationError(f"record: has {rows.size} samples, needs {plan.periods * size}")
+        raise IdentificationError(f"has {rows.size} samples", field="record", allowed=f"{plan.periods * size}")
     rows = rows[: plan.periods * size]
     begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
     signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
     periods = signals.reshape(signals.shape[0], plan.periods, size)
     whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
-    if not whole.any():
-        raise IdentificationError("record: samples were lost on their way in every period")
+    IdentificationError.raise_if(not whole.any(), "samples were lost on their way in every period", field="record")
     return np.asarray(np.roll(periods[:, whole], begun, axis=2))
 
 

@@ -41,15 +41,17 @@ def check_length(plan: Plan, bench: Bench) -> None:
             SegmentKind.RELEASE,
         ):
             raise ConfigurationError(
-                f"{_keys(plan, segment.kind)}: up to {rows:.3g} samples of one record at {bench.sample_rate_hz:g} samples/s, "
-                f"allowed are up to {MOST_ROWS:g}"
+                f"up to {rows:.3g} samples of one record at {bench.sample_rate_hz:g} samples/s",
+                field=_keys(plan, segment.kind),
+                allowed=f"up to {MOST_ROWS:g}",
             )
     days = sum(took.values()) / _DAY_S
     if days > LONGEST_DAYS:
         longest = max(took, key=lambda kind: took[kind])
         raise ConfigurationError(
-            f"{_keys(plan, longest)}: the plan may take {days:.3g} days, {took[longest] / _DAY_S:.3g} of them by this; allowed "
-            f"are up to {LONGEST_DAYS:g} days, with every point as long as it may take"
+            f"the plan may take {days:.3g} days, {took[longest] / _DAY_S:.3g} of them by this",
+            field=_keys(plan, longest),
+            allowed=f"up to {LONGEST_DAYS:g} days, with every point as long as it may take",
         )
 
 

@@ -13,6 +13,7 @@ from rig.bench.configuration import Configured
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
+from vibrolock.errors import InputError
 
 START_RAMP_PERIODS = 10.0
 """Slow enough that an exciter of another gain than the known plant's is noticed at a small force."""
@@ -61,14 +62,13 @@ class Levels(Configured):
     def _levels_make_sense(self) -> Self:
         given = list(self._given)
         if len(given) != 1:
-            raise ValueError(f"{', '.join(LEVELS)}: exactly one of them is to be given")
+            raise InputError("exactly one of them is to be given", field=", ".join(LEVELS))
         if not self.levels:
-            raise ValueError(f"{given[0]} = []: at least one level is needed")
+            raise InputError("at least one level is needed", field=given[0], value=[])
         for index, level in enumerate(self.levels):
-            if not level > 0.0:
-                raise ValueError(f"{given[0]}[{index}] = {level:g}: allowed is above 0")
+            InputError.unless_above(f"{given[0]}[{index}]", level, 0)
         if len(set(self.levels)) != len(self.levels):
-            raise ValueError(f"{given[0]}: a level is given twice; use repeats to measure levels again")
+            raise InputError("a level is given twice", field=given[0], hint="use repeats to measure levels again")
         return self
 
     @property
@@ -143,18 +143,22 @@ class Levels(Configured):
         for index, level in enumerate(self.levels):
             if level > largest[self.level_unit]:
                 raise ConfigurationError(
-                    f"{self.levels_key}[{index}] = {level:g} {self.level_unit}: the bench {bench.name} allows up to "
-                    f"{largest[self.level_unit]:g} {self.level_unit}"
+                    f"the bench {bench.name} allows up to {largest[self.level_unit]:g} {self.level_unit}",
+                    field=f"{self.levels_key}[{index}]",
+                    value=level,
+                    unit=self.level_unit,
                 )
         if band_hz is None or band_hz[0] <= bench.specimen.linear_frequency_hz <= band_hz[1]:
             self._check_channels(bench)
         if self.start_v is not None and self.start_v > limits.voltage_v:
             raise ConfigurationError(
-                f"start_v = {self.start_v:g} V: the bench {bench.name} allows up to {limits.voltage_v:g} V"
+                f"the bench {bench.name} allows up to {limits.voltage_v:g} V", field="start_v", value=self.start_v
             )
         linear = self.amplitude_law is not AmplitudeLaw.RESPONSE and self.force_loop == "linear"
         if self.start_v is None and not linear and self.amplitude_law is not AmplitudeLaw.VOLTAGE:
-            raise ConfigurationError(f"start_v: levels by {self.levels_key} of this loop need a voltage to begin with")
+            raise ConfigurationError(
+                f"levels by {self.levels_key} of this loop need a voltage to begin with", field="start_v"
+            )
 
     def _check_channels(self, bench: Bench) -> None:
         """Refuse levels in metres at which a channel exceeds its limits when the linear mode is passed."""
@@ -172,7 +176,9 @@ class Levels(Configured):
             ):
                 if value > allowed:
                     raise ConfigurationError(
-                        f"{self.levels_key}[{index}] = {level:g} m: means {value:.3g} {unit} at channel {name!r}, which moves "
-                        f"{ratios[name]:.3g} times as far as the drive point; "
-                        f"the bench {bench.name} allows limits.{key} = {allowed:g}"
+                        f"means {value:.3g} {unit} at channel {name!r}, which moves {ratios[name]:.3g} times as far as "
+                        f"the drive point; the bench {bench.name} allows limits.{key} = {allowed:g}",
+                        field=f"{self.levels_key}[{index}]",
+                        value=level,
+                        unit="m",
                     )

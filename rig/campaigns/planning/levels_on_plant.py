@@ -20,9 +20,11 @@ def check_voltage(levels: Levels, plant: PlantModel, lags_deg: Sequence[float], 
         volts = level * of_unit
         if volts > limit:
             raise ConfigurationError(
-                f"{levels.levels_key}[{index}] = {level:g} {levels.level_unit}: needs {volts:.3g} V{lags_text([lag])} on "
-                f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping), "
-                f"the bench {bench.name} allows {limit:g} V"
+                f"needs {volts:.3g} V{lags_text([lag])} on the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % "
+                f"damping), the bench {bench.name} allows {limit:g} V",
+                field=f"{levels.levels_key}[{index}]",
+                value=level,
+                unit=levels.level_unit,
             )
 
 
@@ -56,9 +58,12 @@ def check_motion(
             known = ratio * motion_for(plant, level, unit, lag)[name]
             more = f", and still {least:.3g} {its_unit} with {times:g} times the damping" if times > 1.0 else " or more"
             raise ConfigurationError(
-                f"{levels.levels_key}[{index}] = {level:g} {unit}: means {known:.3g} {its_unit}{at}{lags_text([lag])} on "
-                f"the known plant ([plant], {100.0 * plant.damping_ratio:.3g} % damping){more}; "
-                f"the bench {bench.name} allows limits.{name} = {limit:g}"
+                f"means {known:.3g} {its_unit}{at}{lags_text([lag])} on the known plant ([plant], "
+                f"{100.0 * plant.damping_ratio:.3g} % damping){more}; the bench {bench.name} allows "
+                f"limits.{name} = {limit:g}",
+                field=f"{levels.levels_key}[{index}]",
+                value=level,
+                unit=unit,
             )
 
 

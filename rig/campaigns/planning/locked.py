@@ -71,7 +71,7 @@ class LockedPlan(KnownPlant, Plan):
         try:
             self.controller.check_delay(delay_s, self.amplitude_law)
         except ValueError as error:
-            raise ConfigurationError(f"controller.{error}; or shorter blocks or queue") from None
+            raise ConfigurationError.of(error, within="controller", further=["or shorter blocks or queue"]) from None
 
     def _check_loop(self, bench: Bench) -> None:
         """Refuse a window without the tested mode or beyond the bench's limits, and harmonics beyond the sample rate."""
@@ -79,13 +79,16 @@ class LockedPlan(KnownPlant, Plan):
         linear = bench.specimen.linear_frequency_hz
         if not window[0] < linear < window[1]:
             raise ConfigurationError(
-                f"controller.frequency_window_hz = {list(window)}: allowed is a window around the tested mode's "
-                f"specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}"
+                field="controller.frequency_window_hz",
+                value=list(window),
+                allowed=f"around specimen.linear_frequency_hz = {linear:g} of the bench {bench.name}, the tested mode",
             )
         self.check_evaluated(self.harmonics, bench, window[1], spare=2)
         if window[0] < allowed[0] or window[1] > allowed[1]:
             raise ConfigurationError(
-                f"controller.frequency_window_hz = {list(window)}: the bench {bench.name} allows {list(allowed)} Hz"
+                f"the bench {bench.name} allows {list(allowed)} Hz",
+                field="controller.frequency_window_hz",
+                value=list(window),
             )
 
     def _check_slow_flow(self, bench: Bench) -> None:

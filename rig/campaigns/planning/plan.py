@@ -14,6 +14,7 @@ from rig.campaigns.planning.levels import Levels
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz
 from vibrolock.arrays import Float
+from vibrolock.errors import InputError
 
 MOST_POINTS = 10_000
 """Most points of a plan, including repeats and both directions: at ten seconds a point, more than a day. See also
@@ -79,7 +80,7 @@ class Plan(Configured):
         if points > MOST_POINTS:
             factors = " times ".join(f"{count} ({key})" for key, count in self.counts.items() if count > 1)
             largest = max(self.counts, key=lambda key: self.counts[key])
-            raise ValueError(f"{largest}: {factors} are {points} points, allowed are up to {MOST_POINTS}")
+            raise InputError(f"{factors} are {points} points", field=largest, allowed=f"up to {MOST_POINTS}")
         return self
 
     @property
@@ -163,7 +164,9 @@ class Plan(Configured):
             )
         if harmonics > most:
             raise ConfigurationError(
-                f"harmonics = {harmonics}: allowed is up to {most} of {highest_hz:g} Hz at {rate_hz:g} samples/s"
+                field="harmonics",
+                value=harmonics,
+                allowed=f"up to {most} of {highest_hz:g} Hz at {rate_hz:g} samples/s",
             )
 
     @property
@@ -196,7 +199,7 @@ class Plan(Configured):
         try:
             loop.check_frequency(rate_hz, highest_frequency_hz(self.law, self.segments(rate_hz)), loop_delay_samples)
         except ValueError as error:
-            raise ConfigurationError(f"controller.{error}") from None
+            raise ConfigurationError.of(error, within="controller") from None
 
 
 class OpenLoopPlan(Plan):
@@ -222,13 +225,16 @@ class OpenLoopPlan(Plan):
         for name, frequency_hz in frequencies_hz.items():
             if not lowest <= frequency_hz <= highest:
                 raise ConfigurationError(
-                    f"{name} = {frequency_hz:g} Hz: the bench {bench.name} allows {lowest:g} to {highest:g} Hz"
+                    f"the bench {bench.name} allows {lowest:g} to {highest:g} Hz",
+                    field=name,
+                    value=frequency_hz,
+                    unit="Hz",
                 )
 
     def check_no_harmonics(self, why: str) -> None:
         """Refuse the harmonics loop, because ``why``."""
         if self.controller.harmonics is not None:
-            raise ConfigurationError(f"controller.harmonics: not allowed with kind = {self.kind!r}, {why}")
+            raise ConfigurationError(f"not allowed with kind = {self.kind!r}, {why}", field="controller.harmonics")
 
 
 class TonePlan(Levels, OpenLoopPlan):

@@ -22,6 +22,7 @@ from rig.bench.configuration import Configured
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.levels_on_plant import MORE_DAMPING, check_motion, check_voltage, lags_text
 from rig.errors import ConfigurationError
+from vibrolock.errors import InputError
 
 DELAY_RESERVE = 1.5  # of the delay at which the gains must still be stable
 DELAY_STEP = 1.25  # between delays that are tried
@@ -80,7 +81,7 @@ class PlantFacts(Configured):
             for name in getattr(self, key):
                 if name not in self.response_ratios:
                     known = ", ".join(self.response_ratios) or "it has none"
-                    raise ValueError(f"{key}.{name}: allowed is a channel of response_ratios: {known}")
+                    raise InputError(field=f"{key}.{name}", allowed=f"a channel of response_ratios: {known}")
         return self
 
     @property
@@ -119,8 +120,8 @@ class KnownPlant(Levels):
         for name in measured:
             if name not in names:
                 raise ConfigurationError(
-                    f"plant.response_ratios.{name}: allowed is a response channel of the bench {bench.name}: "
-                    f"{', '.join(names) or 'it has none'}"
+                    field=f"plant.response_ratios.{name}",
+                    allowed=f"a response channel of the bench {bench.name}: {', '.join(names) or 'it has none'}",
                 )
         return bench.response_ratios | measured
 
@@ -138,7 +139,7 @@ class KnownPlant(Levels):
             check_voltage(self, plant, lags_deg, bench)
             check_motion(self, plant, lags_deg, bench, self.ratios_to_drive(bench))
         except ValueError as error:
-            raise ConfigurationError(f"plant: {error}") from None
+            raise ConfigurationError.of(error, within="plant") from None
 
     def check_delay_on_plant(
         self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float], delay_s: float
@@ -149,9 +150,11 @@ class KnownPlant(Levels):
             return
         given = ", ".join(f"{name} = {getattr(law, name):g}" for name in law.gain_names(self.amplitude_law))
         raise ConfigurationError(
-            f"controller: {given}: unstable on the known plant ([plant]) with {DELAY_RESERVE:g} times {1e3 * delay_s:.3g} ms "
-            f"from output to input; allowed is up to {1e3 * longest_s:.3g} ms: shorter blocks or queue, smaller gains, or "
-            "those that `rig tune` finds with this delay"
+            f"{given}: unstable on the known plant ([plant]) with {DELAY_RESERVE:g} times "
+            f"{1000.0 * delay_s:.3g} ms from output to input",
+            field="controller",
+            allowed=f"up to {1000.0 * longest_s:.3g} ms: shorter blocks or queue, smaller gains, or those that `rig "
+            "tune` finds with this delay",
         )
 
     def longest_delay_on_plant_s(
@@ -214,10 +217,11 @@ def _check_quickness(loops: Sequence[ControlLoop]) -> None:
     if gain > LARGEST_AT_HALF:
         hertz = loop.omega_rad_s / 2.0 / math.pi
         raise ConfigurationError(
-            f"controller: the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz){lags_text([loop.lag_deg])}: "
-            f"its gain at {0.5 * hertz:.4g} Hz, half the locked frequency, is {gain:.3g}, allowed is {LARGEST_AT_HALF:g}: "
-            f"demodulated signals cannot follow changes within two periods; its gains are about "
-            f"{gain / LARGEST_AT_HALF:.2g} times too large"
+            f"the {name} is too quick on the known plant ([plant], {hertz:.2f} Hz)"
+            f"{lags_text([loop.lag_deg])}: its gain at {0.5 * hertz:.4g} Hz, half the locked frequency, is {gain:.3g}",
+            field="controller",
+            allowed=f"{LARGEST_AT_HALF:g}: demodulated signals cannot follow changes within two periods",
+            hint=f"its gains are about {gain / LARGEST_AT_HALF:.2g} times too large",
         )
 
 
@@ -230,12 +234,13 @@ def _check_stability(loops: Sequence[ControlLoop]) -> None:
     enough = next((part for part in MORE_DAMPING if _steady(unstable, part)), None)
     damping = 100.0 * worst.plant.damping_ratio
     raise ConfigurationError(
-        f"controller: these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
+        f"these gains are unstable on the known plant ([plant], {worst.omega_rad_s / 2.0 / math.pi:.2f} Hz, "
         f"{damping:.3g} % damping)"
         + lags_text([loop.lag_deg for loop in unstable])
         + (f", growing at {max(growth):.3g} 1/s" if max(growth) > 0.0 else "")
         + ("" if enough is None else f"; with {enough * damping:.3g} % they would be stable")
-        + "; rig tune finds gains, without [plant] nothing is checked"
+        + "; rig tune finds gains, without [plant] nothing is checked",
+        field="controller",
     )
 
 

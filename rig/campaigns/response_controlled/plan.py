@@ -13,6 +13,7 @@ from rig.campaigns.planning.plan import Target
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
+from vibrolock.errors import InputError
 
 LEAST_SINE_LAG_DEG = 5.0  # chosen: closer to 0 or 180 deg the lag hardly changes with the frequency
 
@@ -46,15 +47,14 @@ class ResponseControlledPlan(SettledPlan):
     @model_validator(mode="after")
     def _lags_and_levels_make_sense(self) -> Self:
         if self.levels_m is None:
-            raise ValueError(f"{self.levels_key}: allowed is levels_m, for the displacement is held")
+            raise InputError(field=self.levels_key, allowed="levels_m, for the displacement is held")
         if not self.phase_lags_deg:
-            raise ValueError("phase_lags_deg = []: at least one lag is needed")
+            raise InputError("at least one lag is needed", field="phase_lags_deg", value=[])
         low, high = LEAST_SINE_LAG_DEG - 180.0, -LEAST_SINE_LAG_DEG
         for index, lag in enumerate(self.phase_lags_deg):
-            if not low <= lag <= high:
-                raise ValueError(f"phase_lags_deg[{index}] = {lag:g}: allowed is {low:g} to {high:g}")
+            InputError.unless_between(f"phase_lags_deg[{index}]", lag, low, high)
         if len(set(self.phase_lags_deg)) != len(self.phase_lags_deg):
-            raise ValueError("phase_lags_deg: a lag is given twice; use repeats to measure points again")
+            raise InputError("a lag is given twice", field="phase_lags_deg", hint="use repeats to measure points again")
         return self
 
     @property
@@ -112,7 +112,7 @@ class ResponseControlledPlan(SettledPlan):
         """Refuse, before anything moves, what the bench or the known plant cannot do."""
         if self.controller.detector == "sign":
             raise ConfigurationError(
-                'controller.detector = "sign": allowed is two-phase or adaptive, at lags other than -90'
+                field="controller.detector", value="sign", allowed="two-phase or adaptive, at lags other than -90"
             )
         super().check(bench)
 

@@ -127,8 +127,11 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
     head = f"{source}: " if str(source) else ""
     if change.kind != before.kind:
         raise ConfigurationError(
-            f"{head}kind = {change.kind!r}: allowed is {before.kind!r}, the kind of {name}; "
-            "a test of another kind is recorded in a file of its own"
+            where=head,
+            field="kind",
+            value=change.kind,
+            allowed=f"{before.kind!r}, the kind of {name}",
+            hint="a test of another kind is recorded in a file of its own",
         )
     if change.level_unit != before.level_unit:
         raise ConfigurationError(
@@ -138,19 +141,22 @@ def _check(change: Plan, source: str | Path, before: Plan, bench: Bench, name: s
     for path in KINDS[change.kind].fixed:
         new, old = attrgetter(path)(change), attrgetter(path)(before)
         if new != old:
-            raise ConfigurationError(f"{head}{path} = {new!r}: allowed is {old!r}, with which {name} was begun")
+            raise ConfigurationError(where=head, field=path, value=new, allowed=f"{old!r}, with which {name} was begun")
     if change.bench != before.bench or change.bench.endswith(".toml"):
         named = bench_of(change, source)
         if (named.name, named.specimen.name) != (bench.name, bench.specimen.name):
             raise ConfigurationError(
-                f"{head}bench = {change.bench!r}, specimen {named.specimen.name}: allowed is {bench.name!r}, specimen "
-                f"{bench.specimen.name}, on which {name} was begun"
+                f"specimen {named.specimen.name}",
+                where=head,
+                field="bench",
+                value=change.bench,
+                allowed=f"{bench.name!r}, specimen {bench.specimen.name}, on which {name} was begun",
             )
     try:
         change.check(bench)
         check_length(change, bench)
     except ConfigurationError as error:
-        raise ConfigurationError(f"{head}{error}") from None
+        raise ConfigurationError.of(error, where=head) from None
 
 
 def changed_keys(before: Mapping[str, object], after: Mapping[str, object], path: str = "") -> list[str]:

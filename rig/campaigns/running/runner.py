@@ -275,16 +275,17 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> A
     scale, unproven = known_scale(bench, session.identity, options.check, virtual=virtual)
     missing = [unproven, unproven_phase(bench, virtual=virtual)] if isinstance(plan, LockedPlan) else []
     arming, choice = armed_with_queue(plan, bench, session, options)
+    remarks = [*calibration_remarks(bench, datetime.now(UTC).date()), *filter(None, missing)]
     facts: About = {
         **cast(About, options.about.facts()),
         **({} if scale is None else {"checked": asdict(scale)}),
         **({"rehearsal": cast(RehearsalTable, rehearsed)} if rehearsed else {}),
         "armed": arming,
         "device": session.identity,
-        "remarks": [*calibration_remarks(bench, datetime.now(UTC).date()), *filter(None, missing)],
+        "remarks": remarks,
         "code": imported_code(bench),
     }
-    for remark in facts["remarks"]:
+    for remark in remarks:
         options.progress.remark(remark)
     return with_queue(facts, choice)
 

@@ -12,6 +12,7 @@ from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
+from vibrolock.errors import InputError
 
 LAGS_DEG = (-175.0, -5.0)  # between these lags the force feeds the vibration, and the lag determines the frequency
 
@@ -63,20 +64,25 @@ class SteppedPhasePlan(SettledPlan):
         named += [(f"phase_lags_deg[{index}]", lag) for index, lag in enumerate(self.phase_lags_deg or ())]
         for name, lag in named:
             if lag is not None and not low <= lag <= high:
-                raise ValueError(f"{name} = {lag:g}: allowed is {low:g} to {high:g}")
+                raise InputError(field=name, value=lag, allowed=f"{low:g} to {high:g}")
         if self.start_deg is not None and self.stop_deg is not None and not self.start_deg < self.stop_deg:
-            raise ValueError(
-                f"stop_deg = {self.stop_deg:g}: allowed is above start_deg; direction says which way to go"
+            raise InputError(
+                field="stop_deg", value=self.stop_deg, allowed="above start_deg", hint="direction says which way to go"
             )
         if len(set(self.lags)) != len(self.lags):
-            raise ValueError("phase_lags_deg: a lag is given twice; use repeats to measure lags again")
+            raise InputError("a lag is given twice", field="phase_lags_deg", hint="use repeats to measure lags again")
         if self.controller.phase_lag_deg != -90.0:
-            raise ValueError(
-                f"controller.phase_lag_deg = {self.controller.phase_lag_deg:g}: the plan gives the lags, leave it out"
+            raise InputError(
+                "the plan gives the lags, leave it out",
+                field="controller.phase_lag_deg",
+                value=self.controller.phase_lag_deg,
             )
         if self.controller.detector == "sign" and self.lags != (-90.0,):
-            raise ValueError(
-                'controller.detector = "sign": it knows phase resonance only, allowed is two-phase or adaptive'
+            raise InputError(
+                "it knows phase resonance only",
+                field="controller.detector",
+                value="sign",
+                allowed="two-phase or adaptive",
             )
         return self
 

@@ -12,6 +12,7 @@ from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.plan import Target, TonePlan
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
+from vibrolock.errors import InputError
 
 
 class SteppedSinePlan(TonePlan):
@@ -60,12 +61,11 @@ class SteppedSinePlan(TonePlan):
         if (self.frequencies_hz is None) == (self.start_hz is None) or (self.start_hz is None) != (
             self.stop_hz is None
         ):
-            raise ValueError("frequencies_hz: exactly one of it and of start_hz with stop_hz is to be given")
+            raise InputError("exactly one of it and of start_hz with stop_hz is to be given", field="frequencies_hz")
         for index, frequency_hz in enumerate(self.frequencies_hz or ()):
-            if not frequency_hz > 0.0:
-                raise ValueError(f"frequencies_hz[{index}] = {frequency_hz:g}: allowed is above 0")
+            InputError.unless_above(f"frequencies_hz[{index}]", frequency_hz, 0)
         if not self.frequencies_at_each_level:
-            raise ValueError("frequencies_hz = []: at least one frequency is needed")
+            raise InputError("at least one frequency is needed", field="frequencies_hz", value=[])
         return self
 
     @property

@@ -11,6 +11,7 @@ from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.plan import Target, TonePlan
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
+from vibrolock.errors import InputError
 
 FEWEST_PERIODS = 10  # the fundamental is a mean over two periods; fewer than ten show no variation of it
 LONGEST_S = 86400.0  # one day
@@ -52,9 +53,9 @@ class SweepPlan(TonePlan):
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
         if (self.rate_hz_per_s is None) == (self.rate_octaves_per_min is None):
-            raise ValueError("rate_hz_per_s, rate_octaves_per_min: exactly one of the two is to be given")
+            raise InputError("exactly one of the two is to be given", field="rate_hz_per_s, rate_octaves_per_min")
         if self.start_hz == self.stop_hz:
-            raise ValueError(f"stop_hz = {self.stop_hz:g}: allowed is anything but start_hz")
+            raise InputError(field="stop_hz", value=self.stop_hz, allowed="anything but start_hz")
         mean_hz = 0.5 * (self.start_hz + self.stop_hz)
         if self.rate_hz_per_s is None:
             mean_hz = (self.stop_hz - self.start_hz) / math.log(self.stop_hz / self.start_hz)
@@ -63,17 +64,21 @@ class SweepPlan(TonePlan):
         rate = self.rate_hz_per_s or self.rate_octaves_per_min or 0.0
         if self.sweep_s > LONGEST_S:
             least = rate * self.sweep_s / LONGEST_S
-            raise ValueError(f"{name} = {rate:g}: allowed is from {least:.4g}, a sweep of a day")
+            raise InputError(field=name, value=rate, allowed=f"from {least:.4g}, a sweep of a day")
         if periods < FEWEST_PERIODS:
-            raise ValueError(
-                f"{name} = {rate:g}: allowed is up to {rate * periods / FEWEST_PERIODS:.4g} from {self.start_hz:g} to "
-                f"{self.stop_hz:g} Hz, a sweep of {FEWEST_PERIODS} periods"
+            raise InputError(
+                field=name,
+                value=rate,
+                allowed=f"up to {rate * periods / FEWEST_PERIODS:.4g} from {self.start_hz:g} to {self.stop_hz:g} Hz, a "
+                f"sweep of {FEWEST_PERIODS} periods",
             )
         low, high = sorted((self.start_hz, self.stop_hz))
         for index, band in enumerate(self.off_resonance_hz or ()):
             if not low <= band[0] < band[1] <= high:
-                raise ValueError(
-                    f"off_resonance_hz[{index}] = {list(band)}: allowed is a band within {low:g} to {high:g} Hz"
+                raise InputError(
+                    field=f"off_resonance_hz[{index}]",
+                    value=list(band),
+                    allowed=f"a band within {low:g} to {high:g} Hz",
                 )
         return self
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from rig.bench import Bench
-from rig.bench.configuration import Configured, explain, validated
+from rig.bench.configuration import Configured, invalid, validated
 from rig.daq import DAQ, Capabilities
 from rig.drivers.virtual.faults import FAULT_FLAGS, FaultArrays, Outputs, PassingFaults, held_outputs
 from rig.drivers.virtual.kernels import Converters, Loopback, exchange_block, fused, loopback_of
@@ -65,10 +65,10 @@ class VirtualDAQ(DAQ):
         self._queue_options = validated(Queue, queue, "driver.options")
         converter = {"sample_rate_hz": bench.sample_rate_hz, "dac_range_v": bench.output_range_v}
         if "seed" in options:
-            raise ConfigurationError("driver.options.seed: is given to the run (`seed`), not to the bench")
+            raise ConfigurationError("is given to the run (`seed`), not to the bench", field="driver.options.seed")
         given = options.get("converter", {})
         if not isinstance(given, dict):
-            raise ConfigurationError(f"driver.options.converter = {given!r}: allowed is a table")
+            raise ConfigurationError(field="driver.options.converter", value=given, allowed="a table")
         options["converter"] = {**converter, **given}
         self.rig = validated(VirtualRig, options, "driver.options")
         self._wears = self.rig.wear.wears
@@ -81,7 +81,7 @@ class VirtualDAQ(DAQ):
         self._how = self._queue_options.at_zero_v
         if self._how != "attached" and self._wears:
             raise ConfigurationError(
-                f"driver.options.at_zero_v = {self._how!r}: allowed is 'attached' for a specimen that wears"
+                field="driver.options.at_zero_v", value=self._how, allowed="'attached' for a specimen that wears"
             )
         self._released = self._released_arrays()
         self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults(bench.block))
@@ -102,8 +102,9 @@ class VirtualDAQ(DAQ):
         late_per_s = self._queue_options.faults.late_per_s
         if late_per_s > 0.0:
             raise ConfigurationError(
-                f"driver.options.faults.late_per_s = {late_per_s:g}: allowed is 0 for an emulated device, whose outputs "
-                "come as late as its host sends them"
+                field="driver.options.faults.late_per_s",
+                value=late_per_s,
+                allowed="0 for an emulated device, whose outputs come as late as its host sends them",
             )
         faults = held_outputs(self._seed, self.sample_rate_hz, self._bench_block, self._queue_options.faults)
         return Converters(np.zeros(0), counts, loopback, faults, self._how != "attached", self._released)
@@ -119,18 +120,20 @@ class VirtualDAQ(DAQ):
                 arrays, _ = self.rig.build(seed)
                 delays = self.rig.channel_delays_samples
         except ValidationError as error:  # of the specimen that scatters
-            raise ConfigurationError(f"driver.options: {explain(error, VirtualRig)}") from None
+            raise invalid(error, VirtualRig, where="driver.options") from None
         except (ArithmeticError, ValueError, MemoryError) as error:
             raise ConfigurationError(
-                f"driver.options: this rig cannot be computed, a number of it is far too large or small ({error})"
+                f"this rig cannot be computed, a number of it is far too large or small ({error})",
+                field="driver.options",
             ) from None
         finite = all(np.all(np.isfinite(array)) for array in (arrays.step, arrays.correct, arrays.sense, delays))
         size, first = self.rig.plant.dynamics.shape[0], self.rig.plant.site_rows.shape[0]
         transition = arrays.step[:size, first : first + size].T  # behind the rows of the sites
         if not finite or np.max(np.abs(np.linalg.eigvals(transition))) > 1.0 + GROWTH:
             raise ConfigurationError(
-                "driver.options: this rig cannot be computed, its integration step grows: a mass, stiffness, resistance or "
-                "inductance is far too large or small beside the others"
+                "this rig cannot be computed, its integration step grows: a mass, stiffness, resistance or inductance is far "
+                "too large or small beside the others",
+                field="driver.options",
             )
 
     def _compare_channels(self) -> None:
@@ -139,12 +142,14 @@ class VirtualDAQ(DAQ):
         sensed = len(theirs)
         if ours[:sensed] != theirs or not all(channel.loopback for channel in self.channels[sensed:]):
             raise ConfigurationError(
-                f"channels: {ours} in the bench, the virtual rig has {theirs}, in this order, and loopbacks behind them"
+                f"{ours} in the bench, the virtual rig has {theirs}, in this order, and loopbacks behind them",
+                field="channels",
             )
         if self.rig.converter.sample_rate_hz != self.sample_rate_hz:
             raise ConfigurationError(
-                f"driver.options.converter.sample_rate_hz = {self.rig.converter.sample_rate_hz:g}: "
-                f"allowed is the bench's {self.sample_rate_hz:g}"
+                field="driver.options.converter.sample_rate_hz",
+                value=self.rig.converter.sample_rate_hz,
+                allowed=f"the bench's {self.sample_rate_hz:g}",
             )
 
     @property

@@ -77,7 +77,7 @@ def part_keys(name: str) -> PartKeys:
         if known == name:
             return PartKeys(group, name, str(schema.get("description", "")), list(_keys(schema)))
     allowed = ", ".join(known for _, known, _ in _named_parts())
-    raise ConfigurationError(f"part = {name!r}: there is no such part; allowed is {allowed}")
+    raise ConfigurationError("there is no such part", field="part", value=name, allowed=allowed)
 
 
 @cache

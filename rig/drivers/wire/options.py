@@ -71,7 +71,9 @@ def watchdog_s(options: WireOptions, facts: DeviceFacts, block_s: float) -> floa
     shortest_s, longest_s = SHORTEST_BLOCKS * block_s, _longest_s(block_s)
     if chosen_s < shortest_s:
         raise DaqRefused(
-            f"driver.options.watchdog_s = {chosen_s:g}: allowed is from {shortest_s:g} s on, {SHORTEST_BLOCKS} blocks"
+            field="driver.options.watchdog_s",
+            value=chosen_s,
+            allowed=f"from {shortest_s:g} s on, {SHORTEST_BLOCKS} blocks",
         )
     if chosen_s > longest_s and not facts.simulated:
         whose = "" if options.watchdog_s else ", the shortest that the device can do"

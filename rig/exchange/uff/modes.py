@@ -49,7 +49,7 @@ def _degrees(nodes: Sequence[int], columns: Float, drive: str) -> tuple[tuple[Ch
     moving = [(k, j) for j in range(columns.shape[2]) for k in range(3) if np.any(columns[:, k, j])]
     names = [f"{nodes[j]}+{'XYZ'[k]}" for k, j in moving]
     if drive not in names:
-        raise ImportFailed(f"`drive`: is '{drive}', which says where the force acts; allowed are {', '.join(names)}")
+        raise ImportFailed("which says where the force acts", field="drive", value=drive, allowed=names)
     channels = tuple(Channel(name, "drive" if name == drive else "response", "m") for name in names)
     return channels, np.array([columns[:, k, j] for k, j in moving])
 

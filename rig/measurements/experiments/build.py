@@ -84,33 +84,36 @@ def experiments(
     """
     if recording.kind not in (kinds := kinds_with_experiments()):
         raise RecordingError(f"{recording.path}: holds a {recording.kind}, wanted is a {' or a '.join(kinds)}")
-    if periods not in get_args(Periods):
-        raise IdentificationError(f"periods: is '{periods}', allowed are {', '.join(get_args(Periods))}")
+    IdentificationError.unless_one_of("periods", periods, get_args(Periods))
     if transient_periods is not None and not 0.0 <= transient_periods < math.inf:
-        raise IdentificationError(f"transient_periods: is {transient_periods:g}, needs zero or more")
+        raise IdentificationError(field="transient_periods", value=transient_periods, allowed="zero or more")
     if segment_periods < FEWEST_PERIODS:
-        raise IdentificationError(f"segment_periods: is {segment_periods}, needs {FEWEST_PERIODS} at least")
+        raise IdentificationError(field="segment_periods", value=segment_periods, allowed=f"{FEWEST_PERIODS} at least")
     bench = bench_of_recording(recording)
     try:
         signals = Signals.chosen(bench, inputs, outputs)
     except IdentificationError as error:
-        raise IdentificationError(f"{recording.path}: {error}") from None
+        raise IdentificationError.of(error, where=recording.path) from None
     rate_hz = default_rate_hz(recording) if rate_hz is None else positive("rate_hz", rate_hz, "Hz")
     if rate_hz > bench.sample_rate_hz:
         raise IdentificationError(
-            f"rate_hz: is {rate_hz:g} Hz, allowed is up to {bench.sample_rate_hz:g} Hz, as fast as was recorded"
+            field="rate_hz", value=rate_hz, allowed=f"up to {bench.sample_rate_hz:g} Hz, as fast as was recorded"
         )
     if rate_hz <= FEWEST_SAMPLES_PER_PERIOD * (highest := _highest_hz(recording)):
         raise IdentificationError(
-            f"rate_hz: is {rate_hz:g} Hz, {recording.path} is excited up to {highest:g} Hz; allowed is above "
-            f"{FEWEST_SAMPLES_PER_PERIOD * highest:g} Hz"
+            f"{recording.path} is excited up to {highest:g} Hz",
+            field="rate_hz",
+            value=rate_hz,
+            allowed=f"above {FEWEST_SAMPLES_PER_PERIOD * highest:g} Hz",
         )
     ratio = rate_hz / bench.sample_rate_hz
     whole = Fraction(ratio).limit_denominator(LARGEST_FACTOR)
     if _made_of(recording) != "realisations" and abs(float(whole) / ratio - 1.0) > _SAME_RATIO:
         raise IdentificationError(
-            f"rate_hz: is {rate_hz:.10g} Hz, {recording.path} was recorded at {bench.sample_rate_hz:g} Hz; allowed are ratios "
-            f"of whole numbers up to {LARGEST_FACTOR}, such as {float(whole) * bench.sample_rate_hz:.10g} Hz"
+            f"{recording.path} was recorded at {bench.sample_rate_hz:g} Hz",
+            field="rate_hz",
+            value=rate_hz,
+            allowed=f"ratios of whole numbers up to {LARGEST_FACTOR}, such as {float(whole) * bench.sample_rate_hz:.10g} Hz",
         )
     if _made_of(recording) == "realisations":
         plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
@@ -214,8 +217,7 @@ def _made_of(recording: Recording) -> str | None:
 def _accepted(recording: Recording, points: Iterable[Point[Result]]) -> list[Point[Result]]:
     """Return the accepted points of the current plan, without the repetition of the first point."""
     found = [point for point in without_repetition(points) if point.accepted]
-    if not found:
-        raise IdentificationError(f"{recording.path}: points: none of the recording was accepted")
+    IdentificationError.raise_if(not found, "none of the recording was accepted", where=recording.path, field="points")
     return found
 
 

@@ -92,8 +92,10 @@ def samples_of_a_period(plan: MultisinePlan, bench: Bench, rate_hz: float) -> in
     size = round(exact)
     if size < 1 or abs(exact - size) > 1e-6:
         raise IdentificationError(
-            f"rate_hz: is {rate_hz:g} Hz, a period of {1.0 / plan.resolution_hz:g} s then has {exact:.6g} samples; allowed are "
-            f"whole multiples of {plan.resolution_hz:g} Hz"
+            f"a period of {1.0 / plan.resolution_hz:g} s then has {exact:.6g} samples",
+            field="rate_hz",
+            value=rate_hz,
+            allowed=f"whole multiples of {plan.resolution_hz:g} Hz",
         )
     return size
 

@@ -13,6 +13,7 @@ from controller.harmonics import harmonic_ratios
 from rig.bench.configuration import Configured
 from rig.tick.sequencer.judgement import LONGEST_AVERAGE, SETTLE_RULE
 from rig.tick.sequencer.layout import OUTCOME, SEGMENT, Drive, OnFailure, SegmentKind
+from vibrolock.errors import InputError
 
 
 class SettleRule(Configured):
@@ -33,9 +34,10 @@ class SettleRule(Configured):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if self.longest_periods < self.shortest_periods:
-            raise ValueError(
-                f"longest_periods = {self.longest_periods:g}: allowed is from {self.shortest_periods}, "
-                "which two averages and the settled periods take at the least"
+            raise InputError(
+                field="longest_periods",
+                value=self.longest_periods,
+                allowed=f"from {self.shortest_periods}, which two averages and the settled periods take at the least",
             )
         return self
 

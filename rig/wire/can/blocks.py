@@ -20,8 +20,10 @@ def check_stream(shape: Shape, stream: Stream) -> None:
         raise DaqRefused(f"counts of {stream.bits} bits: allowed over CAN is 16")
     if not 1 <= stream.block <= shape.largest_block:
         raise DaqRefused(
-            f"block = {stream.block}: allowed over {'CAN FD' if shape.fd else 'classical CAN'} with "
-            f"{shape.n_channels} channels is 1 to {shape.largest_block} samples"
+            f"allowed over {('CAN FD' if shape.fd else 'classical CAN')} with {shape.n_channels} channels is "
+            f"1 to {shape.largest_block} samples",
+            field="block",
+            value=stream.block,
         )
 
 

@@ -196,8 +196,7 @@ def _compiled(message: "Message", source: str) -> CompiledMessage:
     where = f"{source}: message {message.name}"
     if message.is_multiplexed():
         raise ConfigurationError(f"{where}: is multiplexed, which cannot be compiled")
-    if message.is_extended_frame:
-        raise ConfigurationError(f"{where}: has an identifier of 29 bits, allowed is 11")
+    ConfigurationError.raise_if(message.is_extended_frame, "has an identifier of 29 bits", where=where, allowed="11")
     placed = sorted(((_first_byte(signal, where), signal) for signal in message.signals), key=lambda pair: pair[0])
     formats = [_format(signal, where) for _, signal in placed]
     dtype = np.dtype(

@@ -222,8 +222,7 @@ def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None
     A file may choose other identifiers, and nothing else: `ConfigurationError` names the message and what differs. One
     without the messages of version 2 defines version 1.
     """
-    if not 0 <= node <= HIGHEST_NODE:
-        raise ConfigurationError(f"driver.options.node = {node}: allowed is 0 to {HIGHEST_NODE}")
+    ConfigurationError.unless_between("driver.options.node", node, 0, HIGHEST_NODE)
     shape = shape_of(n_channels, fd)
     ours = compile_text(definition(n_channels, fd))
     if dbc is None:
@@ -232,17 +231,18 @@ def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None
     if not any(name in theirs.messages for name in SINCE_VERSION_2):
         ours = Protocol(shape, ours, node).speaking(LOWEST_VERSION).layout
     for name, message in ours.messages.items():
-        if name not in theirs.messages:
-            raise ConfigurationError(f"{dbc}: message {name} is missing")
+        ConfigurationError.raise_if(name not in theirs.messages, f"message {name} is missing", where=dbc)
         other = theirs.messages[name]
         wanted, found = message.canonical.split(" ", 1)[1], other.canonical.split(" ", 1)[1]
         if wanted != found:
             raise ConfigurationError(
-                f"{dbc}: message {name}: is [{_short(found, wanted)}], wanted is [{_short(wanted, found)}]"
+                f"message {name}: is [{_short(found, wanted)}], wanted is [{_short(wanted, found)}]", where=dbc
             )
         if other.frame_id & NODE_MASK:
             raise ConfigurationError(
-                f"{dbc}: message {name}: has the identifier 0x{other.frame_id:03X}, allowed are multiples of 16, for nodes"
+                f"message {name}: has the identifier 0x{other.frame_id:03X}",
+                where=dbc,
+                allowed="multiples of 16, for nodes",
             )
     return Protocol(shape, Layout({name: theirs.messages[name] for name in ours.messages}), node)
 

@@ -26,12 +26,12 @@ def opening(timing: BusTiming) -> bytes:
     fd, bit_rate_hz, data_bit_rate_hz = timing
     if bit_rate_hz not in BIT_RATES:
         allowed = ", ".join(str(rate) for rate in BIT_RATES)
-        raise DaqRefused(f"driver.options.bitrate = {bit_rate_hz}: adapters know {allowed}")
+        raise DaqRefused(f"adapters know {allowed}", field="driver.options.bitrate", value=bit_rate_hz)
     out = f"S{BIT_RATES[bit_rate_hz]}\r"
     if fd:
         if data_bit_rate_hz not in DATA_BIT_RATES:
             allowed = ", ".join(str(rate) for rate in DATA_BIT_RATES)
-            raise DaqRefused(f"driver.options.data_bitrate = {data_bit_rate_hz}: adapters know {allowed}")
+            raise DaqRefused(f"adapters know {allowed}", field="driver.options.data_bitrate", value=data_bit_rate_hz)
         out += f"Y{data_bit_rate_hz // 1_000_000}\r"
     return (out + "O\r").encode("ascii")
 

@@ -94,7 +94,7 @@ def open_port(path: str, baud: int) -> serial.Serial:
         port.reset_input_buffer()
     except (OSError, termios.error) as error:
         port.close()
-        raise DaqDisconnected(f"port {path!r}: it went while it was being opened: {error}") from error
+        raise DaqDisconnected.of(error, where=f"port {path!r}: it went while it was being opened") from error
     return port
 
 

@@ -44,7 +44,7 @@ def found(data: DataSet, folder: Path | None) -> tuple[Path, ...]:
     Raises `ConfigurationError` if there is no folder or a file is missing, `RecordingError` if one is unreadable or another.
     """
     if folder is None:
-        raise ConfigurationError(f"`data`: {data.name} needs a folder with {data.needs}; give it")
+        raise ConfigurationError(f"{data.name} needs a folder with {data.needs}", field="data", hint="give it")
     if not folder.is_dir():
         raise ConfigurationError(f"`data` {folder}: is no folder; {data.name} needs one with {data.needs}")
     return tuple(_checked(data, file, folder) for file in data.files)

@@ -5,6 +5,7 @@ import pytest
 
 from identification import Channel, IdentificationError, decay_backbone
 from tests.identification.decays.signals import DRIVE, linear
+from tests.refused import refused
 
 RATE_HZ, DAMPING = 1280.0, 0.004
 
@@ -71,31 +72,31 @@ def test_a_given_beginning_and_end_are_used():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"start_s": 99.0}, "start_s: is 99 s, the record goes from 0 to 8 s"),
-        ({"near_hz": 50.0}, "near_hz: no vibration near 50 Hz|not above the noise"),
-        ({"near_hz": 700.0}, "the spectrum ends at 640 Hz"),
-        ({"near_hz": -1.0}, "near_hz: is -1 Hz"),
-        ({"number": 0}, "number: is 0"),
-        ({"drive_mode_shape": 0.0}, "drive_mode_shape: is 0.0"),
-        ({"stop_s": 0.02}, "start_s, stop_s"),
+        ({"start_s": 99.0}, {"says": "the-record-goes-from-to", "field": "start_s", "value": 99.0}),
+        ({"near_hz": 50.0}, {"says": "no-vibration-near-hz-not-above", "field": "near_hz"}),
+        ({"near_hz": 700.0}, {"says": "the-spectrum-ends-at-hz", "field": "near_hz", "value": 700.0}),
+        ({"near_hz": -1.0}, {"field": "near_hz"}),
+        ({"number": 0}, {"field": "number", "value": 0}),
+        ({"drive_mode_shape": 0.0}, {"field": "drive_mode_shape", "value": 0.0}),
+        ({"stop_s": 0.02}, {"field": "start_s, stop_s"}),
     ],
 )
 def test_wrong_arguments_are_named(changes, message):
     x = linear(DAMPING, 8.0, RATE_HZ) + 1e-4 * np.random.default_rng(0).normal(size=int(8.0 * RATE_HZ))
-    with pytest.raises(IdentificationError, match=message):
+    with refused(IdentificationError, **message):
         decay_backbone([x], DRIVE, sample_rate_hz=RATE_HZ, **changes)
 
 
 @pytest.mark.parametrize(
     ("samples", "channels", "message"),
     [
-        (np.zeros((1, 5000)), DRIVE, "no motion channel moves"),
-        (np.ones((2, 5000)), DRIVE, "for 1 channels"),
-        (np.full((1, 5000), np.nan), DRIVE, "must be finite"),
-        (np.zeros((1, 5000)), [Channel("f", "force", "N")], "none is a motion"),
-        (np.random.default_rng(0).normal(size=(1, 20000)), DRIVE, "."),
+        (np.zeros((1, 5000)), DRIVE, {"says": "no-motion-channel-moves", "field": "samples"}),
+        (np.ones((2, 5000)), DRIVE, {"says": "for-channels", "field": "samples"}),
+        (np.full((1, 5000), np.nan), DRIVE, {"field": "samples", "allowed": "finite"}),
+        (np.zeros((1, 5000)), [Channel("f", "force", "N")], {"says": "none-is-motion", "field": "channels"}),
+        (np.random.default_rng(0).normal(size=(1, 20000)), DRIVE, {"field": "samples"}),
     ],
 )
 def test_records_without_a_decay_are_refused(samples, channels, message):
-    with pytest.raises(IdentificationError, match=message):
+    with refused(IdentificationError, **message):
         decay_backbone(samples, channels, sample_rate_hz=RATE_HZ)

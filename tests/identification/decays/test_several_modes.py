@@ -5,6 +5,7 @@ import pytest
 
 from identification import Channel, IdentificationError, decay_backbone
 from tests.identification.decays.signals import linear
+from tests.refused import refused
 
 RATE_HZ = 1000.0
 CHANNELS = (Channel("a", "drive", "m"), Channel("b", "response", "m"))
@@ -34,7 +35,7 @@ def test_both_of_two_modes_are_found_with_their_frequency_and_damping(second_hz,
 
 @pytest.mark.parametrize("second_hz", [29.7, 30.0, 30.4])
 def test_a_mode_near_twice_the_frequency_of_another_is_refused_if_it_is_named(second_hz):
-    with pytest.raises(IdentificationError, match="near harmonic 2 of the mode at 15 Hz, from which it cannot be told"):
+    with refused(IdentificationError, "near-harmonic-of-the-mode-at", field="near_hz"):
         decay_backbone(two_modes(second_hz), CHANNELS, sample_rate_hz=RATE_HZ, near_hz=[15.0, second_hz])
 
 
@@ -52,14 +53,14 @@ def test_a_mode_detuned_from_twice_the_frequency_is_kept_apart():
 
 
 def test_modes_that_no_filter_separates_are_refused_with_both_frequencies():
-    with pytest.raises(IdentificationError, match=r"1[45].* Hz are too close|leads to"):
+    with refused(IdentificationError, "hz-are-too-close-leads-to", field="near_hz"):
         decay_backbone(two_modes(15.6), CHANNELS, sample_rate_hz=RATE_HZ, near_hz=[15.0, 15.6])
 
 
 def test_one_of_several_modes_has_to_be_named():
     found = decay_backbone(two_modes(40.0), CHANNELS, sample_rate_hz=RATE_HZ)
-    with pytest.raises(IdentificationError, match=r"near_hz: the decay has 2 modes \(15 Hz, 4\d\.?\d* Hz\)"):
+    with refused(IdentificationError, "the-decay-has-modes-hz-hz", field="near_hz"):
         found.mode()
     assert found.mode(39.0).modal_frequency_hz[0] == pytest.approx(40.0, rel=1e-3)
-    with pytest.raises(IdentificationError, match="drive_mode_shape: is that of one mode"):
+    with refused(IdentificationError, "that-of-one-mode", field="drive_mode_shape"):
         decay_backbone(two_modes(40.0), CHANNELS, sample_rate_hz=RATE_HZ, drive_mode_shape=1.0)

@@ -16,6 +16,7 @@ from identification.linear.accelerance import (
     weighted_responses,
 )
 from tests.identification.linear.structures import FREQUENCY_HZ, measured
+from tests.refused import refused
 
 TOTAL = measured(1, 0.1)
 NOISE = replace(TOTAL, total_covariance=None, noise_covariance=TOTAL.total_covariance)
@@ -116,9 +117,9 @@ def test_motions_and_the_errors_of_each_become_accelerations():
 
 
 def test_what_is_no_weighting_or_has_no_covariance_is_refused():
-    with pytest.raises(IdentificationError, match="weighting: is 'all', allowed are auto, total, noise, relative"):
+    with refused(IdentificationError, field="weighting", value="all", allowed="auto, total, noise, relative"):
         weighted_responses(RESONANT, "all")
-    with pytest.raises(IdentificationError, match="weighting: is 'noise', but the responses have no noise_covariance"):
+    with refused(IdentificationError, "the-responses-have-no-noise-covariance", field="weighting", value="noise"):
         weighted_responses(RESONANT, "noise")
-    with pytest.raises(IdentificationError, match="begins at 0 Hz"):
+    with refused(IdentificationError, "begins-at-hz", field="frequency_hz"):
         weighted_accelerance(replace(RESONANT, frequency_hz=np.array([0.0, 1.0, 2.0])))

@@ -20,6 +20,7 @@ from tests.identification.linear.hardening import (
     own_pole,
     spectra,
 )
+from tests.refused import refused
 
 MANY = 240
 
@@ -120,7 +121,7 @@ def test_what_is_no_mode_is_refused_and_starting_frequencies_are_asked_for():
     random = np.random.default_rng(4)
     noise = random.normal(size=(LINES_HZ.size, 1, 1)) + 1j * random.normal(size=(LINES_HZ.size, 1, 1))
     nothing = FrequencyResponseMatrix(outputs=CHANNELS[1:], inputs=CHANNELS[:1], frequency_hz=LINES_HZ, value=noise)
-    with pytest.raises(IdentificationError, match="modes: "):
+    with refused(IdentificationError, field="modes"):
         linear_modes(nothing)
 
 

@@ -4,6 +4,7 @@ from pydantic import ValidationError
 
 from identification import HammerTestMapping, IdentificationError, hammer_test, map_hammer_test
 from tests.identification.hammer.virtual import CHANNELS, RATE_HZ, record
+from tests.refused import refused
 
 RECORDS = np.array([record(1.6, [(0.1, height)]) for height in (50.0, 70.0, 60.0)])
 FORCE, DRIVE, TIP = (RECORDS[:, row].T for row in range(3))
@@ -51,16 +52,20 @@ def test_records_may_be_a_list_and_the_rate_that_of_instants_or_of_the_file():
 @pytest.mark.parametrize(
     ("data", "change", "message"),
     [
-        ({"A": [DRIVE, TIP]}, {}, "channels.hammer: path 'F': no 'F' at the top, which has A"),
-        ({**DATA, "F": FORCE[:-1]}, {}, "channels: unequal lengths"),
-        ({"F": FORCE, "A": [DRIVE, TIP]}, {"sample_rate_hz": None}, "sample_rate_hz: is missing; give it, or time"),
-        ({**DATA, "t": np.arange(5.0) ** 2}, {"sample_rate_hz": None, "time": "t"}, "is not evenly spaced"),
-        ({**DATA, "F": FORCE}, {}, "force: no hit above|hits: "),
-        ({**DATA, "F": np.where(FORCE > 10.0, np.nan, FORCE)}, {}, r"records\[0\]: value at .* is nan"),
+        ({"A": [DRIVE, TIP]}, {}, {"says": "channels-hammer-path-no-at-the"}),
+        ({**DATA, "F": FORCE[:-1]}, {}, {"says": "unequal-lengths", "field": "channels"}),
+        (
+            {"F": FORCE, "A": [DRIVE, TIP]},
+            {"sample_rate_hz": None},
+            {"says": "missing-give-it-or-time", "field": "sample_rate_hz"},
+        ),
+        ({**DATA, "t": np.arange(5.0) ** 2}, {"sample_rate_hz": None, "time": "t"}, {"says": "is-not-evenly-spaced"}),
+        ({**DATA, "F": FORCE}, {}, {"says": "force-no-hit-above-hits", "field": "hits"}),
+        ({**DATA, "F": np.where(FORCE > 10.0, np.nan, FORCE)}, {}, {"says": "value-at-is-nan", "field": "records[0]"}),
     ],
 )
 def test_what_does_not_fit_is_named(data, change, message):
-    with pytest.raises(IdentificationError, match=message):
+    with refused(IdentificationError, **message):
         map_hammer_test(data, mapping(**change))
 
 

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from identification import IdentificationError, TimeDataMapping, TimeRecords, map_time_data
 from identification.storage import decode, encode
+from tests.refused import refused
 
 RATE = 512.0
 SIZE, PERIODS, REALISATIONS, LEVELS = 64, 4, 3, 2
@@ -49,7 +50,7 @@ def test_channels_of_one_matrix_are_told_by_their_number():
     of = {"value": "all", "axes": ["channel", "sample"]}
     found = map_time_data(data, told(of, {**of, "index": 3}))
     np.testing.assert_allclose(found.records[0].samples[1], 1e-3 * MOTION[0, 1].ravel(), rtol=1e-15)
-    with pytest.raises(IdentificationError, match=r"channels\.tip\.index: is 4, the array has 1 to 3"):
+    with refused(IdentificationError, "the-array-has-to", field="channels.tip.index", value=4):
         map_time_data(data, told(of, {**of, "index": 4}))
 
 
@@ -63,9 +64,7 @@ def test_a_structure_for_each_record_gives_a_record_each():
 
 def test_what_is_said_to_be_periodic_and_is_not_is_refused_and_a_doubtful_period_remarked_on():
     u, y = RANDOM.normal(size=(2, 4 * SIZE))
-    with pytest.raises(
-        IdentificationError, match=r"period_samples: is 64, but in record '.*realisation 1' such periods of"
-    ):
+    with refused(IdentificationError, "in-record-realisation-such-periods-of", field="period_samples", value=64):
         map_time_data({"u": u, "y": y}, told(period_samples=SIZE))
     settling = np.tile(u[:SIZE], 4) * (1.0 - 0.5 * np.exp(-np.arange(4 * SIZE) / SIZE))
     (note,) = map_time_data({"u": settling, "y": y}, told(period_samples=SIZE)).notes
@@ -107,7 +106,7 @@ def test_levels_of_a_list_are_named_by_their_size_or_one_by_one(levels):
     assert [record.level for record in each.records] == [7.0, 6.0]  # one for each record: in their order
     one = map_time_data(runs_of(1.9, 7.7), told(records="runs", period_samples=SIZE, levels=[5.0]))
     assert [record.level for record in one.records] == [5.0, 5.0]
-    with pytest.raises(IdentificationError, match=r"levels: has 3 numbers, the data has 2 levels and 4 records"):
+    with refused(IdentificationError, "has-numbers-the-data-has-levels", field="levels"):
         map_time_data(runs_of(1.9, 7.7, 1.8, 7.9), told(records="runs", period_samples=SIZE, levels=[1.0, 2.0, 3.0]))
 
 
@@ -147,7 +146,7 @@ def test_channels_that_begin_at_different_instants_are_lined_up():
     np.testing.assert_array_equal(found.records[0].samples[0], u[20:])
     np.testing.assert_allclose(found.records[0].samples[1], 1e-3 * y[:-20], rtol=1e-15)
     data["__starts_s__"] = {"u": 0.0, "y": 20.4 / RATE}
-    with pytest.raises(IdentificationError, match=r"channels\.force: begins 20\.40 samples before another"):
+    with refused(IdentificationError, "begins-samples-before-another", field="channels.force"):
         map_time_data(data, told(sample_rate_hz=None))
 
 
@@ -197,7 +196,7 @@ def test_records_come_back_from_arrays_as_they_were():
 
 
 def test_too_many_axes_are_named_with_the_shape():
-    with pytest.raises(IdentificationError, match=r"has shape \(64, 4\), `axes` names 3 dimensions"):
+    with refused(IdentificationError, "has-shape-axes-names-dimensions"):
         map_time_data({"u": FORCE[0, 0].T, "y": MOTION[0, 0].T}, told(axes=["sample", "period", "realisation"]))
     with pytest.raises(ValidationError, match="each may be named once"):
         told(axes=["sample", "sample"])

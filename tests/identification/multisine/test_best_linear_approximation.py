@@ -3,6 +3,7 @@ import pytest
 
 from identification import Channel, IdentificationError, MultisineDesign, PeriodicSpectra, best_linear_approximation
 from tests.identification.multisine.linear_systems import RATE_HZ, instruments, measured, response_of
+from tests.refused import refused
 
 FEW_LINES = MultisineDesign(RATE_HZ, 100, 40.0, 160.0)
 
@@ -112,7 +113,7 @@ def test_what_is_missing_of_the_covariances_is_said_and_refused_where_it_is_aske
         "total covariance unknown: 1 realisation only",
     )
     assert np.all(np.isnan(found.noise_std))
-    with pytest.raises(IdentificationError, match="noise_covariance: is unknown, a measurement of two periods or more"):
+    with refused(IdentificationError, "unknown-measurement-of-two-periods-or", field="noise_covariance"):
         found.covariance("noise")
     few = best_linear_approximation(measured(4, 1, noise=0.1, blocks=3, periods=2))
     assert [note.split(" (")[0] for note in few.notes] == [
@@ -126,16 +127,19 @@ def test_what_is_missing_of_the_covariances_is_said_and_refused_where_it_is_aske
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"estimator": "H3"}, "estimator: is 'H3', allowed are instrument, H1, H2"),
-        ({"estimator": "H2"}, "estimator: is 'H2' with 2 inputs, allowed is one"),
-        ({"instruments": ("voltage0",)}, r"instruments: are 1 \(voltage0\), needs one per input, 2"),
-        ({"outputs": ("a0", "a0")}, "outputs: a0, a0; needs one or more, each once"),
-        ({"outputs": ()}, "outputs: none given"),
-        ({"inputs": ("thrust",)}, "no channel 'thrust'"),
+        ({"estimator": "H3"}, {"field": "estimator", "value": "H3", "allowed": "instrument, H1, H2, Hv"}),
+        ({"estimator": "H2"}, {"says": "with-inputs", "field": "estimator", "allowed": "one"}),
+        (
+            {"instruments": ("voltage0",)},
+            {"says": "are-voltage", "field": "instruments", "allowed": "one per input, 2"},
+        ),
+        ({"outputs": ("a0", "a0")}, {"says": "message", "field": "outputs"}),
+        ({"outputs": ()}, {"says": "none-given", "field": "outputs"}),
+        ({"inputs": ("thrust",)}, {"says": "no-channel-thrust"}),
     ],
 )
 def test_channels_and_estimators_that_do_not_fit_are_named(arguments: dict[str, object], message: str) -> None:
-    with pytest.raises(IdentificationError, match=message):
+    with refused(IdentificationError, **message):
         best_linear_approximation(measured(2, 2), **({"instruments": instruments(2)} | arguments))
 
 
@@ -144,12 +148,12 @@ def test_experiments_that_cannot_tell_the_inputs_apart_are_refused() -> None:
     same = PeriodicSpectra(
         spectra.channels, spectra.frequency_hz, spectra.excited, np.repeat(spectra.spectra[:1], 4, axis=0)
     )
-    with pytest.raises(IdentificationError, match="does not move the 2 inputs independently of each other at 20 Hz"):
+    with refused(
+        IdentificationError, "does-not-move-the-inputs-independently", field="instruments 'voltage0', 'voltage1'"
+    ):
         best_linear_approximation(same, instruments=instruments(2))
     odd = PeriodicSpectra(spectra.channels, spectra.frequency_hz, spectra.excited, spectra.spectra[:3])
-    with pytest.raises(
-        IdentificationError, match="realisations: are 3, need a multiple of the 2 inputs force0, force1"
-    ):
+    with refused(IdentificationError, "are-need-multiple-of-the-inputs", field="realisations"):
         best_linear_approximation(odd, instruments=instruments(2))
 
 
@@ -169,7 +173,5 @@ def test_an_excited_line_without_power_is_refused() -> None:
     silent = spectra.spectra.copy()
     silent[:, :, 1, 7] = 0.0
     dead = PeriodicSpectra(spectra.channels, spectra.frequency_hz, spectra.excited, silent)
-    with pytest.raises(
-        IdentificationError, match="gives no input at 34 Hz, an excited line; is the design what was played"
-    ):
+    with refused(IdentificationError, "gives-no-input-at-hz-an", field="instrument 'voltage'"):
         best_linear_approximation(dead)

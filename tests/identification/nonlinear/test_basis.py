@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from identification import Backbone, Channel, IdentificationError, LinearModes, nonlinear_mode
 from identification.nonlinear.basis import shapes_for
 from tests.identification.nonlinear.test_uncertainty import SHAPE, noisy_point
+from tests.refused import refused
 
 
 def linear_modes(
@@ -51,23 +51,21 @@ def test_a_mode_near_the_tested_one_is_told_apart_from_it() -> None:
     modes = linear_modes((24.37, 27.0), shapes=((3.1, -2.0), (1.7, 1.5)))
     found, _, _ = shapes_for(modes, BACKBONE)
     assert found.shapes.shape == (2, 2)
-    with pytest.raises(
-        IdentificationError, match=r"3 closely spaced ones .* 2 common channels .*measure at more points"
-    ):
+    with refused(IdentificationError, "closely-spaced-ones-common-channels-meas", field="modes"):
         shapes_for(linear_modes((23.0, 24.37, 27.0), shapes=((3, 3.1, -2), (-1.7, 1.7, 1.5))), BACKBONE)
-    with pytest.raises(IdentificationError, match=r"24.37, 27 Hz look alike .*measure where their shapes differ"):
+    with refused(IdentificationError, "hz-look-alike-measure-where-their", field="modes"):
         shapes_for(linear_modes((24.37, 27.0), shapes=((3.1, 3.2), (1.7, 1.6))), BACKBONE)
 
 
 def test_the_tested_mode_is_refused_where_the_frequency_does_not_say_which() -> None:
-    with pytest.raises(IdentificationError, match=r"near to 24\.\d+ and 24\.\d+ Hz alike; say by mode= which"):
+    with refused(IdentificationError, "near-to-and-hz-alike-say", field="modes"):
         shapes_for(linear_modes((24.34, 24.41)), BACKBONE)
     assert shapes_for(linear_modes((24.34, 24.41)), BACKBONE, mode=1)[1] == 1
-    with pytest.raises(IdentificationError, match=r"none lies within 10 % of 24\.37 Hz"):
+    with refused(IdentificationError, "none-lies-within-of-hz", field="modes"):
         shapes_for(linear_modes((50.0, 134.0)), BACKBONE)
-    with pytest.raises(IdentificationError, match="mode: is 2, allowed are 0 to 1"):
+    with refused(IdentificationError, field="mode", value=2, allowed="0 to 1"):
         nonlinear_mode(BACKBONE, modes=linear_modes(), mode=2)
-    with pytest.raises(IdentificationError, match="there are no modes to choose from"):
+    with refused(IdentificationError, "there-are-no-modes-to-choose", field="mode", value=0):
         nonlinear_mode(BACKBONE, mode=0)
 
 
@@ -77,7 +75,7 @@ def test_a_sensor_that_the_modal_model_does_not_know_is_left_out_and_named() -> 
     assert "channel 'tip' is not in the modal model" in mode.notes[0]
     np.testing.assert_allclose(mode.damping_ratio, 0.004, rtol=1e-9)
     moved = replace(modes, channels=(Channel("drive", "response", "m/s2"), Channel("hammer", "drive", "m/s2")))
-    with pytest.raises(IdentificationError, match="backbone's drive point is 'drive', the modal model's is 'hammer'"):
+    with refused(IdentificationError, "backbone-drive-point-is-drive-the", field="modes"):
         nonlinear_mode(BACKBONE, modes=moved)
 
 

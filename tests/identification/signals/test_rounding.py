@@ -5,6 +5,7 @@ import pytest
 
 from identification import Channel, IdentificationError, periodic_vibration
 from identification.signals.rounding import part_of_each, rounding_errors, turns_of
+from tests.refused import refused
 
 CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"))
 HARMONICS = np.array([0.0, 1.0, 0.2, 0.05j])
@@ -114,7 +115,7 @@ def test_harmonics_beyond_those_asked_for_count_in_the_shape_but_are_not_returne
 @pytest.mark.parametrize("values", [[1.0], [1.0, -1.0]])
 def test_steps_and_noise_that_do_not_fit_are_named(name: str, values: list[float]) -> None:
     rounded = record(9.6, 0.05, 0.2, np.random.default_rng(5))
-    with pytest.raises(IdentificationError, match=rf"{name}: is .* needs 2 numbers of 0 or above"):
+    with refused(IdentificationError, field=name, value=values, allowed="2 numbers of 0 or above, one per channel"):
         periodic_vibration(THETA, [rounded, rounded], CHANNELS, sample_rate_hz=5000.0, **{name: values})
 
 

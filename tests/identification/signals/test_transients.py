@@ -6,6 +6,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from identification import Channel, IdentificationError, demodulate
+from tests.refused import refused
 
 CHANNELS = (Channel("force", "force", "N"), Channel("drive", "drive", "m/s2"))
 RATE_HZ = 5000.0
@@ -105,17 +106,23 @@ def test_only_whole_windows_are_given() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"theta_rad": np.linspace(0.0, 10.0, 800)}, r"theta_rad: covers 1.59 periods, needs 3 with periods = 1"),
-        ({"theta_rad": np.linspace(0.0, 700.0, 800)}, r"theta_rad: 7.17 samples in the shortest period"),
-        ({"theta_rad": np.linspace(10.0, 0.0, 800)}, r"theta_rad: does not rise from \[0\] to \[1\]"),
-        ({"periods": 0}, r"periods: is 0, needs at least 1"),
-        ({"every": 0}, r"every: is 0, needs at least 1"),
-        ({"samples": np.zeros((1, 800))}, r"samples: shape \(1, 800\), needs \(2, 800\)"),
-        ({"samples": np.full((2, 800), np.nan)}, r"samples: value at \[0, 0\] is nan"),
+        (
+            {"theta_rad": np.linspace(0.0, 10.0, 800)},
+            {"says": "covers-periods-2", "field": "theta_rad", "allowed": "3 with periods = 1"},
+        ),
+        ({"theta_rad": np.linspace(0.0, 700.0, 800)}, {"says": "samples-in-the-shortest-period", "field": "theta_rad"}),
+        ({"theta_rad": np.linspace(10.0, 0.0, 800)}, {"says": "does-not-rise-from-to-2", "field": "theta_rad"}),
+        ({"periods": 0}, {"field": "periods", "value": 0, "allowed": "1 and above"}),
+        ({"every": 0}, {"field": "every", "value": 0, "allowed": "at least 1"}),
+        (
+            {"samples": np.zeros((1, 800))},
+            {"says": "shape-6", "field": "samples", "allowed": "(2, 800): channels by samples of theta_rad"},
+        ),
+        ({"samples": np.full((2, 800), np.nan)}, {"says": "value-at-is-nan-2", "field": "samples"}),
     ],
 )
 def test_what_cannot_be_demodulated_is_named(change: dict[str, object], message: str) -> None:
     arguments = {"theta_rad": np.linspace(0.0, 60.0, 800), "samples": np.zeros((2, 800))} | change
     theta, samples = arguments.pop("theta_rad"), arguments.pop("samples")
-    with pytest.raises(IdentificationError, match=message):
+    with refused(IdentificationError, **message):
         demodulate(theta, samples, CHANNELS, sample_rate_hz=RATE_HZ, **arguments)

@@ -11,6 +11,7 @@ from tests.identification.slow_flows.ramps import (
     modal_rad_s,
     ramp,
 )
+from tests.refused import refused
 
 LEVELS = np.geomspace(1.2e-4, 1.9e-3, 9)
 
@@ -75,9 +76,9 @@ def test_levels_are_chosen_over_what_both_ramps_cover() -> None:
 
 def test_levels_beyond_the_ramps_and_ramps_that_do_not_meet_are_refused() -> None:
     up, down = ramps()
-    with pytest.raises(IdentificationError, match="levels_m"):
+    with refused(IdentificationError, field="levels_m"):
         continuous_backbone(up, down, levels_m=[5e-3])
-    with pytest.raises(IdentificationError, match="in common"):
+    with refused(IdentificationError, "in-common", field="up, down"):
         continuous_backbone(up.select(up.amplitude_m < 4e-4), down.select(down.amplitude_m > 6e-4))
 
 

@@ -13,18 +13,19 @@ from rig.drivers import make_daq
 from rig.errors import ConfigurationError
 from rig.exchange.reading import import_file, read_mapping
 from rig.wire.can.layout import compile_layout
+from tests.refused import refused
 
 
 def refusal(use, *arguments):
-    """The line that an answer within two seconds of CPU time consists of."""
+    """The line that an answer within two seconds of CPU time consists of, without marks around keys."""
     began = time.process_time()
-    with pytest.raises(ConfigurationError) as refused:
+    with pytest.raises(ConfigurationError) as caught:
         use(*arguments)
     assert time.process_time() - began < 2.0
-    line = str(refused.value)
+    line = str(caught.value)
     assert line.isprintable()
     assert len(line) < 1000
-    return line
+    return line.replace("`", "")
 
 
 @pytest.mark.parametrize("read", [read_toml, load_plan, load_bench, read_mapping, compile_layout])
@@ -41,7 +42,7 @@ def test_a_table_or_universal_file_that_is_a_fifo_is_refused_without_waiting(tmp
 
     for name in ("fifo.csv", "fifo.uff"):
         os.mkfifo(tmp_path / name)
-        with pytest.raises(ImportFailed, match="is a FIFO, allowed is a regular file"):
+        with refused(ImportFailed, "is-allowed-is-regular-file"):
             import_file(tmp_path / name)
 
 
@@ -71,19 +72,19 @@ def test_a_name_that_no_file_can_have_is_refused(tmp_path):
     [
         (b"a = " + b"[" * 50_000 + b"]" * 50_000, "is nested too deeply"),
         (b"a = " + b"{a=" * 5_000 + b"1" + b"}" * 5_000, "is nested too deeply"),
-        (b"a = " + b"[" * 40 + b"]" * 40, "is nested too deeply: allowed are up to 16 levels"),
-        (b"[" + b".".join([b"a"] * 40) + b"]", "is nested too deeply: allowed are up to 16 levels"),
-        (b".".join([b"a"] * 400_000) + b" = 1", "line 1: a key has more than 100 parts"),
+        (b"a = " + b"[" * 40 + b"]" * 40, "is nested too deeply; allowed: up to 16 levels"),
+        (b"[" + b".".join([b"a"] * 40) + b"]", "is nested too deeply; allowed: up to 16 levels"),
+        (b".".join([b"a"] * 400_000) + b" = 1", "line 1: a key has too many parts; allowed: up to 100"),
         (b"a = " + b"9" * 5_000, "is not TOML: Exceeds the limit"),
-        (b"a = 0x" + b"f" * 5_000, "a = a number of 20000 bits: allowed is up to 9223372036854775807"),
-        (b"a = 1e300", "a = 1e+300: allowed is 0, or a size from 1e-30 to 1e+30"),
-        (b"[b]\na = [1.0, 5e-324]", "b.a[1] = 5e-324: allowed is 0"),
-        (b"a = nan", "a = nan: allowed is a finite number"),
+        (b"a = 0x" + b"f" * 5_000, "a = '20000 bits'; allowed: up to 9223372036854775807"),
+        (b"a = 1e300", "a = 1e+300; allowed: 0, or a size from 1e-30 to 1e+30"),
+        (b"[b]\na = [1.0, 5e-324]", "b.a[1] = 4.94066e-324; allowed: 0"),
+        (b"a = nan", "a = nan; allowed: a finite number"),
         (b"a = '\xff'", "is no text in UTF-8 (byte 5: invalid start byte)"),
         (b"a = '\0'", "is not TOML"),
-        (b'a = "\\u001b[31m"', r"a = '\x1b[31m': holds a control character"),
+        (b'a = "\\u001b[31m"', r"a = '\x1b[31m'; allowed: printable text, without control characters"),
         (b'"\\u0000" = 1', r"holds the key '\x00'"),
-        (b"k" * 5_000 + b" = 1", "... (5000 characters): allowed is a printable name of up to 200 characters"),
+        (b"k" * 5_000 + b" = 1", "... (5000 characters); allowed: printable names of up to 200 characters"),
     ],
 )
 def test_what_no_table_may_hold_is_refused_in_one_line(tmp_path, text, said):
@@ -103,11 +104,11 @@ def test_a_discriminator_of_another_type_is_refused(key, value):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ("base = {}", "base = {}: allowed is"),
-        ("base = 'magnet-beam'\ndriver = 'virtual'", "driver = 'virtual': allowed is"),
-        ("base = 'magnet-beam'\ndriver.name = {}", "driver.name = {}: allowed is"),
-        ("base = 'magnet-beam'\ndriver.options.structure = 1", "structure = 1: allowed is"),
-        ("base = 'magnet-beam'\ndriver.options.structure.kind = {}", "structure.kind = '{}': allowed is 'beam'"),
+        ("base = {}", "base = {}; allowed:"),
+        ("base = 'magnet-beam'\ndriver = 'virtual'", "driver = 'virtual'; allowed:"),
+        ("base = 'magnet-beam'\ndriver.name = {}", "driver.name = {}; allowed:"),
+        ("base = 'magnet-beam'\ndriver.options.structure = 1", "structure = 1; allowed:"),
+        ("base = 'magnet-beam'\ndriver.options.structure.kind = {}", "structure.kind = '{}'; allowed: 'beam'"),
         ("base = 'magnet-beam'\ndriver.options.structure.length_m = 1e29", "driver.options: "),
         ("base = 'magnet-beam'\ndriver.options.structure.thickness_m = 1e-29", "cannot be computed with these numbers"),
         ("base = 'magnet-beam'\ndriver.options.specimen = {}", "specimen"),
@@ -121,11 +122,11 @@ def test_a_rig_of_wrong_types_or_that_cannot_be_computed_is_refused(tmp_path, ch
 def test_a_line_names_a_few_of_many_faults_and_says_how_many_there_are():
     table = {"kind": "backbone", "bench": "b", "levels_v": ["x"] * 9_000, "controller": {}}
     line = refusal(plan_from, table, "plan.toml")
-    assert line.startswith("plan.toml: levels_v[0] = 'x': allowed is a valid number; levels_v[1]")
+    assert line.startswith("plan.toml: levels_v[0] = 'x'; allowed: a valid number; levels_v[1]")
     assert line.endswith("; and 8997 more")
 
 
 def test_a_long_value_is_shortened_and_what_is_allowed_stays():
     table = {"kind": "backbone", "bench": "b", "levels_v": [1.0], "repeats": "a" * 9_000, "controller": []}
     line = refusal(plan_from, table, "plan.toml")
-    assert f"repeats = '{'a' * 30}'... (9000 characters): allowed is a valid integer" in line
+    assert f"repeats = '{'a' * 30}'... (9000 characters); allowed: a valid integer" in line

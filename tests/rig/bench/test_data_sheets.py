@@ -11,8 +11,14 @@ from rig.bench.configuration import validated
 from rig.bench.data_sheet import volts_per_unit
 from rig.bench.sensors import Sensor
 from rig.errors import ConfigurationError, NotArmed
+from tests.refused import refused
 
 G = 9.80665  # m/s2, standard gravity
+
+
+def unmarked(error):
+    """The line of an error without marks around keys."""
+    return str(error).replace("`", "")
 
 
 @pytest.mark.parametrize(
@@ -47,19 +53,19 @@ def test_a_sensitivity_of_a_data_sheet_in_volts_per_unit(sensitivity, gain, volt
 @pytest.mark.parametrize(
     ("keys", "fault"),
     [
-        ({"sensitivity": "100"}, "sensitivity = '100': allowed is a number and its unit"),
-        ({"sensitivity": "0 mV/N"}, "sensitivity = '0 mV/N': allowed is"),
-        ({"sensitivity": "1e999 mV/N"}, "sensitivity = '1e999 mV/N': allowed is"),
-        ({"sensitivity": "50 mV/stone"}, "sensitivity = '50 mV/stone': the quantity: is 'stone', understood are m, mm"),
+        ({"sensitivity": "100"}, "sensitivity = '100'; allowed: a number and its unit"),
+        ({"sensitivity": "0 mV/N"}, "sensitivity = '0 mV/N'; allowed:"),
+        ({"sensitivity": "1e999 mV/N"}, "sensitivity = '1e999 mV/N'; allowed:"),
+        ({"sensitivity": "50 mV/stone"}, "sensitivity = '50 mV/stone': the quantity: is 'stone'; allowed: m, mm"),
         ({"sensitivity": "100 mV/g"}, "sensitivity = '100 mV/g': is per m/s^2, the channel is in N"),
         ({"sensitivity": "4 pC/N"}, "amplifier_gain: is missing, sensitivity = '4 pC/N' is a charge"),
         ({"sensitivity": "4 pC/N", "amplifier_gain": "10"}, "amplifier_gain = '10': sensitivity = '4 pC/N'"),
-        ({"sensitivity": "4 mV/N", "amplifier_gain": "1 mV/pC"}, "allowed is such as '10' or '10 V/V'"),
-        ({"sensitivity": "4 mV/N", "amplifier_gain": "ten"}, "amplifier_gain = 'ten': allowed is a number"),
-        ({"sensitivity": 0.1}, "sensitivity = 0.1: allowed is a text with number and unit"),
-        ({"sensitivity": "100 mV/N", "sensitivity_v_per_unit": 0.2}, "makes it 0.1; allowed is one of the two"),
-        ({"sensitivity_v_per_unit": 0.1, "inverted": True}, "inverted: allowed is beside `sensitivity`"),
-        ({"sensitivity_v_per_unit": 0.1, "amplifier_gain": "10"}, "amplifier_gain: allowed is beside `sensitivity`"),
+        ({"sensitivity": "4 mV/N", "amplifier_gain": "1 mV/pC"}, "allowed: such as '10' or '10 V/V'"),
+        ({"sensitivity": "4 mV/N", "amplifier_gain": "ten"}, "amplifier_gain = 'ten'; allowed: a number"),
+        ({"sensitivity": 0.1}, "sensitivity = 0.1; allowed: a text with number and unit"),
+        ({"sensitivity": "100 mV/N", "sensitivity_v_per_unit": 0.2}, "makes it 0.1; allowed: one of the two"),
+        ({"sensitivity_v_per_unit": 0.1, "inverted": True}, "inverted: allowed: beside sensitivity"),
+        ({"sensitivity_v_per_unit": 0.1, "amplifier_gain": "10"}, "amplifier_gain: allowed: beside sensitivity"),
         ({}, "sensitivity_v_per_unit: is missing"),
     ],
 )
@@ -69,9 +75,10 @@ def test_what_is_wrong_with_a_sensitivity_is_said_in_one_line(keys, fault):
     table["channels"][0] |= keys
     with pytest.raises(ConfigurationError) as caught:
         validated(Bench, table, "bench.toml")
-    assert fault in str(caught.value)
-    assert str(caught.value).startswith("bench.toml: channels[0]")
-    assert "\n" not in str(caught.value)
+    line = unmarked(caught.value)
+    assert fault in line
+    assert line.startswith("bench.toml: channels[0]")
+    assert "\n" not in line
 
 
 @pytest.mark.parametrize("name", shipped_benches())
@@ -136,7 +143,7 @@ def test_a_bench_may_start_from_one_with_sensors_in_another_folder(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ('"A1"', '"A11"', "serial_number = 'A11': sensors.toml has no such sensor, did you mean 'A1'?; allowed is one"),
+        ('"A1"', '"A11"', "serial_number = 'A11': sensors.toml has no such sensor, did you mean 'A1'?; allowed: one"),
         ('"F1",', '"F1", calibrated = "2026-01-01",', "channels[0].calibrated = '2026-01-01': sensors.toml says it"),
         (
             '"A1",',
@@ -153,34 +160,34 @@ def test_a_bench_may_start_from_one_with_sensors_in_another_folder(tmp_path):
 def test_nothing_is_said_twice_and_no_sensor_is_unknown(old, new, fault, tmp_path):
     with pytest.raises(ConfigurationError) as caught:
         load_bench(written(tmp_path, CHANNELS.replace(old, new)))
-    assert fault in str(caught.value)
+    assert fault in unmarked(caught.value)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
         ('"A1"', '"F1"', "sensors[1].serial_number = 'F1': is there twice"),
-        ("10.2 mV", "10.2 mW", "sensors[1]: sensitivity = '10.2 mW/(m/s2)'"),
-        ("2024-02-29", '"2024-02-30"', "calibrated = '2024-02-30': allowed is a day"),
-        ("calibrated = 2024-02-29\n", "", "calibration_interval_months = 12: allowed is with `calibrated`"),
-        ("= 12", "= 12\ncalibration_due = 2030-01-01", "and without `calibration_due`"),
-        ("calibration_interval_months = 12", "calibration_due = 2020-01-01", "allowed is a day after calibrated"),
+        ("10.2 mV", "10.2 mW", "sensors[1].sensitivity = '10.2 mW/(m/s2)'"),
+        ("2024-02-29", '"2024-02-30"', "calibrated = '2024-02-30'; allowed: a day"),
+        ("calibrated = 2024-02-29\n", "", "calibration_interval_months = 12; allowed: with calibrated"),
+        ("= 12", "= 12\ncalibration_due = 2030-01-01", "and without calibration_due"),
+        ("calibration_interval_months = 12", "calibration_due = 2020-01-01", "allowed: a day after calibrated"),
         ("make", "maker", "sensors[0].maker: unknown key, did you mean make?"),
     ],
 )
 def test_what_is_wrong_in_a_file_of_sensors_is_said_with_its_name(old, new, fault, tmp_path):
     with pytest.raises(ConfigurationError) as caught:
         load_bench(written(tmp_path, sensors=SENSORS.replace(old, new)))
-    assert fault in str(caught.value)
+    assert fault in unmarked(caught.value)
     assert "sensors.toml" in str(caught.value)
 
 
 def test_a_file_of_sensors_that_is_none_is_refused(tmp_path):
     (tmp_path / "b.toml").write_text('base = "magnet-beam"\nsensors = 3\n')
-    with pytest.raises(ConfigurationError, match=r"sensors = 3: allowed is the path of a \.toml file"):
+    with refused(ConfigurationError, field="sensors", value=3, allowed="the path of a .toml file"):
         load_bench(tmp_path / "b.toml")
     (tmp_path / "b.toml").write_text('base = "magnet-beam"\nsensors = "none.toml"\n')
-    with pytest.raises(ConfigurationError, match=r"none\.toml"):
+    with refused(ConfigurationError, "none-toml"):
         load_bench(tmp_path / "b.toml")
 
 
@@ -204,8 +211,6 @@ def test_a_bench_that_asks_for_it_is_not_armed_while_a_calibration_is_overdue(tm
     path = written(tmp_path)
     assert armed(load_bench(path), Physical, "backbone", True)["how"] == "switch"
     path.write_text(path.read_text() + "[arming]\nrequire_calibration = true\n")
-    with pytest.raises(
-        NotArmed, match=r"channel force: calibration was due on 2025-02-28 \(sensor F1\), and \[arming\]"
-    ):
+    with refused(NotArmed, "channel-force-calibration-was-due-on"):
         armed(load_bench(path), Physical, "backbone", True)
     assert armed(load_bench(path), Physical, "check", True)["how"] == "switch"

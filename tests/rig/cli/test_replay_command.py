@@ -125,7 +125,7 @@ def test_in_a_pipe_it_prints_every_point_and_ends_with_the_recording(recording):
 
 def test_a_speed_or_file_that_cannot_be_is_one_line(command, recording, tmp_path):
     for arguments, text in [
-        ((str(recording), "--speed", "0"), "rig: --speed = 0: allowed is above 0, up to 1000\n"),
+        ((str(recording), "--speed", "0"), "rig: --speed = 0; allowed: above 0, up to 1000\n"),
         ((str(tmp_path / "none.h5"),), "none.h5"),
     ]:
         status, out, err = command("replay", *arguments, "--terminal")

@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from rig.drawing.page import grid, page_for
 from rig.drawing.style import COLOURS, REJECTED, STYLE, height_is_free, page_in, restyle, shade, title, unit_text
 from rig.errors import RecordingError
+from tests.refused import refused
 
 LIKE_SRGB = 2.4
 DEUTERANOPIA = np.array(
@@ -113,16 +114,16 @@ def test_what_is_no_style_is_refused_in_a_line_and_changes_nothing(
     preset: str, rc: dict[str, object], size_mm: tuple[float, float | None] | None, said: str
 ) -> None:
     before = dict(STYLE)
-    with pytest.raises(RecordingError) as refused:
+    with pytest.raises(RecordingError) as caught:
         restyle(preset, rc, size_mm=size_mm)
-    assert said in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
     assert before == STYLE
 
 
 def test_a_page_without_room_for_its_axes_is_refused_in_a_line(tmp_path: Path) -> None:
     with (
-        pytest.raises(RecordingError, match=r"`size` 25 x 25 mm: has no room for this figure; take a larger one"),
+        refused(RecordingError, "size-mm-has-no-room-for"),
         page_for(tmp_path / "small.png", (1.0, 1.0)) as page,
     ):
         page.subplots(3, 3)[1, 1].set_ylabel("a label")

@@ -12,6 +12,7 @@ from rig.emulator import Device, VirtualPlant
 from rig.emulator.parameters import described
 from rig.errors import DaqProtocol, DaqTimeout, DaqWatchdog
 from rig.wire.messages import DeviceState, Message, Output, Request
+from tests.refused import refused
 from tests.rig.drivers.test_wire import BLOCKS, answers, drive, message_of, virtual
 from tests.rig.rigs import bench_with
 from tests.rig.wire.mangled import MangledDAQ
@@ -80,9 +81,7 @@ def test_a_line_that_damages_everything_ends_the_run_with_what_was_counted() -> 
     daq = MangledDAQ(bench_with(), 3, WireOptions(), lambda data, number: flipped(data, number), lockstep=False)
     with daq:
         daq.start(BLOCK)
-        with pytest.raises(
-            DaqWatchdog, match=r"\d+ crc errors"
-        ):  # for the host waits, and hands over nothing meanwhile
+        with refused(DaqWatchdog, "crc-errors"):  # for the host waits, and hands over nothing meanwhile
             drive(daq, 2)
     assert not daq.device.output_v.any()
 
@@ -105,7 +104,7 @@ def test_outputs_that_are_damaged_on_the_way_hold_the_last_and_then_bite() -> No
         drive(daq, 20, BLOCK)
         assert daq.counters["output_held"] == 2 * BLOCK
         lose[0] = 10_000
-        with pytest.raises(DaqWatchdog, match="watchdog_s"):
+        with refused(DaqWatchdog, "watchdog"):
             drive(daq, 10_000, BLOCK)
     assert not daq.device.output_v.any()
 

@@ -10,6 +10,7 @@ from rig.conformance import with_loopback
 from rig.drivers import make_daq
 from rig.errors import ConfigurationError, DaqRefused
 from rig.loop.loop import Loop
+from tests.refused import refused
 from tests.rig.rigs import bench_with, tick_for
 from tests.simulators.references import UNFILTERED
 
@@ -103,7 +104,7 @@ def test_a_loopback_reads_the_same_fused_and_exchanged_and_changes_no_other_chan
 
 def test_a_channel_that_the_rig_has_not_is_refused_unless_it_is_a_loopback() -> None:
     other = {"name": "estop", "role": "monitor", "unit": "V", "sensitivity_v_per_unit": 1.0}
-    with pytest.raises(ConfigurationError, match="in this order, and loopbacks behind them"):
+    with refused(ConfigurationError, "in-this-order-and-loopbacks-behind", field="channels"):
         make_daq(bench_with({"channels": [*bench_with().model_dump()["channels"], other]}))
 
 
@@ -152,7 +153,7 @@ def test_wear_that_leaves_nothing_is_refused_in_one_line() -> None:
     with pytest.raises(ConfigurationError) as error:
         make_daq(bench_with(wear={"frequency_per_s": [-0.01], "until_s": 200.0}))
     assert str(error.value) == (
-        "driver.options: wear: until_s = 200: allowed is below 100, where frequency_per_s = -0.01 reaches -100 %"
+        "driver.options: `wear.until_s` = 200 s; allowed: below 100, where frequency_per_s = -0.01 reaches -100 %"
     )
 
 
@@ -176,7 +177,7 @@ def test_an_output_beyond_the_range_is_refused_wherever_it_stands(wrong: float) 
         for place in range(3):
             voltages = np.array([1.0, -10.0, 10.0])
             voltages[place] = wrong
-            with pytest.raises(DaqRefused, match="was demanded"):
+            with refused(DaqRefused, "was-demanded"):
                 daq.exchange(voltages)
         assert daq.exchange(np.array([1.0, -10.0, 10.0])).shape[0] == 3
 

@@ -42,6 +42,7 @@ from rig.wire.messages import (
     Status,
 )
 from rig.wire.parameter_words import float_word
+from tests.refused import refused
 from tests.rig.loop.worker.rigs import tone
 from tests.rig.rigs import bench_with
 from tests.rig.wire.memory_link import MemoryDAQ, MemoryLink
@@ -319,7 +320,7 @@ def test_an_emergency_stop_after_the_opening_is_not_cleared_with_the_watchdog_th
     daq = latched_by(emergency=False)
     with daq:
         daq.emergency_stop()
-        with pytest.raises(DaqEmergencyStop, match="emergency stop and watchdog had latched"):
+        with refused(DaqEmergencyStop, "emergency-stop-and-watchdog-had-latched"):
             daq.clear()
     assert daq.device.state is DeviceState.LATCHED
 
@@ -404,7 +405,7 @@ def test_an_emergency_stop_at_the_device_is_told() -> None:
         daq.start(5)
         drive(daq, 20)
         daq.device.press_emergency_stop()
-        with pytest.raises(DaqEmergencyStop, match="emergency stop"):
+        with refused(DaqEmergencyStop, "emergency-stop"):
             drive(daq, 20)
     assert not daq.device.output_v.any()
 
@@ -465,7 +466,7 @@ def test_another_who_disarms_the_device_is_noticed() -> None:
         daq.start(5)
         drive(daq, 50)
         daq.device.handle(Request(240, Command.DISARM), daq.wire.now_s)
-        with pytest.raises(DaqReset, match="was disarmed by another; its output is 0 V"):
+        with refused(DaqReset, "was-disarmed-by-another-its-output"):
             drive(daq, 500)  # half a second
     assert not daq.device.output_v.any()
 
@@ -575,7 +576,10 @@ def test_a_setting_that_a_device_halves_is_told_by_its_key_in_the_benchs_units(
 
 
 def test_a_watchdog_shorter_than_two_blocks_is_refused() -> None:
-    with MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=0.01)) as daq, pytest.raises(DaqRefused, match=r"0\.02 s"):
+    with (
+        MemoryDAQ(bench_with(), 0, WireOptions(watchdog_s=0.01)) as daq,
+        refused(DaqRefused, field="driver.options.watchdog_s", value=0.01),
+    ):
         daq.start(50)
 
 
@@ -607,9 +611,7 @@ def test_a_device_that_cannot_wait_as_short_as_usual_is_remarked_and_refused_whe
         if starts:
             daq.start(5)
         else:
-            with pytest.raises(
-                DaqRefused, match=r"watchdog_s = 30, the shortest that the device can do: allowed .* 1 s"
-            ):
+            with refused(DaqRefused, "watchdog-the-shortest-that-the-device"):
                 daq.start(5)
     with MemoryDAQ(bench_with(), 0, simulated=0) as daq:
         assert not any("watchdog" in remark for remark in daq.remarks)
@@ -728,7 +730,7 @@ def test_a_driver_that_replaces_its_flags_is_told_so() -> None:
 
     with Replaces(bench_with()) as daq:
         daq.start()
-        with pytest.raises(DaqError, match="replaced `flags`"):
+        with refused(DaqError, "replaced-flags"):
             daq.exchange(np.zeros(1))
 
 

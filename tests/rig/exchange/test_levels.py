@@ -14,6 +14,7 @@ from rig.exchange.child_reading import ImportFailed
 from rig.exchange.export import export_file
 from rig.exchange.reading import import_file, import_sep005
 from rig.measurements.sep005 import time_series
+from tests.refused import refused
 from tests.rig.exchange.test_universal_files import response, units, written
 
 CHANNELS = (("force", "force", "N"), ("drive", "drive", "m/s2"), ("acc_drive", "response", "m/s2"))
@@ -48,9 +49,9 @@ def test_every_level_of_a_multisine_comes_back(multisine_file, matrices, encodin
         assert found.input_rms == matrix.input_rms
         assert [channel.name for channel in found.outputs] == [channel.name for channel in matrix.outputs]
         assert found.estimator == matrix.estimator
-    with pytest.raises(ImportFailed, match="holds 2 objects; choose by `item` 1 to 2"):
+    with refused(ImportFailed, "holds-objects-choose-by-item-to"):
         import_file(path)
-    with pytest.raises(ImportFailed, match="choose by `item` 1 to 2"):
+    with refused(ImportFailed, "choose-by-item-to"):
         import_file(path, item=3)
 
 
@@ -87,9 +88,7 @@ def test_binary_keeps_every_bit_of_uneven_frequencies_where_ascii_keeps_six_digi
 
 @pytest.mark.parametrize(("format_", "encoding"), [("mat", "ascii"), ("uff", "hex")])
 def test_an_encoding_is_one_of_two_and_of_universal_files(multisine_file, format_, encoding, tmp_path):
-    with pytest.raises(
-        ConfigurationError, match=f"`encoding` = '{encoding}': allowed is ascii or binary, of format uff"
-    ):
+    with pytest.raises(ConfigurationError, match=f"`encoding` = '{encoding}'; allowed: ascii or binary, of format uff"):
         export_file(multisine_file, tmp_path / f"out.{format_}", format_, encoding=encoding)
 
 
@@ -101,7 +100,7 @@ def test_time_data_of_one_level_give_the_same_best_linear_approximation(multisin
         found = import_file(path, mapping=mapping(tmp_path, [2 * number + 1, 2 * number + 2], "voltage"))
         np.testing.assert_allclose(found.value, matrix.value, rtol=1e-10)
         np.testing.assert_allclose(found.noise_covariance, matrix.noise_covariance, rtol=1e-3, atol=1e-12)
-    with pytest.raises(ImportFailed, match="records: 9, the data has 1 to 4"):
+    with refused(ImportFailed, "the-data-has-to", field="records"):
         import_file(path, mapping=mapping(tmp_path, [9], "voltage"))
 
 
@@ -111,7 +110,7 @@ def test_load_cases_of_another_program_are_taken_apart_where_a_response_is_there
     for number, value in enumerate(values, 1):
         np.testing.assert_allclose(import_file(path, item=number).value[:, 0, 0], value)
     path = written(tmp_path / "b.uff", units(), *(response(v) for v in values))
-    with pytest.raises(ImportFailed, match=r"a second response of .* in load case 0; wanted is one"):
+    with refused(ImportFailed, "second-response-of-in-load-case"):
         import_file(path)
 
 
@@ -129,7 +128,7 @@ def test_sep005_has_the_recorded_signals_and_its_own_check_accepts_them(multisin
         second = time_series(recording, point=2, columns=["force"])
         assert len(second) == 1
         assert second[0]["start_timestamp"] > recording.started
-        with pytest.raises(RecordingError, match="`columns` = 'froce'"):
+        with refused(RecordingError, field="columns", value="froce"):
             time_series(recording, columns=["froce"])
 
 
@@ -168,20 +167,20 @@ def test_series_of_sep005_come_in_by_a_mapping_as_time_data_of_a_file_do(multisi
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
-        ({"data": [[1.0]]}, r"series\[0\].data: has shape \(1, 1\)"),
-        ({"data": "x"}, r"series\[0\].data: allowed is a list of numbers"),
-        ({"fs": None}, r"series\[0\].fs: is missing, and so is time"),
-        ({"fs": -1.0}, r"series\[0\].fs = -1.0: allowed is a number above 0"),
-        ({"fs": None, "time": [0.0, 1.0, 3.0]}, r"series\[0\].time: allowed are evenly spaced instants"),
-        ({"name": 3}, r"series\[0\].name = 3: allowed is a text"),
-        ({"fs": 20.0}, "sample rates from 10 to 20 Hz"),
+        ({"data": [[1.0]]}, {"says": "series-data-has-shape"}),
+        ({"data": "x"}, {"says": "series-data-allowed-is-list-of"}),
+        ({"fs": None}, {"says": "series-fs-is-missing-and-so"}),
+        ({"fs": -1.0}, {"field": "series[0].fs", "value": -1.0, "allowed": "a number above 0"}),
+        ({"fs": None, "time": [0.0, 1.0, 3.0]}, {"says": "series-time-allowed-are-evenly-spaced"}),
+        ({"name": 3}, {"field": "series[0].name", "value": 3, "allowed": "a text"}),
+        ({"fs": 20.0}, {"says": "sample-rates-from-to-hz"}),
     ],
 )
 def test_series_that_do_not_follow_sep005_are_refused_in_one_line(change, fault, tmp_path):
     good = {"data": [1.0, 2.0, 3.0], "name": "force", "unit_str": "N", "fs": 10.0}
-    with pytest.raises(ImportFailed, match=fault):
+    with refused(ImportFailed, **fault):
         import_sep005([{**good, **change}, {**good, "name": "drive"}], mapping(tmp_path, None, "output_v"))
-    with pytest.raises(ImportFailed, match="series: allowed is a list"):
+    with refused(ImportFailed, "series-allowed-is-list"):
         import_sep005(good, mapping(tmp_path, None, "output_v"))
 
 

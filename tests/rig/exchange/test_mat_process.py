@@ -15,6 +15,7 @@ from rig.exchange.child_values import read_values, write_values
 from rig.exchange.file_data import ChannelFacts, FileData
 from rig.exchange.mat import read_mat
 from rig.system.child import ChildFailed
+from tests.refused import refused
 
 THINGS = {
     "numbers": np.arange(12.0).reshape(3, 4),
@@ -98,7 +99,7 @@ CRASHES_SCIPY = (
 
 def test_a_file_that_crashes_scipy_is_refused_in_one_line(tmp_path):
     (tmp_path / "broken.mat").write_bytes(zlib.decompress(base64.b85decode(CRASHES_SCIPY)))
-    with pytest.raises(ImportFailed, match=r"broken\.mat: is no MAT file, or a damaged one"):
+    with refused(ImportFailed, "broken-mat-is-no-file-or"):
         read_mat(tmp_path / "broken.mat")
 
 
@@ -108,9 +109,9 @@ def test_a_file_that_ends_its_reader_is_one_line(path, monkeypatch, how):
         raise ChildFailed(how)
 
     monkeypatch.setattr(child_reading, "ask_child", ended)
-    with pytest.raises(ImportFailed) as refused:
+    with pytest.raises(ImportFailed) as caught:
         read_mat(path)
-    assert str(refused.value) == f"{path}: is no MAT file, or a damaged one (reading it {how})"
+    assert str(caught.value) == f"{path}: is no MAT file, or a damaged one (reading it {how})"
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -10,6 +10,7 @@ from identification import stepped_sine_mode
 from rig.errors import ConfigurationError
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.reading import read_frequency_responses, read_mapping
+from tests.refused import refused
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "brake-reuss-mapping.toml"
 LEVELS = [5, 20, 30, 40, 50, 60, 70, 80]
@@ -54,19 +55,23 @@ def test_the_shipped_example_reads_a_file_of_the_same_layout(mat_path: Path) -> 
 def test_a_missing_path_names_both_files_and_what_there_is(mat_path: Path, tmp_path: Path) -> None:
     wrong = tmp_path / "wrong.toml"
     wrong.write_text(EXAMPLE.read_text().replace("FRdata.ForceControl", "FRdata.Force"))
-    message = r"responses\.mat does not fit .*wrong\.toml: sets\[0\]\.levels: .*no 'Force' at 'FRdata', which has Force"
-    with pytest.raises(ImportFailed, match=message):
+    message = {"says": "responses-mat-does-not-fit-wrong"}
+    with refused(ImportFailed, **message):
         read_frequency_responses(mat_path, wrong)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('force = "N"', 'force = "dyn"', r"units\.force = 'dyn': allowed is 'N', 'mN', 'kN', 'lbf' or 'kgf'"),
-        ('unit = "rad"', 'unit = "rad"\nsign = 1', r"phase\.sign: unknown key"),
-        ('values = "peak"', "", r"units\.values: is missing"),
-        ("[5, 20,", "[-5, 20,", r"sets\[1\]\.level_values\[0\] = -5: allowed is greater than 0"),
-        ("[units]", "[units", r"is not TOML"),
+        (
+            'force = "N"',
+            'force = "dyn"',
+            {"field": "units.force", "value": "dyn", "allowed": "'N', 'mN', 'kN', 'lbf' or 'kgf'"},
+        ),
+        ('unit = "rad"', 'unit = "rad"\nsign = 1', {"says": "unknown-key", "field": "phase.sign"}),
+        ('values = "peak"', "", {"says": "missing", "field": "units.values"}),
+        ("[5, 20,", "[-5, 20,", {"field": "sets[1].level_values[0]", "value": -5, "allowed": "greater than 0"}),
+        ("[units]", "[units", {"says": "is-not"}),
     ],
 )
 def test_a_wrong_mapping_is_named_in_one_line(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -74,15 +79,15 @@ def test_a_wrong_mapping_is_named_in_one_line(tmp_path: Path, old: str, new: str
     assert old in text
     path = tmp_path / "mapping.toml"
     path.write_text(text.replace(old, new))
-    with pytest.raises(ConfigurationError, match=message) as caught:
+    with refused(ConfigurationError, **message) as caught:
         read_mapping(path)
     assert "\n" not in str(caught.value)
 
 
 def test_files_that_cannot_be_read_are_said_so(tmp_path: Path) -> None:
-    with pytest.raises(ImportFailed, match=r"nowhere\.mat: there is no such file"):
+    with refused(ImportFailed, "nowhere-mat-there-is-no-such"):
         read_frequency_responses(tmp_path / "nowhere.mat", EXAMPLE)
-    with pytest.raises(ConfigurationError, match=r"nowhere\.toml: there is no such file"):
+    with refused(ConfigurationError, "nowhere-toml-there-is-no-such"):
         read_mapping(tmp_path / "nowhere.toml")
 
 
@@ -90,7 +95,7 @@ def test_files_that_cannot_be_read_are_said_so(tmp_path: Path) -> None:
 def test_a_file_that_is_no_mat_file_is_said_so(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "foreign.mat"
     path.write_bytes(content)
-    with pytest.raises(ImportFailed, match=r"foreign\.mat: is no MAT file, or a damaged one"):
+    with refused(ImportFailed, "foreign-mat-is-no-file-or"):
         read_frequency_responses(path, EXAMPLE)
 
 
@@ -99,7 +104,7 @@ def test_a_mat_file_with_damaged_compressed_data_is_said_so(mat_path: Path) -> N
     content = bytearray(mat_path.read_bytes())
     content[-200] ^= 0xFF
     mat_path.write_bytes(content)
-    with pytest.raises(ImportFailed, match=r"is no MAT file, or a damaged one \(.*decompressing"):
+    with refused(ImportFailed, "is-no-file-or-damaged-one"):
         read_frequency_responses(mat_path, EXAMPLE)
 
 
@@ -107,7 +112,7 @@ def test_a_mat_file_with_damaged_compressed_data_is_said_so(mat_path: Path) -> N
 def test_a_truncated_mat_file_is_said_so(mat_path: Path, kept: float) -> None:
     content = mat_path.read_bytes()
     mat_path.write_bytes(content[: int(kept * len(content))])
-    with pytest.raises(ImportFailed, match=r"responses\.mat"):
+    with refused(ImportFailed, "responses-mat"):
         read_frequency_responses(mat_path, EXAMPLE)
 
 
@@ -115,7 +120,7 @@ def test_a_mat_file_of_version_7_3_without_content_is_said_to_be_damaged(tmp_pat
     path = tmp_path / "new.mat"
     header = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
     path.write_bytes(header.ljust(512, b"\0"))
-    with pytest.raises(ImportFailed, match=r"is no MAT file, or a damaged one"):
+    with refused(ImportFailed, "is-no-file-or-damaged-one-2"):
         read_frequency_responses(path, EXAMPLE)
 
 

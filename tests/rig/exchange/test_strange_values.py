@@ -8,6 +8,7 @@ import pytest
 from rig.errors import RigError
 from rig.exchange.reading import import_file
 from rig.exchange.sep005 import data_of_series
+from tests.refused import refused
 
 MAPPING = """kind = "time-data"
 sample_rate_hz = 1000.0
@@ -38,10 +39,10 @@ def test_a_strange_table_is_refused_in_one_line(tmp_path, what):
     (tmp_path / "x.csv").write_text(TABLES[what])
     (tmp_path / "m.toml").write_text(MAPPING % "")
     for mapping in (None, tmp_path / "m.toml"):
-        with pytest.raises(RigError, match=r"x\.csv") as refused:
+        with refused(RigError, "csv") as caught:
             import_file(tmp_path / "x.csv", mapping=mapping)
-        assert "\n" not in str(refused.value)
-        assert len(str(refused.value)) < 500
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 500
 
 
 @pytest.mark.parametrize("what", [name for name in TABLES if "ours" not in name and "JSON" not in name])
@@ -56,7 +57,7 @@ def test_of_a_strange_table_a_mapping_is_proposed_or_refused(tmp_path, command, 
     "time", [[1, 1], [2, 1], [1, np.nan], ["a", "b"], [[1, 2]], [None, 1], [0, 10**400], "ab", {}, 3]
 )
 def test_instants_that_do_not_increase_evenly_are_refused(time):
-    with pytest.raises(RigError, match=r"series\[0\]\.time: allowed are evenly spaced instants that increase"):
+    with refused(RigError, "series-time-allowed-are-evenly-spaced"):
         data_of_series([{"data": [1.0, 2.0], "name": "F", "unit_str": "N", "time": time}])
 
 
@@ -69,10 +70,10 @@ def test_a_strange_value_in_a_series_is_refused_by_its_key(key, value):
     if isinstance(value, str) and key in ("name", "unit_str"):
         assert data_of_series([one]).sample_rate_hz == 100.0
         return
-    with pytest.raises(RigError) as refused:
+    with pytest.raises(RigError) as caught:
         data_of_series([one])
-    assert f"series[0].{key}" in str(refused.value)
-    assert len(str(refused.value)) < 500
+    assert f"series[0].{key}" in str(caught.value)
+    assert len(str(caught.value)) < 500
 
 
 @pytest.mark.parametrize(
@@ -84,5 +85,5 @@ def test_a_mapping_reads_no_file_outside_its_folder(tmp_path, name):
     for path in (tmp_path / "x.csv", folder / "x.csv", folder / "sub" / "x.csv"):
         path.write_text(f"F,a\n{ROWS}")
     (folder / "m.toml").write_text(MAPPING % f", file = {json.dumps(name)}")
-    with pytest.raises(RigError, match=r"allowed is the name of a file beside"):
+    with refused(RigError, "allowed-is-the-name-of-file"):
         import_file(folder / "x.csv", mapping=folder / "m.toml")

@@ -13,6 +13,7 @@ from rig.exchange.export import write_contents
 from rig.exchange.reading import import_file
 from rig.exchange.uff.reading import read_uff, time_data_in
 from rig.results.time_data.series import TimeData
+from tests.refused import refused
 from tests.rig.exchange.conftest import CHANNELS
 
 FREQUENCY = np.arange(20.0, 30.0, 0.5)
@@ -161,9 +162,7 @@ def test_units_of_dataset_164_divide(tmp_path):
 @pytest.mark.parametrize(("choice", "factor"), [("labels", 1.0), ("file", 1e-3), ("si", 1.0)])
 def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
     path = written(tmp_path / "mixed.uff", units(5, 1000.0, 1.0), response(np.ones(20), label="m/s^2", force_label="N"))
-    with pytest.raises(
-        ImportFailed, match=r"mixed units: the ordinate is labelled m/s\^2 .* dataset 164 says MM .*`units`"
-    ):
+    with refused(ImportFailed, "mixed-units-the-ordinate-is-labelled"):
         import_file(path)
     np.testing.assert_allclose(import_file(path, units=choice).value, factor)
 
@@ -201,7 +200,7 @@ def test_a_truncated_file_is_said_so(matrix, tmp_path, kept):
     write_contents([taken_apart(matrix)], path, "uff")
     content = path.read_bytes()
     path.write_bytes(content[: int(kept * len(content))])
-    with pytest.raises(ImportFailed, match=r"matrix\.uff.*(cut short|damaged|of 401 values)"):
+    with refused(ImportFailed, "matrix-uff-cut-short-damaged-of"):
         import_file(path)
 
 
@@ -209,16 +208,16 @@ def test_a_truncated_file_is_said_so(matrix, tmp_path, kept):
 def test_a_file_that_is_no_universal_file_is_said_so(tmp_path, content):
     path = tmp_path / "foreign.uff"
     path.write_bytes(content)
-    with pytest.raises(ImportFailed, match=r"foreign\.uff: is no universal file"):
+    with refused(ImportFailed, "foreign-uff-is-no-universal-file"):
         import_file(path)
 
 
 def test_rates_and_lengths_that_disagree_are_named(tmp_path):
     path = written(tmp_path / "rates.uff", signal(np.ones(10)), signal(np.ones(10), node=2, rate=1100.0))
-    with pytest.raises(ImportFailed, match=r"sample rate 1100 Hz, that of the first is 1000 Hz"):
+    with refused(ImportFailed, "sample-rate-hz-that-of-the"):
         time_data_in(read_uff(path))
     path = written(tmp_path / "lengths.uff", signal(np.ones(10)), signal(np.ones(12)))
-    with pytest.raises(ImportFailed, match=r"1\+Z has 12 samples, before 10"):
+    with refused(ImportFailed, "has-samples-before"):
         time_data_in(read_uff(path))
 
 
@@ -261,13 +260,13 @@ def test_a_modal_mass_in_other_units_is_converted(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "drive", "message"),
     [
-        ({}, "", r"`drive`: is '', .*allowed are 1\+Z, 7\+Y, 7\+Z"),
-        ({}, "3+X", r"`drive`: is '3\+X'"),
-        ({"modal_m": 0.0}, "1+Z", r"modal mass 0, wanted is a real shape and a modal mass above zero"),
-        ({axis: np.array([1j, 1.0]) for axis in ("r1", "r2", "r3")}, "1+Z", r"wanted is a real shape"),
+        ({}, "", {"field": "drive", "value": "", "allowed": "1+Z, 7+Y, 7+Z"}),
+        ({}, "3+X", {"field": "drive", "value": "3+X"}),
+        ({"modal_m": 0.0}, "1+Z", {"says": "modal-mass-wanted-is-real-shape"}),
+        ({axis: np.array([1j, 1.0]) for axis in ("r1", "r2", "r3")}, "1+Z", {"says": "wanted-is-real-shape"}),
     ],
 )
 def test_modes_that_cannot_be_normalised_are_refused(tmp_path, changes, drive, message):
     path = written(tmp_path / "modes.uff", units(), mode(**changes))
-    with pytest.raises(ImportFailed, match=message):
+    with refused(ImportFailed, **message):
         import_file(path, drive=drive)

@@ -15,6 +15,7 @@ from rig.live.place import base_folder, lives, new_folder, runs
 from rig.live.publisher import Live, Publisher, published
 from rig.live.reader import LiveRun, run_into
 from rig.tick.safety.layout import GuardMode
+from tests.refused import refused
 from tests.rig.live.writer import BENCH, FACTS, ROWS, chunk, made_loop
 
 WRITER = "tests.rig.live.writer"
@@ -149,7 +150,7 @@ def test_an_ended_run_can_be_read_to_its_last_line_by_whoever_had_it_open():
         live.line("end", {"text": "over"})
     assert not run.connected
     assert run.lines(0) == [{"text": "over", "is": "end"}]
-    with pytest.raises(RecordingError, match="is no run under way"):
+    with refused(RecordingError, "is-no-run-under-way"):
         LiveRun(live.folder)
     run.close()
 
@@ -197,7 +198,7 @@ def test_a_request_needs_no_text_for_the_memory_may_be_full(monkeypatch):
 def test_a_request_that_cannot_be_left_is_an_error():
     with Publisher(FACTS, N) as live:
         run = LiveRun(live.folder)
-    with pytest.raises(RecordingError, match="use the hardware stop"):
+    with refused(RecordingError, "use-the-hardware-stop"):
         run.request_stop("too late")
     run.close()
 
@@ -248,7 +249,7 @@ def test_an_error_in_publishing_is_told_once_and_raised_never():
 def test_a_folder_of_somebody_else_is_refused(monkeypatch, place):
     base_folder()
     monkeypatch.setattr(os, "getuid", lambda: place.stat().st_uid + 1)
-    with pytest.raises(RecordingError, match="belongs to somebody else; set VIBROLOCK_LIVE"):
+    with refused(RecordingError, "belongs-to-somebody-else-set"):
         base_folder()
     assert runs() == []
     remarks = []
@@ -261,14 +262,14 @@ def test_a_link_in_place_of_the_folder_is_refused(place, tmp_path):
     place.parent.mkdir()
     (tmp_path / "elsewhere").mkdir()
     place.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(RecordingError, match="belongs to somebody else"):
+    with refused(RecordingError, "belongs-to-somebody-else"):
         base_folder()
 
 
 def test_a_run_of_another_version_is_refused(monkeypatch):
     with Publisher(FACTS, N) as live:
         monkeypatch.setattr("rig.live.reader.BINS", BINS + 1)
-        with pytest.raises(RecordingError, match="another version"):
+        with refused(RecordingError, "another-version"):
             LiveRun(live.folder)
         assert lives(live.folder)
 

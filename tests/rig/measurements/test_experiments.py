@@ -13,6 +13,7 @@ from rig.measurements import point_rows, spectra
 from rig.measurements.experiments import default_rate_hz, experiments
 from rig.measurements.experiments.signals import Signals
 from tests.recorded import recorded_run
+from tests.refused import refused
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.lossy import lose
 from tests.rig.rigs import bench_with
@@ -130,7 +131,7 @@ def test_a_settled_point_of_which_no_stretch_is_left_is_not_used(monkeypatch):
     lose(monkeypatch, [(k, k + 1) for k in range(997, 400_000, 1009)])
     with (
         rig.run(plan_with(levels_v=(0.6,), record_periods=20), seed=1) as run,
-        pytest.raises(IdentificationError, match="long enough"),
+        refused(IdentificationError, "long-enough"),
     ):
         run.experiments()
 
@@ -138,7 +139,7 @@ def test_a_settled_point_of_which_no_stretch_is_left_is_not_used(monkeypatch):
 def test_points_that_were_not_accepted_are_never_used():
     with (
         rig.run(plan_with(levels_v=(0.6,), accepted_phase_error_deg=1e-6), seed=1) as run,
-        pytest.raises(IdentificationError, match="none of the recording was accepted"),
+        refused(IdentificationError, "none-of-the-recording-was-accepted", field="points"),
     ):
         run.experiments()
 
@@ -169,24 +170,27 @@ def test_the_rate_is_a_round_number_near_25_a_period_and_at_most_the_recordings(
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"rate_hz": 9000.0}, "rate_hz: is 9000 Hz, allowed is up to 5000 Hz"),
-        ({"rate_hz": 800.2}, "whole multiples of 0.5 Hz"),
-        ({"inputs": ["current"]}, "inputs: there is no channel current; channels are force, drive"),
-        ({"outputs": ["force"]}, "outputs: force is an input already"),
-        ({"outputs": []}, "outputs: none given"),
-        ({"periods": "some"}, "periods: is 'some', allowed are mean, all"),
-        ({"transient_periods": -1.0}, "transient_periods: is -1"),
-        ({"segment_periods": 3}, "segment_periods: is 3, needs 8"),
+        (
+            {"rate_hz": 9000.0},
+            {"field": "rate_hz", "value": 9000.0, "allowed": "up to 5000 Hz, as fast as was recorded"},
+        ),
+        ({"rate_hz": 800.2}, {"says": "whole-multiples-of-hz", "field": "rate_hz", "value": 800.2}),
+        ({"inputs": ["current"]}, {"says": "there-is-no-channel-current-channels", "field": "inputs"}),
+        ({"outputs": ["force"]}, {"says": "force-is-an-input-already", "field": "outputs"}),
+        ({"outputs": []}, {"says": "none-given", "field": "outputs"}),
+        ({"periods": "some"}, {"field": "periods", "value": "some", "allowed": "mean, all"}),
+        ({"transient_periods": -1.0}, {"field": "transient_periods", "value": -1.0}),
+        ({"segment_periods": 3}, {"field": "segment_periods", "value": 3, "allowed": "8 at least"}),
     ],
 )
 def test_what_cannot_be_is_refused_by_name(multisine, asked, said):
-    with pytest.raises(IdentificationError, match=said):
+    with refused(IdentificationError, **said):
         multisine.experiments(**asked)
 
 
 def test_a_continuous_backbone_holds_no_experiments(multisine, monkeypatch):
     monkeypatch.setattr(type(multisine.recording), "kind", "continuous-backbone")
-    with pytest.raises(RecordingError, match=r"holds a continuous-backbone, wanted is a .* a multisine"):
+    with refused(RecordingError, "holds-continuous-backbone-wanted-is-mult"):
         experiments(multisine.recording)
 
 

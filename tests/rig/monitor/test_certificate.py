@@ -94,7 +94,7 @@ def test_files_that_are_of_no_use_are_named_in_one_line(files, tmp_path, wrong):
         key.write_bytes(_locked(key.read_bytes()))
     else:
         certificate = tmp_path
-    with pytest.raises(ConfigurationError, match=r"^`certificate` = .*, `key` = .*: .*; allowed are .*") as error:
+    with pytest.raises(ConfigurationError, match=r"^`certificate` = .*, `key` = .*: .*; allowed: .*") as error:
         Address(certificate=certificate, key=key).secured()
     assert "\n" not in str(error.value)
 

@@ -25,6 +25,7 @@ from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import GuardMode
 from tests.recorded import recorded_at
+from tests.refused import refused
 from tests.rig.campaigns.running.test_runs import plan_with
 from tests.rig.rigs import bench_with
 
@@ -205,10 +206,10 @@ def test_what_a_page_asks_for_is_done(watched):
 
 
 def test_there_is_nothing_to_stop_and_no_speed_of_nothing(watched):
-    with Replay(watched[0]) as replay, pytest.raises(RecordingError, match="there is nothing to stop"):
+    with Replay(watched[0]) as replay, refused(RecordingError, "there-is-nothing-to-stop"):
         replay.request_stop("please")
     for speed in (0.0, -1.0, math.nan, 1001.0):
-        with pytest.raises(RecordingError, match="`speed` = "):
+        with refused(RecordingError, field="speed"):
             Replay(watched[0], speed)
 
 
@@ -355,5 +356,5 @@ def test_no_more_bins_than_of_a_run_under_way_are_kept(watched, monkeypatch):
 
 def test_other_files_are_refused_in_a_line(tmp_path):
     (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(RecordingError, match=r"text\.h5"):
+    with refused(RecordingError, "text"):
         Replay(tmp_path / "text.h5")

@@ -11,6 +11,7 @@ from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
+from tests.refused import refused
 from tests.rig.recording.samples import COLUMNS, ROW, all_rows, fill, header, journal, rows
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "file-format.md"
@@ -183,7 +184,7 @@ def test_a_journal_never_joins_a_file_of_another_recording(output):
     before = output.read_bytes()
     journal(journal_path(output), 10)
     for use in (Recording, continue_recording, lambda path: finalise(journal_path(path), path)):
-        with pytest.raises(RecordingError, match="is another recording than the journal beside it"):
+        with refused(RecordingError, "is-another-recording-than-the-journal"):
             use(output)
     assert output.read_bytes() == before
 
@@ -192,7 +193,7 @@ def test_a_continuing_journal_wants_its_file(output):
     with continue_recording(output) as writer:
         fill(writer, 10_000, 3)
     output.unlink()
-    with pytest.raises(RecordingError, match="missing, but its journal continues it"):
+    with refused(RecordingError, "missing-but-its-journal-continues-it"):
         Recording(output)
 
 
@@ -204,7 +205,7 @@ def test_a_continuing_journal_refuses_an_older_copy_of_its_file(output):
     with continue_recording(output) as writer:
         fill(writer, 10_003, 3)
     output.write_bytes(older)
-    with pytest.raises(RecordingError, match="holds 1 parts, but its journal continues it behind part 2"):
+    with refused(RecordingError, "holds-parts-but-its-journal-continues"):
         finalise(journal_path(output), output)
 
 
@@ -234,7 +235,7 @@ def test_a_journal_with_damage_amid_whole_blocks_is_kept_aside(tmp_path):
 def test_a_journal_without_parts_makes_no_file(tmp_path):
     path = tmp_path / "OUT.h5"
     JournalWriter.create(journal_path(path), header()).close()
-    with pytest.raises(RecordingError, match="nothing was recorded"):
+    with refused(RecordingError, "nothing-was-recorded"):
         finalise(journal_path(path), path)
     assert names(tmp_path) == ["OUT.h5.journal"]
 

@@ -70,22 +70,22 @@ def part_of(**told):
 @pytest.mark.parametrize(
     ("told", "message"),
     [
-        ({"events": [{"what": 3}]}, r"events\[0\]\.what = 3: allowed is a text"),
+        ({"events": [{"what": 3}]}, r"events\[0\]\.what`? = 3; allowed: a text"),
         (
             {"events": [{"what": "telemetry", "row": 0}]},
             r"events\[0\]: allowed is an event telemetry with row, sample and stride",
         ),
-        ({"events": [{"sample": "soon"}]}, r"events\[0\]\.sample = 'soon': allowed is a whole number from 0"),
+        ({"events": [{"sample": "soon"}]}, r"events\[0\]\.sample = 'soon'; allowed: a whole number from 0"),
         ({"events": [{"sample": 1.5}]}, r"allowed is a whole number from 0"),
         ({"events": [{"sample": 10**400}]}, r"allowed is a whole number from 0"),
-        ({"events": [{"stride": 0}]}, r"events\[0\]\.stride = 0: allowed is a whole number from 1"),
+        ({"events": [{"stride": 0}]}, r"events\[0\]\.stride = 0; allowed: a whole number from 1"),
         (
             {"points": [{"amplitude_m": 1e200}]},
-            r"points\[0\]\.amplitude_m = 1e\+200: allowed is a number up to 1e\+100",
+            r"points\[0\]\.amplitude_m = 1e\+200; allowed: a number up to 1e\+100",
         ),
         ({"points": [{"harmonics": [[1.0, -1e308]]}]}, r"points\[0\]\.harmonics\[0\]\[1\] = -1e\+308"),
-        ({"points": [{"accepted": "yes"}]}, r"points\[0\]\.accepted = 'yes': allowed is true or false"),
-        ({"end": {"text": ["ended"]}}, r"end\.text = \['ended'\]: allowed is a text"),
+        ({"points": [{"accepted": "yes"}]}, r"points\[0\]\.accepted`? = 'yes'; allowed: true or false"),
+        ({"end": {"text": ["ended"]}}, r"end\.text`? = \['ended'\]; allowed: a text"),
         ({"information": {"first_sample": -1}}, r"information\.first_sample = -1"),
     ],
 )

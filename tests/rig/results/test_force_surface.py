@@ -113,7 +113,7 @@ def test_its_levels_are_exported_as_the_frequency_responses_that_they_are(made, 
             "identify surface.h5 --model force-surface -o x.h5",
             "holds a force-surface; a force surface comes from respon",
         ),
-        ("predict surface.h5 --frequency-response 9 -o x.h5", "force_n: is 9 N, levels at lag"),
+        ("predict surface.h5 --frequency-response 9 -o x.h5", "force_n = 9 N: levels at lag"),
         (
             "predict surface.h5 --frequency-response 0.6 --force rms -o x.h5",
             "--force: means nothing to a force surface",

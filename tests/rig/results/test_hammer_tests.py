@@ -86,7 +86,7 @@ def test_the_refusal_names_an_option_that_there_is(hammer, tmp_path):
         ("--near 40,x", "--near = '40,x': allowed are frequencies above 0 Hz, with commas"),
         ("--near 40 --count 2", "--count: is the number of frequencies in --near"),
         ("--weighting most", "--weighting = 'most': allowed are auto, total, noise, relative"),
-        ("--near 4000", "modes: frequencies are 4000 Hz, allowed are"),
+        ("--near 4000", "modes: frequencies are 4000 Hz; allowed:"),
     ],
 )
 def test_wrong_options_are_refused_in_one_line(hammer, tmp_path, line, message):
@@ -105,6 +105,6 @@ def test_a_wrong_mapping_and_faulty_hits_are_named(hammer, tmp_path):
     assert "trigger" in hammer("import hits.mat --mapping hammer.toml -o other.h5").err
     (tmp_path / "hammer.toml").write_text(MAPPING.replace("2048.0", "2048.0\nrecord_s = 5.0"))
     refused = hammer("import hits.mat --mapping hammer.toml -o other.h5")
-    assert "0 of 5 count, needs two at least" in refused.err
+    assert "0 of 5 count; allowed: two at least" in refused.err
     assert "cut short" in refused.err
     assert not (tmp_path / "other.h5").exists()

@@ -106,7 +106,7 @@ def test_points_that_were_not_accepted_are_counted_in_a_note(
             "modal.h5 --model linear --resistance 3",
             "--resistance: means nothing to --model linear, which takes --estimator",
         ),
-        ("exciter.h5 --model exciter --band 20 22", "9 excited lines in 20 to 22 Hz, needs at least 20"),
+        ("exciter.h5 --model exciter --band 20 22", "9 excited lines in 20 to 22 Hz; allowed: at least 20"),
         ("exciter.h5 --model shaker", "--model = 'shaker'"),
         ("nothing.h5 --model exciter", "nothing.h5"),
     ],

@@ -297,7 +297,7 @@ def test_progress_says_which_start_is_compared(capsys):
         ("identify lines.h5 --model pnlss --degrees 1,3", "--degrees = '1,3': allowed are whole numbers from 2 to 12"),
         ("identify lines.h5 --model pnlss --input current", "--input = 'current': allowed are force, voltage"),
         ("identify lines.h5 --model pnlss --rate 0", "--rate = 0: allowed is any number above 0"),
-        ("identify lines.h5 --model pnlss --rate 9000", "rate_hz: is 9000 Hz, allowed is up to 5000 Hz"),
+        ("identify lines.h5 --model pnlss --rate 9000", "--rate = 9000 Hz; allowed: up to 5000 Hz"),
         ("identify lines.h5 --model pnlss --outputs nothing", "outputs: there is no channel nothing"),
         (
             "identify lines.h5 --model pnlss --validation sweep.h5 --hold-out 1",
@@ -312,11 +312,11 @@ def test_progress_says_which_start_is_compared(capsys):
         ("identify backbone.h5 --model pnlss", "backbone.h5 (backbone): no multisine among them"),
         (
             "identify lines.h5 --model pnlss --rate 60",
-            "rate_hz: is 60 Hz, lines.h5 is excited up to 35 Hz; allowed is above",
+            "--rate = 60 Hz: lines.h5 is excited up to 35 Hz; allowed: above",
         ),
         (
             "identify sweep.h5 lines.h5 --model pnlss --rate 777.7",
-            "sweep.h5 was recorded at 5000 Hz; allowed are ratios of",
+            "sweep.h5 was recorded at 5000 Hz; allowed: ratios of",
         ),
         (
             "identify lines.h5 --model pnlss --validation lines.h5",

@@ -167,7 +167,7 @@ def test_an_extrapolation_that_was_allowed_is_flagged(at_shelf):
         ("NM.h5 --frequency-response 0", "--frequency-response = 0: allowed is any number above 0, N"),
         ("NM.h5 --frequency-response nan", "--frequency-response = nan: allowed is any number above 0, N"),
         ("NM.h5 --frequency-response -0.1", "--frequency-response = -0.1: allowed is any number above 0, N"),
-        ("NM.h5 --frequency-response 1e-12", "force_n: is 1e-12 N, too small"),
+        ("NM.h5 --frequency-response 1e-12", "force_n = 1e-12 N: too small"),
         (
             "NM.h5 --frequency-response 2",
             "measure higher levels, or allow extrapolation (--allow-",

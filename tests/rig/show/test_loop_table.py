@@ -11,6 +11,7 @@ from rig.figures.lateness import exceedance, together
 from rig.recording.reader import Recording
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 
 PLAN = SweepPlan(bench="magnet-beam", levels_v=(0.4,), start_hz=20.0, stop_hz=22.0, rate_hz_per_s=2.0)
@@ -46,7 +47,7 @@ def test_the_lateness_is_drawn_where_a_clock_paced_the_loop_and_else_refused(com
     command("plot", paced, "--lateness", "-o", "late.png").succeeded()
     assert (tmp_path / "late.png").stat().st_size > 10_000
     rig.run(PLAN, output=tmp_path / "quick.h5").close()
-    with pytest.raises(RecordingError, match=r"quick\.h5: its loop did not run by the clock"):
+    with refused(RecordingError, "quick-its-loop-did-not-run"):
         plot(tmp_path / "quick.h5", tmp_path / "quick.png", lateness=True)
 
 

@@ -12,6 +12,7 @@ from rig.tick.layout import ROW_COLUMNS
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
 from rig.tick.tick import Tick
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 from tests.rig.tick.blocks import nothing_told
 
@@ -104,11 +105,11 @@ def test_every_recorded_column_is_described():
 
 
 def test_a_lead_below_one_sample_is_refused():
-    with pytest.raises(ConfigurationError, match="loop_delay_samples"):
+    with refused(ConfigurationError, field="loop_delay_samples", value=0.5):
         _tick(0.5)
 
 
 def test_a_law_that_the_bench_cannot_sample_is_refused():
     law = preset("friction-beam").model_copy(update={"frequency_window_hz": (100.0, 1400.0)})
-    with pytest.raises(ConfigurationError, match=r"controller\.frequency_window_hz"):
+    with refused(ConfigurationError, "frequency-window-hz-ends-at-hz", field="controller"):
         _tick(1.5, law=law)

@@ -47,7 +47,7 @@ def test_the_highest_level_keeps_the_tip_within_its_limit(tuned):
 
 def test_a_level_asked_for_that_takes_the_tip_beyond_its_limit_is_refused(tmp_path):
     with pytest.raises(
-        ConfigurationError, match=r"`to_m` = 0\.001 m: allowed is up to 0\.0005\d+ m, where .*'acc_magnet'"
+        ConfigurationError, match=r"`to_m` = 0\.001 m; allowed: up to 0\.0005\d+ m, where .*'acc_magnet'"
     ):
         tune(far_tip(), tmp_path / "test.h5", TuningRequest(level_rms_v=0.02, to_m=0.001))
 

@@ -3,6 +3,7 @@ import pytest
 
 from simulators.analysis.frequency_responses import frequency_response
 from simulators.simulation import Simulation
+from tests.refused import refused
 from tests.simulators.analysis.rigs import DAMPING_RATIO, FREQUENCY_HZ, SHAPE, one_mode
 from tests.simulators.references import ideal
 
@@ -62,7 +63,7 @@ def test_held_is_what_a_simulation_samples(frequency_hz: float) -> None:
 
 
 def test_bad_frequencies_are_named() -> None:
-    with pytest.raises(ValueError, match=r"frequencies_hz = 0: allowed is above 0"):
+    with refused(ValueError, field="frequencies_hz", value=0.0, allowed="above 0"):
         frequency_response(one_mode(), [10.0, 0.0])
-    with pytest.raises(ValueError, match=r"frequencies_hz = 2500: allowed is below 2500"):
+    with refused(ValueError, field="frequencies_hz", value=2500.0, allowed="below 2500, half the sample rate"):
         frequency_response(one_mode(), [2500.0], held=True)

@@ -8,6 +8,7 @@ from simulators.analysis import phase_resonance_backbone
 from simulators.analysis.balance import Balance
 from simulators.analysis.conditions import Conditions
 from simulators.virtual_rig import VirtualRig
+from tests.refused import refused
 from tests.simulators.analysis.rigs import every_site
 from tests.simulators.references import EquationsOfMotion, ideal
 
@@ -79,7 +80,7 @@ def test_jacobian_agrees_with_finite_differences(at: str) -> None:
 
 def test_what_a_pure_sine_cannot_be_given_is_named() -> None:
     rig = VirtualRig.shipped("magnet-beam")
-    with pytest.raises(ValueError, match="voltages_v: allowed with excitation = 'exciter'"):
+    with refused(ValueError, "allowed-with-excitation-exciter", field="voltages_v"):
         phase_resonance_backbone(rig, voltages_v=[1.0], excitation="pure-sine")
-    with pytest.raises(ValueError, match="excitation = 'square': allowed is exciter or pure-sine"):
+    with refused(ValueError, field="excitation", value="square", allowed="exciter or pure-sine"):
         phase_resonance_backbone(rig, forces_n=[1.0], excitation="square")

@@ -240,14 +240,14 @@ def test_site_force_has_no_slope_at_rest_but_what_was_declared(element: Element)
     [
         ({"function": "nothing_here:spring"}, "No module named 'nothing_here'"),
         ({"function": f"{__name__}:no_such_name"}, "no_such_name"),
-        ({"function": "spring"}, "allowed is 'module:name'"),
+        ({"function": "spring"}, "allowed: 'module:name'"),
         ({"function": "math:sin"}, "is a builtin_function_or_method, allowed is a numba cfunc"),
         ({"function": of_one_argument}, r"is c_double\(c_double\), allowed is a numba cfunc"),
         ({"function": ctypes.CDLL(None).labs}, r"is c_int\(\), allowed is"),
-        ({"function": pushing_at_rest}, "gives 1 N at rest, allowed is 0"),
-        ({"function": undefined_at_rest}, "gives nan at 0, allowed is a finite force"),
+        ({"function": pushing_at_rest}, "gives 1 N at rest; allowed: 0"),
+        ({"function": undefined_at_rest}, "gives nan at 0; allowed: a finite force"),
         ({"function": NAME, "parameters": [1.0] * 9}, "at most 8 items"),
-        ({"function": drag, "of": "velocity", "linear_n_m": 1.0}, "linear_n_m = 1.0: allowed is 0"),
+        ({"function": drag, "of": "velocity", "linear_n_m": 1.0}, "linear_n_m`? = 1; allowed: 0"),
     ],
 )
 def test_a_users_function_that_cannot_work_is_refused(element: dict[str, Any], message: str) -> None:

@@ -8,9 +8,20 @@ from hypothesis import given, strategies as st
 from rig.errors import ConfigurationError
 from studies.matrix.rows import Row, Verified, read_rows, write_rows
 from studies.matrix.table import print_matrix
+from tests.refused import refused
 
-OURS = {"bench": "magnet-beam", "driver": "serial", "utc": "2026-11-23T12:00:00+00:00", "version": "0.1.0"}
-THEIRS = {"bench": "their-beam", "driver": "can", "utc": "2027-02-01T09:30:00+00:00", "version": "0.2.0"}
+OURS = {
+    {"says": "bench", "field": "row[0].bench"}: "magnet-beam",
+    "driver": "serial",
+    "utc": "2026-11-23T12:00:00+00:00",
+    "version": "0.1.0",
+}
+THEIRS = {
+    {"says": "bench", "field": "row[0].bench"}: "their-beam",
+    "driver": "can",
+    "utc": "2027-02-01T09:30:00+00:00",
+    "version": "0.2.0",
+}
 SUITE = Verified(utc="2026-11-24T12:00:00+00:00", passed=25, failed=1, not_applicable=5, failures=("stop: 0.05 V",))
 
 
@@ -41,7 +52,7 @@ positive = st.floats(1e-6, 1e6)
     )
 )
 def test_rows_are_read_as_they_were_written(tmp_path_factory, suffix, made):
-    path = tmp_path_factory.getbasetemp() / f"rows{suffix}"
+    path = tmp_path_factory.getbasetemp() / {"field": "row"}
     write_rows(path, [made, row()])
     assert read_rows(path) == [made, row()]
 
@@ -49,15 +60,15 @@ def test_rows_are_read_as_they_were_written(tmp_path_factory, suffix, made):
 @pytest.mark.parametrize(
     ("text", "named"),
     [
-        ("no table", "cannot be read"),
-        ('[[row]]\nway = "x"', "bench"),
-        ('[[rows]]\nway = "x"', "rows"),
-        ("row = 3", "row"),
+        ("no table", {"says": "cannot-be-read"}),
+        ('[[row]]\nway = "x"', {"says": "bench", "field": "row[0].bench"}),
+        ('[[rows]]\nway = "x"', {"field": "row"}),
+        ("row = 3", {"field": "row", "value": 3}),
     ],
 )
 def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, text, named):
     (tmp_path / "theirs.toml").write_text(text)
-    with pytest.raises(ConfigurationError, match=named) as caught:
+    with refused(ConfigurationError, **named) as caught:
         read_rows(tmp_path / "theirs.toml")
     assert "theirs.toml" in str(caught.value)
     assert "\n" not in str(caught.value)

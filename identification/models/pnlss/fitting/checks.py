@@ -39,8 +39,9 @@ def check_enough(experiments: Sequence[Experiment], parameters: int) -> None:
     values = sum(e.counted * len(e.output_channels) for e in experiments)
     if values < parameters:
         raise IdentificationError(
-            f"experiments: {values} values of outputs count, fewer than the {parameters} parameters; "
-            "give more data, or take fewer features or states"
+            f"{values} values of outputs count, fewer than the {parameters} parameters; give more data, or "
+            "take fewer features or states",
+            field="experiments",
         )
 
 
@@ -55,7 +56,7 @@ def check_data(
     check_signals(experiments)
     if not np.array_equal(start.state_features.limits, start.output_features.limits):
         raise IdentificationError(
-            "output_features: have other limits than state_features; a fit needs the same for both"
+            "have other limits than state_features; a fit needs the same for both", field="output_features"
         )
     for kind, group in (("experiments", experiments), ("validation", validation)):
         for index, experiment in enumerate(group):
@@ -83,7 +84,8 @@ def _check_validation(experiments: Sequence[Experiment], validation: Sequence[Ex
         if twin is not None:
             name = f" ({one.name})" if one.name else ""
             raise IdentificationError(
-                f"validation[{index}]{name}: has the samples of experiments[{twin}]; validate on data that is not trained on"
+                f"has the samples of experiments[{twin}]; validate on data that is not trained on",
+                where=f"validation[{index}]{name}",
             )
     for row, channel in enumerate(validation[0].output_channels if validation else ()):
         if not any(np.any(one.counted_outputs[row]) for one in validation):
@@ -96,21 +98,26 @@ def check_resumed(start: PnlssModel, resume: PnlssFit, estimated: int, validated
         mine, theirs = getattr(start, name).shape, getattr(resume.last, name).shape
         if mine != theirs:
             raise IdentificationError(
-                f"resume: its {name} has shape {theirs}, that of the start {mine}; give the same start"
+                f"its {name} has shape {theirs}, that of the start {mine}; give the same start", field="resume"
             )
     for name in ("state_features", "output_features"):
         mine, theirs = getattr(start, name), getattr(resume.last, name)
         if not np.array_equal(mine.exponents, theirs.exponents) or mine.functions != theirs.functions:
-            raise IdentificationError(f"resume: its {name} differ from those of the start; give the same start")
+            raise IdentificationError(
+                f"its {name} differ from those of the start", field="resume", hint="give the same start"
+            )
     if len(resume.last_initial_states) != estimated:
         raise IdentificationError(
-            f"resume: has {len(resume.last_initial_states)} estimated initial states, the experiments {estimated}; "
-            "give the same experiments"
+            f"has {len(resume.last_initial_states)} estimated initial states, the experiments {estimated}; "
+            "give the same experiments",
+            field="resume",
         )
     before = not bool(np.all(np.isnan(resume.history.validation_error)))
     if before != validated:
         had, has = ("validation data" if there else "no validation data" for there in (before, validated))
-        raise IdentificationError(f"resume: was fitted with {had}, now there is {has}; give the same validation")
+        raise IdentificationError(
+            f"was fitted with {had}, now there is {has}", field="resume", hint="give the same validation"
+        )
 
 
 def needed_bytes(parameters: Parameters, experiments: Sequence[Experiment], by_frequency: bool) -> dict[str, int]:
@@ -151,6 +158,7 @@ def check_memory(parameters: Parameters, experiments: Sequence[Experiment], by_f
     parts = ", ".join(f"{name} {value / 1e9:.2f}" for name, value in need.items())
     advice = "leave the frequency weighting out, or " if by_frequency else ""
     raise IdentificationError(
-        f"memory: the fit needs {sum(need.values()) / 1e9:.2f} GB ({parts}), {there / 1e9:.2f} GB are free; "
-        f"{advice}give shorter experiments or take fewer features"
+        f"the fit needs {sum(need.values()) / 1000000000.0:.2f} GB ({parts}), {there / 1000000000.0:.2f} "
+        f"GB are free; {advice}give shorter experiments or take fewer features",
+        field="memory",
     )

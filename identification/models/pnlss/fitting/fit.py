@@ -106,13 +106,16 @@ def _state_scale(start: PnlssModel, experiments: Sequence[Experiment]) -> Float:
         what = f"experiments[{index}]{f' ({experiment.name})' if experiment.name else ''}"
         if run.unbounded_at is not None:
             raise IdentificationError(
-                f"start: leaves all bounds at sample {run.unbounded_at} of {what}; needs a model that is stable there"
+                f"leaves all bounds at sample {run.unbounded_at} of {what}",
+                field="start",
+                allowed="a model that is stable there",
             )
         largest, measured = (float(np.max(np.abs(y))) for y in (run.outputs, experiment.outputs))
         if not largest <= _HOPELESS * max(measured, 1e-300):
             raise IdentificationError(
-                f"start: its outputs reach {largest / max(measured, 1e-300):.3g} times those of {what}; needs a model "
-                "that is stable and in the units of the channels"
+                f"its outputs reach {largest / max(measured, 1e-300):.3g} times those of {what}",
+                field="start",
+                allowed="a model that is stable and in the units of the channels",
             )
         total += np.sum(run.states**2, axis=1)
         samples += run.states.shape[1]

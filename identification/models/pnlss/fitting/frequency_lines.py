@@ -27,13 +27,14 @@ def with_lines(records: Sequence[Record], settings: FitSettings, sample_rate_hz:
     for record in records:
         if not record.period:
             raise IdentificationError(
-                f"{record.name}: is not periodic and cannot be weighted over frequency; "
-                "leave band_hz and line_weights out, or it"
+                "is not periodic and cannot be weighted over frequency; leave band_hz and line_weights out, or it",
+                where=record.name,
             )
         lines = _line_weights(settings, record, sample_rate_hz)
         if not np.any(lines):
             raise IdentificationError(
-                f"{record.name}: has no frequency line that counts; its lines are {sample_rate_hz / record.period:g} Hz apart"
+                f"has no frequency line that counts; its lines are {sample_rate_hz / record.period:g} Hz apart",
+                where=record.name,
             )
         found.append(replace(record, lines=lines))
     return found
@@ -56,8 +57,9 @@ def _line_weights(settings: FitSettings, record: Record, sample_rate_hz: float) 
         given = np.array(settings.line_weights)
         if given.shape[1] not in (2, 1 + outputs):
             raise IdentificationError(
-                f"line_weights: have {given.shape[1] - 1} weights beside each frequency, "
-                f"needs 1 or one for each of {outputs} outputs"
+                f"have {given.shape[1] - 1} weights beside each frequency",
+                field="line_weights",
+                allowed=f"1 or one for each of {outputs} outputs",
             )
         for output, row in enumerate(rows):
             of = given[:, 1 + min(output, given.shape[1] - 2)]

@@ -82,7 +82,7 @@ class Problem:
         self._held[parameters.ends[2] : parameters.ends[3]] = PRIOR / self._total
         self._validation_total = self._measured(self.validation)
         if self.validation and not self._validation_total > 0.0:
-            raise IdentificationError("validation: its outputs are zero at all frequencies that count")
+            raise IdentificationError("its outputs are zero at all frequencies that count", field="validation")
 
     def _measured(self, records: list[Record]) -> float:
         return sum(record.weight * float(self.weights**2 @ record.squares(record.y)) for record in records)

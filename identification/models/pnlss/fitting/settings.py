@@ -73,20 +73,21 @@ class FitSettings:
             ("truncation", "0 and above, below 1", 0.0 <= self.truncation < 1.0),
         ):
             if not fine:
-                raise IdentificationError(f"{name}: is {getattr(self, name)}, allowed are {allowed}")
+                raise IdentificationError(field=name, value=getattr(self, name), allowed=allowed)
         if self.band_hz is not None:
             low, high = (float(value) for value in self.band_hz)
             object.__setattr__(self, "band_hz", (low, high))
             if not 0.0 <= low < high:
                 raise IdentificationError(
-                    f"band_hz: is {low:g} to {high:g} Hz, needs 0 or above, the second the larger"
+                    f"is {low:g} to {high:g} Hz", field="band_hz", allowed="0 or above, the second the larger"
                 )
         rows = self.line_weights
         rising = all(later[0] > row[0] for row, later in pairwise(rows))
         alike = all(len(row) == len(rows[0]) >= 2 and min(row) >= 0.0 and max(row) < float("inf") for row in rows)
         if not (alike and rising):
             raise IdentificationError(
-                "line_weights: need rows of a frequency and weights, all finite and not below 0, frequencies rising"
+                "need rows of a frequency and weights, all finite and not below 0, frequencies rising",
+                field="line_weights",
             )
 
     @property

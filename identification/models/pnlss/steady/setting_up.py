@@ -57,7 +57,7 @@ def balance_of(
     least = 2 * harmonics + 1
     count = samples_for(model, harmonics) if samples is None else samples
     if count < least:
-        raise IdentificationError(f"samples: is {count}, needs at least {least} for {harmonics} harmonics")
+        raise IdentificationError(field="samples", value=count, allowed=f"at least {least} for {harmonics} harmonics")
     basis = Basis(harmonics, count)
     row, values = held_values(model, held_inputs)
     return Balance(model, drive_of(model, level, force, exciter, basis.size, row), basis, values)
@@ -65,12 +65,11 @@ def balance_of(
 
 def harmonics_that_fit(model: PnlssModel, harmonics: int, highest_hz: float) -> tuple[int, list[str]]:
     """Return the number of harmonics below half the sample rate, with a note if it is lower than requested."""
-    if harmonics < 1:
-        raise IdentificationError(f"harmonics: is {harmonics}, needs at least 1")
+    IdentificationError.unless_at_least("harmonics", harmonics, 1)
     room = int(np.ceil(0.5 * model.sample_rate_hz / highest_hz)) - 1
     if room < 1:
         raise IdentificationError(
-            f"frequency_hz: {highest_hz:g} Hz is not below half the model's {model.sample_rate_hz:g} Hz"
+            f"{highest_hz:g} Hz is not below half the model's {model.sample_rate_hz:g} Hz", field="frequency_hz"
         )
     if room >= harmonics:
         return harmonics, []

@@ -74,7 +74,9 @@ def structured_mode(
 
     path = _within_training(model, backbone, row, near_hz) if force_n is None else backbone(force_n, np.inf)
     if force_n is not None and path.reason:
-        raise IdentificationError(f"force_n: the backbone ends at {path.level[-1] * force_n:.3g} N ({path.reason})")
+        raise IdentificationError(
+            f"the backbone ends at {path.level[-1] * force_n:.3g} N ({path.reason})", field="force_n"
+        )
     path = path.some(np.unique(np.linspace(0, len(path.level) - 1, _POINTS).round().astype(int)))
     states = path.states()
     shape, linear = _tested(model, row, near_hz)
@@ -129,7 +131,9 @@ def _within_training(
 ) -> Resonances:
     """Return the part of the backbone on which no element moves further than in the training data."""
     if not model.elements or not all(element.largest for element in model.elements):
-        raise IdentificationError("force_n: is missing; the model does not know the range of its training data")
+        raise IdentificationError(
+            "is missing", field="force_n", hint="the model does not know the range of its training data"
+        )
     at_rest = model.linearised()
     mode = int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz(model, near_hz))))
     shape = abs(at_rest.output_shapes[row, mode])
@@ -145,7 +149,7 @@ def _within_training(
             continue
         force_n *= 2.0
     raise IdentificationError(
-        f"force_n: is missing; up to {force_n:.3g} N no element moves as far as in the training data"
+        f"is missing; up to {force_n:.3g} N no element moves as far as in the training data", field="force_n"
     )
 
 
@@ -171,7 +175,7 @@ def _at_amplitudes(path: Resonances, model: StructuredModel, row: int, near_hz: 
             if np.max(np.abs(change / scale)) < _EXACT:
                 break
         else:
-            raise IdentificationError(f"covariance: no vibration was found at the amplitude of point {k + 1}")
+            raise IdentificationError(f"no vibration was found at the amplitude of point {k + 1}", field="covariance")
         at_hz = float(v[-2])
         inputs = balance.balance.inputs_of(v[:-2], float(v[-1]))
         out[0, k] = np.log(at_hz)

@@ -7,6 +7,7 @@ import pytest
 
 from identification import IdentificationError, best_linear_responses
 from tests.identification.models.pnlss.multisines import PERIOD, RATE_HZ, linear_model, measured, multisine, oscillator
+from tests.refused import refused
 
 SISO = linear_model(oscillator())
 
@@ -76,7 +77,7 @@ def test_what_is_not_periodic_takes_no_part() -> None:
     np.testing.assert_array_equal(
         best_linear_responses([sweep, periodic]).value, best_linear_responses([periodic]).value
     )
-    with pytest.raises(IdentificationError, match=r"none is periodic.*or give a linear model"):
+    with refused(IdentificationError, "none-is-periodic-or-give-linear", field="experiments"):
         best_linear_responses([sweep])
 
 
@@ -91,16 +92,13 @@ def test_periods_that_do_not_repeat_are_refused_by_name() -> None:
     good = measured(SISO, multisine(0), periods=2, name="realisation 1")
     drifting = np.array(good.outputs)
     drifting[:, 2 * PERIOD :] = np.roll(drifting[:, 2 * PERIOD :], 300)
-    with pytest.raises(
-        IdentificationError,
-        match=r"experiment 'realisation 1', channel 'a0': periods 1 and 2 of 1024 samples differ by 1\.",
-    ):
+    with refused(IdentificationError, "experiment-realisation-channel-periods-a"):
         best_linear_responses([replace(good, outputs=drifting)])
-    with pytest.raises(IdentificationError, match=r"channel 'voltage0': periods 1 and 2 of 1000 samples differ"):
+    with refused(IdentificationError, "channel-voltage-periods-and-of-samples"):
         best_linear_responses([replace(good, period_samples=1000, counted_from=3 * PERIOD - 2000)])
     other = np.array(good.inputs)
     other[:, :PERIOD] = multisine(9)
-    with pytest.raises(IdentificationError, match=r"the 32 samples before sample 1024.*Experiment\.periodic"):
+    with refused(IdentificationError, "the-samples-before-sample-experiment-per"):
         best_linear_responses([replace(good, inputs=other)])
 
 
@@ -112,15 +110,20 @@ def test_a_transient_that_decays_before_counting_begins_is_no_offence() -> None:
 
 def test_what_cannot_be_is_named() -> None:
     model = linear_model(oscillator(inputs=2))
-    with pytest.raises(IdentificationError, match="1 periodic for 2 inputs, needs one for each at least"):
+    with refused(
+        IdentificationError,
+        "periodic-for-inputs",
+        field="experiments",
+        allowed="one for each at least, with other phases at every input",
+    ):
         best_linear_responses([measured(model, multisine(0, inputs=2))])
     same = [measured(model, multisine(0, inputs=2)) for _ in range(2)]
-    with pytest.raises(IdentificationError, match="does not move the 2 inputs independently"):
+    with refused(IdentificationError, "does-not-move-the-inputs-independently-2", field="inputs"):
         best_linear_responses(same)
     good = measured(SISO, multisine(0))
-    with pytest.raises(IdentificationError, match="input 1 is zero at all lines"):
+    with refused(IdentificationError, "input-is-zero-at-all-lines", field="inputs"):
         best_linear_responses([replace(good, inputs=np.zeros_like(good.inputs))])
-    with pytest.raises(IdentificationError, match="band_hz: no line in"):
+    with refused(IdentificationError, "no-line-in", field="band_hz"):
         best_linear_responses([good], band_hz=(60.2, 60.8))
-    with pytest.raises(IdentificationError, match="band_hz: is 60 to 50"):
+    with refused(IdentificationError, field="band_hz"):
         best_linear_responses([good], band_hz=(60.0, 50.0))

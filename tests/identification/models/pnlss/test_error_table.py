@@ -9,6 +9,7 @@ import pytest
 from identification import ErrorTable, IdentificationError, realisation_combinations
 from identification.models.pnlss.error_table import SAME_LEVEL, ErrorCell, ModelTest
 from tests.identification.models.pnlss.studies import realisations, system
+from tests.refused import refused
 
 
 @pytest.fixture(scope="module")
@@ -125,5 +126,5 @@ def test_data_read_twice_is_still_no_test_of_a_model_that_was_trained_on_it():
 
 def test_an_output_that_is_not_there_is_named(study):
     levels, jobs = study
-    with pytest.raises(IdentificationError, match="output: is tip, allowed are drive"):
+    with refused(IdentificationError, field="output", value="tip", allowed="drive"):
         ErrorTable.of({}, jobs, levels, output="tip")

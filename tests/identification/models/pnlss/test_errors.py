@@ -5,6 +5,7 @@ import pytest
 
 from identification import IdentificationError, estimated_initial_state, pnlss_errors
 from tests.identification.models.pnlss.systems import experiment, nonlinear_system
+from tests.refused import refused
 
 
 def test_a_scaled_output_is_wrong_by_just_that_share() -> None:
@@ -78,11 +79,11 @@ def test_an_estimated_initial_state_does_not_depend_on_the_units_of_the_states_n
 def test_what_cannot_be_compared_is_named() -> None:
     system = nonlinear_system(2, 1, 1)
     one = experiment(system, 100)
-    with pytest.raises(IdentificationError, match="experiments: none given"):
+    with refused(IdentificationError, "none-given", field="experiments"):
         pnlss_errors(system, [])
-    with pytest.raises(IdentificationError, match=r"experiments\[0\] \(noise 1\): output 'y1' is zero where it counts"):
+    with refused(IdentificationError, "output-is-zero-where-it-counts", where="experiments[0] (noise 1)"):
         pnlss_errors(system, [replace(one, outputs=0.0 * one.outputs)])
-    with pytest.raises(IdentificationError, match=r"experiments\[0\] \(noise 1\): inputs are u1, the model has u1, u2"):
+    with refused(IdentificationError, "inputs-are-the-model-has-2", where="experiments[0] (noise 1)"):
         pnlss_errors(nonlinear_system(2, 2, 1), [one])
-    with pytest.raises(IdentificationError, match="samples: is 1, too few for 2 states"):
+    with refused(IdentificationError, "too-few-for-states", field="samples", value=1):
         estimated_initial_state(system, one, samples=1)

@@ -7,6 +7,7 @@ from joblib import parallel_config
 
 from identification import IdentificationError, identify_many, realisation_combinations
 from tests.identification.models.pnlss.studies import identify_by_name, realisations
+from tests.refused import refused
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def test_the_backend_is_the_callers_choice_in_one_line(jobs):
 
 
 def test_two_jobs_of_one_name_are_refused(jobs):
-    with pytest.raises(IdentificationError, match="is there twice"):
+    with refused(IdentificationError, "is-there-twice", field="jobs"):
         list(identify_many((*jobs, jobs[0]), identify_by_name))
 
 
@@ -63,7 +64,7 @@ def test_five_realisations_give_the_twenty_models_of_the_paper_each_ordered_pair
         train, choose, test = split_of(job)
         assert len(train) == 3
         assert sorted(train + choose + test) == sorted(one.name for one in low)
-    with pytest.raises(IdentificationError, match="21 of low, allowed are 0 to 20"):
+    with refused(IdentificationError, "of-low", field="models", allowed="0 to 20 different combinations"):
         realisation_combinations({"low": low}, models=21, mixed=False)
 
 
@@ -98,21 +99,21 @@ def test_fewer_realisations_can_be_fitted_and_all_take_their_turn():
     fitted = [name for job in jobs[:10] for name in split_of(job)[0]]
     assert {fitted.count(name) for name in fitted} == {4}
     assert len(jobs[10].training) == 3 + 4
-    with pytest.raises(IdentificationError, match="most: is 0, allowed are 1 and above"):
+    with refused(IdentificationError, field="most", value=0, allowed="1 and above, or None for all realisations"):
         realisation_combinations(levels, models=1, most=0)
 
 
 @pytest.mark.parametrize(
     ("levels", "models", "said"),
     [
-        ({}, 1, "levels: none given"),
-        ({"mixed": 3}, 1, "none called mixed"),
-        ({"low": 2}, 1, "2 realisations at low, needs 3"),
-        ({"low": 3}, {"high": 1}, "models: there is no training set high"),
-        ({"low": 3}, 0, "models: are 0"),
+        ({}, 1, {"says": "none-given", "field": "levels"}),
+        ({"mixed": 3}, 1, {"says": "none-called-mixed", "field": "levels"}),
+        ({"low": 2}, 1, {"says": "realisations-at-low", "field": "levels"}),
+        ({"low": 3}, {"high": 1}, {"says": "there-is-no-training-set-high", "field": "models"}),
+        ({"low": 3}, 0, {"says": "are", "field": "models"}),
     ],
 )
 def test_what_cannot_be_combined_is_said(levels, models, said):
     given = {name: realisations(0.5, count) for name, count in levels.items()}
-    with pytest.raises(IdentificationError, match=said):
+    with refused(IdentificationError, **said):
         realisation_combinations(given, models=models)

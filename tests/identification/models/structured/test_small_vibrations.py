@@ -8,6 +8,7 @@ import pytest
 from identification import IdentificationError, NonlinearElement
 from identification.models.structured.laws import Jenkins, Joint, PolynomialDamper, PolynomialSpring, Spring, UserSpring
 from tests.identification.models.structured.models import beam, multisine
+from tests.refused import refused
 
 NEAR = 1e-6
 
@@ -81,5 +82,5 @@ def test_laws_without_slope_change_nothing():
 
 def test_a_structure_that_buckles_at_rest_has_no_small_vibrations():
     soft = NonlinearElement(direction=[0.9, -0.1], scale_m=1e-3, laws=(sloped(-1e3), Jenkins(1.0)))
-    with pytest.raises(IdentificationError, match="at rest a mode does not oscillate and fade"):
+    with refused(IdentificationError, "at-rest-mode-does-not-oscillate", field="elements"):
         beam(elements=(soft,)).linearised()

@@ -15,6 +15,7 @@ from identification.models.structured.model import ends_of_steps, room_for
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.steps import end_step, run, take_input, take_step
 from tests.identification.models.structured.models import RATE_HZ, beam, multisine
+from tests.refused import refused
 
 
 def spring(system, e, x):
@@ -268,27 +269,33 @@ def test_no_force_of_a_hundred_times_the_range_makes_a_run_unbounded(seed):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"frequency_hz": [25.0, -1.0]}, r"frequency_hz: is \[25.0, -1.0\], allowed are numbers above 0"),
-        ({"damping_ratio": [0.01, 0.0]}, r"damping_ratio: is \[0.01, 0.0\], allowed are numbers above 0"),
-        ({"input_shapes": [[1.0]]}, r"input_shapes: shape \(1, 1\), needs \(2, 1\)"),
+        (
+            {"frequency_hz": [25.0, -1.0]},
+            {"field": "frequency_hz", "value": [25.0, -1.0], "allowed": "numbers above 0: the model must stay bounded"},
+        ),
+        (
+            {"damping_ratio": [0.01, 0.0]},
+            {"field": "damping_ratio", "value": [0.01, 0.0], "allowed": "numbers above 0: the model must stay bounded"},
+        ),
+        ({"input_shapes": [[1.0]]}, {"says": "shape-7", "field": "input_shapes", "allowed": "2, 1"}),
         (
             {"frequency_hz": [25.0, 1000.0]},
-            r"frequency_hz: is \[25.0, 1000.0\], allowed is below 1000, half of the rate",
+            {"field": "frequency_hz", "value": [25.0, 1000.0], "allowed": "below 1000, half of the rate of the steps"},
         ),
-        ({"steps": 0}, r"steps: is 0, allowed is 1 or above"),
-        ({"support_n_m": -1.0}, r"support_n_m: is -1.0, allowed is 0 or above"),
-        ({"direct": [[np.nan], [0.0], [0.0]]}, r"direct: value at \[0, 0\] is nan, must be finite"),
+        ({"steps": 0}, {"field": "steps", "value": 0, "allowed": "1 or above"}),
+        ({"support_n_m": -1.0}, {"field": "support_n_m", "value": -1.0, "allowed": "0 or above"}),
+        ({"direct": [[np.nan], [0.0], [0.0]]}, {"says": "value-at-is-nan-2", "field": "direct", "allowed": "finite"}),
     ],
 )
 def test_a_model_that_cannot_be_is_refused(changes, message):
-    with pytest.raises(IdentificationError, match=message):
+    with refused(IdentificationError, **message):
         beam(**changes)
 
 
 def test_an_element_that_would_do_work_is_refused():
-    with pytest.raises(IdentificationError, match=r"coefficients_n_s_m is \[-1.0\], allowed are numbers from 0"):
+    with refused(IdentificationError, "coefficients-is", field="polynomial-damper", allowed="numbers from 0"):
         PolynomialDamper((-1.0,))
-    with pytest.raises(IdentificationError, match=r"elements\[0\].direction: shape \(1,\), needs \(2,\)"):
+    with refused(IdentificationError, "shape-8", field="elements[0].direction", allowed="(2,)"):
         beam(elements=(replace(beam().elements[0], direction=[1.0]),))
-    with pytest.raises(IdentificationError, match=r"inputs: shape \(2, 9\), needs 1 rows"):
+    with refused(IdentificationError, "shape-9", field="inputs", allowed="1 rows"):
         beam().simulate(np.zeros((2, 9)))

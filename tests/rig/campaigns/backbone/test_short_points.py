@@ -11,6 +11,7 @@ from rig.measurements import point_rows
 from rig.tick.sequencer.layout import SegmentKind
 from simulators import VirtualRig
 from simulators.analysis import phase_resonance_backbone
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 
 PERIODS = {"magnet-beam": 15, "friction-beam": 30}
@@ -124,5 +125,5 @@ def test_before_the_first_point_the_lock_is_gained_at_its_level():
 
 def test_the_slow_flow_needs_the_mode_shape():
     bench = bench_with({"specimen": {"drive_mode_shape": None}})
-    with pytest.raises(ConfigurationError, match="drive_mode_shape"):
+    with refused(ConfigurationError, "drive-mode-shape"):
         load_plan("magnet-beam/backbone-short").check(bench)

@@ -10,6 +10,7 @@ from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.plan import MOST_POINTS
 from rig.campaigns.plans import bench_of, load_plan, plan_from, shipped_plans
 from rig.errors import ConfigurationError
+from tests.refused import refused
 
 
 def changed(name, **changes):
@@ -39,15 +40,15 @@ def changed(name, **changes):
 )
 def test_more_points_than_anybody_measures_are_refused_at_once_by_key(name, changes, said):
     began = time.process_time()
-    with pytest.raises(ConfigurationError, match=r"points, allowed are up to 10000") as refused:
+    with pytest.raises(ConfigurationError, match=r"points; allowed: up to 10000") as caught:
         changed(name, **changes)
     assert time.process_time() - began < 1.0
-    assert f"plan.toml: {said}" in str(refused.value)
+    assert f"plan.toml: {said}" in str(caught.value).replace("`", "")
 
 
 @pytest.mark.parametrize("step_deg", [1e-3, 1e-9, 1e-30])
 def test_steps_of_a_lag_are_counted_before_they_are_made(step_deg):
-    with pytest.raises(ConfigurationError, match=r"step_deg: .* points, allowed are up to 10000"):
+    with refused(ConfigurationError, "points", field="step_deg", allowed="up to 10000"):
         changed("magnet-beam/stepped-phase", phase_lags_deg=None, start_deg=-170.0, stop_deg=-10.0, step_deg=step_deg)
 
 
@@ -92,24 +93,36 @@ def test_a_shipped_plan_is_not_too_long(name):
 @pytest.mark.parametrize(
     ("name", "changes", "said"),
     [
-        ("magnet-beam/backbone", {"record_periods": 1_000_000}, "record_periods: up to 2.2.e.08 samples of one record"),
+        (
+            "magnet-beam/backbone",
+            {"record_periods": 1_000_000},
+            {"says": "up-to-samples-of-one-record", "field": "record_periods"},
+        ),
         (
             "magnet-beam/backbone",
             {"settle": {"longest_periods": 1e6}, "repeats": 700},
-            "settle.longest_periods: the plan may",
+            {"says": "the-plan-may", "field": "settle.longest_periods"},
         ),
-        ("magnet-beam/backbone", {"ramp_periods": 1e5, "repeats": 700}, "ramp_periods: the plan may take .* days"),
-        ("magnet-beam/multisine-1", {"periods": 100_000}, "^periods: up to .* samples of one record"),
+        (
+            "magnet-beam/backbone",
+            {"ramp_periods": 1e5, "repeats": 700},
+            {"says": "the-plan-may-take-days", "field": "ramp_periods"},
+        ),
+        (
+            "magnet-beam/multisine-1",
+            {"periods": 100_000},
+            {"says": "up-to-samples-of-one-record-2", "field": "periods"},
+        ),
     ],
 )
 def test_a_plan_of_absurd_length_is_refused_by_the_key_that_makes_it_so(name, changes, said):
-    with pytest.raises(ConfigurationError, match=said):
+    with refused(ConfigurationError, **said):
         check_length(changed(name, **changes), load_bench("magnet-beam"))
 
 
 def test_a_run_of_absurd_length_leaves_no_file(tmp_path):
     import rig
 
-    with pytest.raises(ConfigurationError, match="samples of one record"):
+    with refused(ConfigurationError, "samples-of-one-record", field="record_periods"):
         rig.run(changed("magnet-beam/backbone", record_periods=1_000_000), output=tmp_path / "run.h5")
     assert list(tmp_path.iterdir()) == []

@@ -6,6 +6,7 @@ from rig.bench import load_bench
 from rig.campaigns.plans import load_plan, plan_from
 from rig.errors import ConfigurationError
 from tests.controller.tuning.rigs import plant_of
+from tests.refused import refused
 
 KINDS = ["backbone-short", "response-controlled", "continuous-backbone"]
 RATIO = 1.444326 / 0.908466  # of the bench's mode shapes
@@ -27,11 +28,7 @@ def tone(kind, band_hz, level_m):
 def test_a_level_that_takes_a_channel_beyond_its_limit_by_the_mode_shapes_is_refused_without_a_plant(kind):
     bench = load_bench("magnet-beam")
     plan_of(kind, levels_m=[1e-3, 3.3e-3]).check(bench)
-    with pytest.raises(
-        ConfigurationError,
-        match=r"levels_m\[1\] = 0\.004 m: means 0\.00636 m at channel 'acc_magnet', which moves 1\.59 times as far .* "
-        r"limits\.displacement_m = 0\.006",
-    ):
+    with refused(ConfigurationError, "means-at-channel-acc-magnet-which", field="levels_m[1]", value=0.004):
         plan_of(kind, levels_m=[1e-3, 4e-3]).check(bench)
 
 
@@ -39,7 +36,7 @@ def test_the_acceleration_of_a_level_is_checked_at_the_linear_frequency():
     bench = load_bench("magnet-beam")
     narrow = bench.model_copy(update={"limits": bench.limits.model_copy(update={"acceleration_m_s2": 70.0})})
     plan_of("backbone-short", levels_m=[1e-3, 1.8e-3]).check(narrow)
-    with pytest.raises(ConfigurationError, match=r"0\.002 m: means 74\.6 m/s\^2 at channel 'acc_magnet'"):
+    with refused(ConfigurationError, "means-at-channel-acc-magnet", field="levels_m[1]", value=0.002):
         plan_of("backbone-short", levels_m=[1e-3, 2e-3]).check(narrow)
 
 
@@ -48,7 +45,7 @@ def test_in_open_loop_the_shapes_count_where_the_band_holds_the_mode(kind):
     bench = load_bench("magnet-beam")
     tone(kind, (23.8, 25.6), 3.7e-3).check(bench)
     tone(kind, (30.0, 35.0), 4e-3).check(bench)
-    with pytest.raises(ConfigurationError, match=r"0\.00636 m at channel 'acc_magnet'"):
+    with refused(ConfigurationError, "at-channel-acc-magnet", field="levels_m[0]", value=0.004):
         tone(kind, (23.8, 25.6), 4e-3).check(bench)
 
 
@@ -71,15 +68,13 @@ def test_a_measured_ratio_takes_the_place_of_the_mode_shape(measured, level_m):
 
 def test_a_ratio_of_a_channel_that_the_bench_does_not_have_is_refused():
     plant = plant_of("magnet-beam").to_dict() | {"response_ratios": {"tip": 5.0}}
-    with pytest.raises(
-        ConfigurationError, match=r"plant\.response_ratios\.tip: .* magnet-beam: acc_drive, acc_magnet$"
-    ):
+    with refused(ConfigurationError, "magnet-beam-acc-drive-acc-magnet", field="plant.response_ratios.tip"):
         plan_of("backbone-short", plant=plant).check(load_bench("magnet-beam"))
 
 
 def test_a_ratio_that_is_none_is_refused_when_the_plan_is_read():
     plant = plant_of("magnet-beam").to_dict() | {"response_ratios": {"acc_magnet": -1.0}}
-    with pytest.raises(ConfigurationError, match=r"plant\.response_ratios\.acc_magnet = -1\.0"):
+    with refused(ConfigurationError, field="plant.response_ratios.acc_magnet", value=-1.0):
         plan_of("backbone-short", plant=plant)
 
 
@@ -88,7 +83,9 @@ def test_a_standard_error_of_no_ratio_is_refused_when_the_plan_is_read():
         "response_ratios": {"acc_magnet": 1.6},
         "response_ratio_stds": {"tip": 0.1},
     }
-    with pytest.raises(ConfigurationError, match=r"response_ratio_stds\.tip: .* response_ratios: acc_magnet"):
+    with refused(
+        ConfigurationError, field="plant.response_ratio_stds.tip", allowed="a channel of response_ratios: acc_magnet"
+    ):
         plan_of("backbone-short", plant=plant)
 
 

@@ -10,6 +10,7 @@ from rig.campaigns.planning.levels_on_plant import motion_for, voltage_for
 from rig.campaigns.plans import load_plan, plan_from
 from rig.errors import ConfigurationError
 from tests.controller.tuning.rigs import plant_of
+from tests.refused import refused
 
 LINEAR_HZ = {"magnet-beam": 24.37, "friction-beam": 149.0}
 
@@ -51,7 +52,7 @@ def test_a_mode_shape_that_is_wrong_by_half_passes(name, factor):
 def test_a_mode_shape_that_is_far_too_large_is_refused_with_the_growth(name):
     shape = 3.5 * plant_of(name).drive_shape
     plan, bench = plan_for(name, controller={"drive_mode_shape": shape})
-    with pytest.raises(ConfigurationError, match=r"unstable on the known plant .* growing at [\d.]+ 1/s"):
+    with refused(ConfigurationError, "unstable-on-the-known-plant-growing", field="controller"):
         plan.check(bench)
 
 
@@ -65,7 +66,7 @@ def test_the_closed_form_fails_on_the_friction_beam_and_the_papers_gains_do_not(
     plan, bench = plan_for("friction-beam", controller={**voltage, "k1": 1.0, "k2": 10 * math.pi}, levels_v=[0.1])
     plan.check(bench)
     plan, bench = plan_for("friction-beam", controller={**voltage, "k1": 7.7, "k2": 3000.0}, levels_v=[0.1])
-    with pytest.raises(ConfigurationError, match="unstable on the known plant"):
+    with refused(ConfigurationError, "unstable-on-the-known-plant", field="controller"):
         plan.check(bench)
 
 
@@ -73,8 +74,8 @@ def test_the_closed_form_fails_on_the_friction_beam_and_the_papers_gains_do_not(
     ("levels", "said"),
     [
         ({"levels_m": [1e-4, 3.7e-3]}, None),
-        ({"levels_n": [0.1, 3.0]}, r"levels_n\[1\] = 3 N: needs 19\.\d V .* allows 9\.5 V"),
-        ({"levels_rms_n": [2.0]}, r"levels_rms_n\[0\] = 2 N RMS: needs 18\.\d V"),
+        ({"levels_n": [0.1, 3.0]}, {"field": "levels_n[1]", "value": 3.0}),
+        ({"levels_rms_n": [2.0]}, {"field": "levels_rms_n[0]", "value": 2.0}),
         ({"levels_v": [7.0]}, None),
     ],
 )
@@ -83,7 +84,7 @@ def test_levels_beyond_the_voltage_limit_are_refused_with_the_voltage(levels, sa
     if said is None:
         plan.check(bench)
     else:
-        with pytest.raises(ConfigurationError, match=said):
+        with refused(ConfigurationError, **said):
             plan.check(bench)
 
 
@@ -104,16 +105,16 @@ def test_a_phase_that_a_force_loop_cannot_hold_is_refused_with_its_lag_and_the_o
     plan, bench = phases_for("stepped-phase-fast", [-90.0, -60.0], controller=LOGARITHMIC, levels_n=[0.1])
     plan.check(bench)
     plan, bench = phases_for("stepped-phase-fast", [-120.0, -90.0], controller=LOGARITHMIC, levels_n=[0.1])
-    with pytest.raises(ConfigurationError, match=r"unstable .* at a lag of -120 deg, growing at 3\d\.\d 1/s; with"):
+    with refused(ConfigurationError, "unstable-at-lag-of-deg-growing", field="controller"):
         plan.check(bench)
     many = phases_for("stepped-phase-fast", [-160.0, -150.0, -140.0, -130.0, -90.0], controller=LOGARITHMIC)
-    with pytest.raises(ConfigurationError, match="at 4 lags from -160 to -130 deg"):
+    with refused(ConfigurationError, "at-lags-from-to-deg", field="controller"):
         many[0].check(many[1])
 
 
 def test_the_phases_that_the_papers_force_loop_loses_on_the_friction_beam_are_refused():
     plan, bench = phases_for("stepped-phase", [-150.0, -140.0, -130.0, -100.0, -60.0, -30.0])
-    with pytest.raises(ConfigurationError, match="at a lag of -150, -140, -130 deg"):
+    with refused(ConfigurationError, "at-lag-of-deg", field="controller"):
         plan.check(bench)
     plan, bench = phases_for("stepped-phase", [-100.0, -60.0, -30.0])
     plan.check(bench)
@@ -121,7 +122,7 @@ def test_the_phases_that_the_papers_force_loop_loses_on_the_friction_beam_are_re
 
 def test_the_lag_at_which_levels_are_reached_is_checked_too():
     plan, bench = phases_for("stepped-phase-fast", [-90.0], controller=LOGARITHMIC, levels_n=[0.1], approach_deg=-150.0)
-    with pytest.raises(ConfigurationError, match="at a lag of -150 deg"):
+    with refused(ConfigurationError, "at-lag-of-deg-2", field="controller"):
         plan.check(bench)
 
 
@@ -130,7 +131,7 @@ def test_the_loop_of_a_held_response_is_checked_at_every_lag():
     plan.check(bench)
     quick = {"response_integral_per_s": 3000.0}
     plan, bench = phases_for("response-controlled", [-150.0, -90.0], controller=quick, levels_m=[1e-5])
-    with pytest.raises(ConfigurationError, match="the response loop is too quick on the known plant"):
+    with refused(ConfigurationError, "the-response-loop-is-too-quick", field="controller"):
         plan.check(bench)
 
 
@@ -139,16 +140,13 @@ def test_the_papers_gains_a_hundred_times_as_large_are_refused_on_the_magnet_bea
     lags = [-150.0, -90.0, -30.0]
     phases_for("stepped-phase", lags, name="magnet-beam")[0].check(load_bench("magnet-beam"))
     plan, bench = phases_for("stepped-phase", lags, name="magnet-beam", controller={"k2": k2, "k4": k4})
-    with pytest.raises(ConfigurationError, match=r"(unstable|is too quick) on the known plant"):
+    with refused(ConfigurationError, "unstable-is-too-quick-on-the", field="controller"):
         plan.check(bench)
 
 
 def test_a_loop_that_is_too_quick_is_refused_with_its_gain_at_half_the_frequency():
     plan, bench = plan_for("magnet-beam", controller={"response_integral_per_s": 2000.0})
-    with pytest.raises(
-        ConfigurationError,
-        match=r"the response loop is too quick .* gain at 12\.\d+ Hz, half the locked frequency, is \d.*allowed is 2\.2",
-    ):
+    with refused(ConfigurationError, "the-response-loop-is-too-quick-2", field="controller"):
         plan.check(bench)
 
 
@@ -169,7 +167,7 @@ def test_the_loops_inside_a_force_loop_by_the_force_at_rest_are_checked(name, ke
     assert table["controller"]["rest_low_pass_rad_s"] > 0.0
     table["controller"][key] *= factor
     plan = plan_from(table | {"plant": plant_of(name).to_dict()}, "plan")
-    with pytest.raises(ConfigurationError, match="on the known plant"):
+    with refused(ConfigurationError, "on-the-known-plant", field="controller"):
         plan.check(load_bench(name))
 
 
@@ -180,36 +178,40 @@ def test_the_loops_inside_a_force_loop_by_the_force_at_rest_are_checked(name, ke
             "force_n",
             0.5,
             {"levels_m": [1e-3, 3.5e-3]},
-            r"levels_m\[1\] = 0\.0035 m: means 0\.[78]\d* N on .* or more; .* = 0\.5",
+            {"says": "means-on-or-more", "field": "levels_m[1]", "value": 0.0035},
         ),
         (
             "acceleration_m_s2",
             50.0,
             {"levels_m": [1e-3, 3.5e-3]},
-            r"levels_m\[1\] = 0\.0035 m: means 130 m/s\^2 at channel 'acc_magnet'",
+            {"says": "means-at-channel-acc-magnet-2", "field": "levels_m[1]", "value": 0.0035},
         ),
         (
             "displacement_m",
             2e-4,
             {"levels_n": [0.1, 0.55]},
-            r"levels_n\[1\] = 0\.55 N: means 0\.0038\d m at channel 'acc_magnet' on .* "
-            r"still 0\.0004\d* m with 8 times the damping; .* = 0\.0002",
+            {"says": "means-at-channel-acc-magnet-on-2", "field": "levels_n[1]", "value": 0.55},
         ),
         ("displacement_m", 5e-4, {"levels_n": [0.1, 0.55]}, None),  # a joint of eight times the damping would do
         (
             "acceleration_m_s2",
             5.0,
             {"levels_rms_n": [0.39]},
-            r"0\.39 N RMS: means 90\.\d m/s\^2 at channel 'acc_magnet' on",
+            {"says": "means-at-channel-acc-magnet-on-3", "field": "levels_rms_n[0]", "value": 0.39},
         ),
         ("displacement_m", 5e-4, {"levels_v": [0.5]}, None),
         (
             "displacement_m",
             4e-4,
             {"levels_v": [0.5]},
-            r"levels_v\[0\] = 0\.5 V: means 0\.00053\d m at channel 'acc_magnet' on",
+            {"says": "means-at-channel-acc-magnet-on", "field": "levels_v[0]", "value": 0.5},
         ),
-        ("force_n", 0.07, {"levels_v": [0.5]}, r"levels_v\[0\] = 0\.5 V: means 0\.076\d N on the known plant"),
+        (
+            "force_n",
+            0.07,
+            {"levels_v": [0.5]},
+            {"says": "means-on-the-known-plant", "field": "levels_v[0]", "value": 0.5},
+        ),
     ],
 )
 def test_levels_beyond_the_limits_of_force_and_motion_are_refused_with_the_number(limit, value, levels, said):
@@ -220,7 +222,7 @@ def test_levels_beyond_the_limits_of_force_and_motion_are_refused_with_the_numbe
     if said is None:
         plan.check(bench)
     else:
-        with pytest.raises(ConfigurationError, match=said):
+        with refused(ConfigurationError, **said):
             plan.check(bench)
 
 
@@ -247,7 +249,7 @@ def test_the_voltage_that_a_level_needs_is_that_of_the_lag_that_takes_most():
     )
     phases_for("response-controlled", [-90.0], levels_m=[9e-4])[0].check(bench)
     with pytest.raises(
-        ConfigurationError, match=rf"levels_m\[0\] = .* needs [\d.]+ V at a lag of {at:g} deg on the known"
+        ConfigurationError, match=rf"`levels_m\[0\]` = .* needs [\d.]+ V at a lag of {at:g} deg on the known"
     ):
         phases_for("response-controlled", lags, levels_m=[9e-4])[0].check(bench)
 
@@ -256,23 +258,32 @@ def test_the_voltage_that_a_level_needs_is_that_of_the_lag_that_takes_most():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"frequency_window_hz": [24.6, 26.0], "centre_frequency_hz": 25.0}, "linear_frequency_hz = 24"),
-        ({"frequency_window_hz": [0.1, 90.0]}, r"the bench magnet-beam allows \["),
-        ({"harmonics": 50, "frequency_window_hz": [21.0, 60.0]}, r"harmonics = 50: allowed is up to 39"),
+        (
+            {"frequency_window_hz": [24.6, 26.0], "centre_frequency_hz": 25.0},
+            {"says": "linear-frequency-hz", "field": "controller.frequency_window_hz", "value": [24.6, 26.0]},
+        ),
+        (
+            {"frequency_window_hz": [0.1, 90.0]},
+            {"says": "the-bench-magnet-beam-allows", "field": "controller.frequency_window_hz", "value": [0.1, 90.0]},
+        ),
+        (
+            {"harmonics": 50, "frequency_window_hz": [21.0, 60.0]},
+            {"field": "harmonics", "value": 50, "allowed": "up to 39 of 60 Hz at 5000 samples/s"},
+        ),
     ],
 )
 def test_every_campaign_under_a_lock_checks_window_and_harmonics(kind, change, said):
     table = load_plan(f"magnet-beam/{kind}").model_dump(mode="json", exclude_none=True)
     own = {key: value for key, value in change.items() if key == "harmonics"}
     table["controller"] |= {key: value for key, value in change.items() if key != "harmonics"}
-    with pytest.raises(ConfigurationError, match=said):
+    with refused(ConfigurationError, **said):
         plan_from(table | own, "plan").check(load_bench("magnet-beam"))
 
 
 def test_a_plant_with_a_wrong_key_is_named():
     table = plan_for("magnet-beam")[0].model_dump(mode="json")
     table["plant"]["damping"] = 0.1
-    with pytest.raises(ConfigurationError, match=r"plant\.damping: unknown key"):
+    with refused(ConfigurationError, "unknown-key", field="plant.damping"):
         plan_from(table, "plan")
 
 
@@ -281,9 +292,9 @@ def test_a_frequency_too_high_for_any_harmonic_is_named_with_the_highest_allowed
     plan, bench = load_plan("magnet-beam/backbone"), load_bench("magnet-beam")
     with pytest.raises(
         ConfigurationError, match=f"{highest_hz:g} Hz: is too high for 5000 samples/s.*up to (.*) Hz"
-    ) as refused:
+    ) as caught:
         plan.check_evaluated(7, bench, highest_hz, spare)
-    allowed_hz = float(str(refused.value).split()[-2])
+    allowed_hz = float(str(caught.value).split()[-2])
     plan.check_evaluated(1, bench, allowed_hz, spare)
 
 
@@ -292,11 +303,11 @@ def test_gains_that_do_not_bear_a_longer_delay_are_refused_with_the_longest_that
     plan, bench = plan_for(name)
     known_s = plan.plant.model.delay_s
     plan.check_delay(bench, known_s * bench.sample_rate_hz)
-    with pytest.raises(ConfigurationError, match=r"^controller: frequency_proportional = 0, ") as caught:
+    with refused(ConfigurationError, "frequency-proportional", field="controller") as caught:
         plan.check_delay(bench, 10.0 * bench.sample_rate_hz / LINEAR_HZ[name])
     said = str(caught.value)
     assert "response_integral_per_s = " in said
-    longest_s = 1e-3 * float(re.search(r"allowed is up to ([\d.]+) ms", said).group(1))
+    longest_s = 1e-3 * float(re.search(r"allowed: up to ([\d.]+) ms", said).group(1))
     assert known_s < longest_s < 10.0 / LINEAR_HZ[name]
     assert plan.longest_delay_s(bench, 1.0) == pytest.approx(longest_s, rel=0.01)
     assert plan.longest_delay_s(bench, known_s) == known_s
@@ -316,8 +327,11 @@ def test_without_a_plant_the_bound_of_the_gains_holds():
     longest_s = plan.longest_delay_s(bench, 1.0)
     assert longest_s == plan.controller.longest_delay_s(plan.amplitude_law)
     plan.check_delay(bench, 0.999 * longest_s * bench.sample_rate_hz)
-    refused = r"^controller\.response_integral_per_s = .* ms from output .*; or shorter blocks or queue$"
-    with pytest.raises(ConfigurationError, match=refused):
+    parts = {
+        "says": "controller-response-integral-per-ms-from",
+        "field": "controller.response_integral_per_s = 46.8097",
+    }
+    with refused(ConfigurationError, **parts):
         plan.check_delay(bench, 1.001 * longest_s * bench.sample_rate_hz)
 
 
@@ -326,8 +340,8 @@ def test_the_harmonics_loop_is_judged_at_the_delay_of_the_device():
     bench = load_bench(plan.bench)
     longest_s = plan.longest_delay_s(bench, 1.0)
     plan.check_delay(bench, 0.999 * longest_s * bench.sample_rate_hz)
-    refused = r"^controller\.harmonics\.integral = 0\.04: its phase margin .* 35 deg"
-    with pytest.raises(ConfigurationError, match=refused):
+    parts = {"says": "its-phase-margin-deg", "field": "controller.harmonics.integral", "value": 0.04}
+    with refused(ConfigurationError, **parts):
         plan.check_delay(bench, 1.001 * longest_s * bench.sample_rate_hz)
 
 

@@ -8,6 +8,7 @@ from rig.campaigns.plans import load_plan, plan_from
 from rig.campaigns.response_controlled.plan import ResponseControlledPlan
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
+from tests.refused import refused
 from tests.rig.campaigns.running.test_continuation import recording
 
 LAW = {
@@ -85,29 +86,38 @@ def test_a_level_that_is_added_leaves_the_points_of_the_others_their_numbers(tmp
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"levels_m": None, "levels_n": (1.0,)}, r"levels_n: allowed is levels_m, for the displacement is held"),
-        ({"phase_lags_deg": ()}, r"phase_lags_deg = \[\]: at least one lag is needed"),
-        ({"phase_lags_deg": (-90.0, -178.0)}, r"phase_lags_deg\[1\] = -178: allowed is -175 to -5"),
-        ({"phase_lags_deg": (-90.0, -90.0)}, r"phase_lags_deg: a lag is given twice"),
+        (
+            {"levels_m": None, "levels_n": (1.0,)},
+            {"field": "levels_n", "allowed": "levels_m, for the displacement is held"},
+        ),
+        ({"phase_lags_deg": ()}, {"says": "at-least-one-lag-is-needed", "field": "phase_lags_deg", "value": []}),
+        ({"phase_lags_deg": (-90.0, -178.0)}, {"field": "phase_lags_deg[1]", "value": -178.0, "allowed": "-175 to -5"}),
+        ({"phase_lags_deg": (-90.0, -90.0)}, {"says": "lag-is-given-twice", "field": "phase_lags_deg"}),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_its_name(changes, said):
-    with pytest.raises(ConfigurationError, match=said):
+    with refused(ConfigurationError, **said):
         plan(**changes)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"start_v": None}, "start_v: levels by levels_m of this loop need a voltage to begin with"),
-        ({"levels_m": (0.1,)}, r"levels_m\[0\] = 0.1 m: the bench magnet-beam allows up to 0.006 m"),
-        ({"harmonics": 50, "bench": "friction-beam", "controller": FRICTION, "levels_m": (1e-4,)}, "harmonics = 50"),
-        ({"controller": LAW | {"frequency_window_hz": (22.0, 24.2)}}, "allowed is a window around the tested mode's"),
+        ({"start_v": None}, {"says": "levels-by-levels-of-this-loop", "field": "start_v"}),
+        ({"levels_m": (0.1,)}, {"says": "the-bench-magnet-beam-allows-up", "field": "levels_m[0]", "value": 0.1}),
+        (
+            {"harmonics": 50, "bench": "friction-beam", "controller": FRICTION, "levels_m": (1e-4,)},
+            {"field": "harmonics", "value": 50},
+        ),
+        (
+            {"controller": LAW | {"frequency_window_hz": (22.0, 24.2)}},
+            {"field": "controller.frequency_window_hz", "value": [22.0, 24.2]},
+        ),
     ],
 )
 def test_what_the_bench_cannot_do_is_refused_before_anything_moves(changes, said):
     made = plan(**changes)
-    with pytest.raises(ConfigurationError, match=said):
+    with refused(ConfigurationError, **said):
         made.check(load_bench(made.bench))
 
 

@@ -22,6 +22,7 @@ from rig.loop.loop import Loop
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.tick.sequencer.segments import SettleRule
+from tests.refused import refused
 from tests.rig.rigs import bench_with
 from tests.waiting import wait_until
 
@@ -166,7 +167,7 @@ def test_a_full_disk_ends_the_run_safely_and_keeps_what_was_recorded(tmp_path):
 
 
 def test_a_level_beyond_the_voltage_limit_is_refused_before_anything_moves(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"levels_v\[3\] = 9.75 V: the bench magnet-beam allows up to 9.5 V"):
+    with refused(ConfigurationError, "the-bench-magnet-beam-allows-up-3", field="levels_v[3]", value=9.75):
         rig.run(plan_with(levels_v=(0.1, 0.2, 0.3, 9.75)), output=tmp_path / "run.h5")
     assert list(tmp_path.iterdir()) == []
 
@@ -189,7 +190,9 @@ MISTAKEN = {"specimen": {"linear_frequency_hz": 29.0}}
 
 
 def test_a_window_that_does_not_hold_the_tested_mode_is_refused(tmp_path):
-    with pytest.raises(ConfigurationError, match=r"linear_frequency_hz = 24\.37"):
+    with refused(
+        ConfigurationError, "linear-frequency-hz-2", field="controller.frequency_window_hz", value=[28.0, 30.0]
+    ):
         run_plan(plan_with(controller=OFF_RESONANCE), bench_with(), tmp_path / "run.h5")
 
 
@@ -324,7 +327,7 @@ def test_overwriting_keeps_the_old_file_until_the_new_one_is_begun_and_spares_wh
     before = output.read_bytes()
     with monkeypatch.context() as patch:
         patch.setattr("rig.campaigns.running.runner.JournalWriter.create", _cannot_create)
-        with pytest.raises(RecordingError, match="no room"):
+        with refused(RecordingError, "no-room"):
             rig.run(plan_with(levels_v=(0.4,)), output=output, overwrite=True)
     assert output.read_bytes() == before
     rig.run(plan_with(levels_v=(0.5,)), output=output, overwrite=True).close()
@@ -332,7 +335,7 @@ def test_overwriting_keeps_the_old_file_until_the_new_one_is_begun_and_spares_wh
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
     plan = tmp_path / "plan.toml"
     plan.write_text("mine")
-    with pytest.raises(RecordingError, match="not a file of vibrolock"):
+    with refused(RecordingError, "not-file-of-vibrolock"):
         rig.run(plan_with(levels_v=(0.4,)), output=plan, overwrite=True)
     assert plan.read_text() == "mine"
 
@@ -402,7 +405,7 @@ def test_up_and_down_with_repeats_measures_every_level_in_its_direction(tmp_path
 def test_an_existing_file_is_not_overwritten_unasked(tmp_path):
     output = tmp_path / "run.h5"
     output.write_text("precious")
-    with pytest.raises(RecordingError, match="exists already"):
+    with refused(RecordingError, "exists-already"):
         rig.run(plan_with(), output=output)
     assert output.read_text() == "precious"
 

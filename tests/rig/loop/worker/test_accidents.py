@@ -19,6 +19,7 @@ from rig.loop.worker.process import _presumed_latency, _shared
 from rig.loop.worker.session import WorkerSession
 from rig.loop.worker.spawn import Worker
 from rig.tick.safety.layout import GuardMode
+from tests.refused import refused
 from tests.rig.loop.worker.drivers import NotingDAQ
 from tests.rig.loop.worker.rigs import slow_bench, tone
 from tests.rig.loop.worker.test_worker import ROOT, is_there, ramped, ran
@@ -79,7 +80,7 @@ def test_a_device_that_waits_for_the_host_is_never_late(noting):
 def test_a_loop_killed_before_it_is_started_or_before_its_rows_are_asked_for_is_reported(noting):
     with WorkerSession(slow_bench()) as session:
         os.kill(session.pid, signal.SIGKILL)
-        with pytest.raises(DaqError, match="has ended \\(SIGKILL\\)"):
+        with refused(DaqError, "has-ended"):
             session.start(tone(slow_bench(), 60.0))
     with WorkerSession(slow_bench()) as session:
         loop = session.start(tone(slow_bench(), 60.0))

@@ -7,6 +7,7 @@ from hypothesis import given, strategies as st
 from rig.errors import DaqRefused
 from rig.wire.messages import VERSION, EmergencyStop, Heartbeat, Output, Readback, Request, Samples, Stream
 from rig.wire.serial.codec import Codec, ForeignVersion, Malformed
+from tests.refused import refused
 from tests.rig.wire.serial.strategies import messages, same, streams
 
 STREAM = Stream(n_channels=4, block=5, rate_hz=5000.0)
@@ -61,7 +62,7 @@ def test_blocks_of_another_shape_are_malformed_and_not_sent():
     for message in (Samples(0, counts), Output(0, counts[:, 0]), Readback(0, counts[:, 0])):
         with pytest.raises(Malformed):
             configured().decode(other.encode(message))
-        with pytest.raises(DaqRefused, match="of shape"):
+        with refused(DaqRefused, "of-shape"):
             configured().encode(message)
 
 
@@ -69,7 +70,7 @@ def test_blocks_are_neither_sent_nor_understood_before_their_shape_is_known():
     samples = Samples(0, np.zeros((5, 4), np.int16))
     with pytest.raises(Malformed):
         Codec().decode(configured().encode(samples))
-    with pytest.raises(DaqRefused, match="configure"):
+    with refused(DaqRefused, "configure"):
         Codec().encode(samples)
 
 
@@ -96,7 +97,7 @@ def test_version_1_has_no_periods_and_no_readbacks():
     assert configured(version=1).encode(Output(7, counts, 1, 1 << 20, 99)) == bytes.fromhex(
         "01040100070000000000000000000100020003000400"
     )
-    with pytest.raises(DaqRefused, match="version 2"):
+    with refused(DaqRefused, "version"):
         configured(version=1).encode(Readback(7, counts))
     with pytest.raises(Malformed):
         configured(version=1).decode(b"\1" + configured().encode(Readback(7, counts))[1:])
@@ -105,9 +106,9 @@ def test_version_1_has_no_periods_and_no_readbacks():
 
 
 def test_streams_that_no_frame_holds_are_refused():
-    with pytest.raises(DaqRefused, match="80028 bytes: allowed is 65536"):
+    with refused(DaqRefused, "bytes-allowed-is"):
         Codec().configure(Stream(n_channels=8, block=5000, rate_hz=1e4))
-    with pytest.raises(DaqRefused, match="24 bits: allowed is 16 or 32"):
+    with refused(DaqRefused, "bits-allowed-is-or"):
         Codec().configure(Stream(n_channels=8, block=5, rate_hz=1e4, bits=24))
 
 

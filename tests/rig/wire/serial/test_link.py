@@ -20,6 +20,7 @@ from rig.wire.messages import Answer, EmergencyStop, Heartbeat, Output, Request,
 from rig.wire.serial.link import SerialLink, line_load
 from rig.wire.serial.port import is_pseudo_terminal, open_pseudo_terminal
 from tests.docs.wire import on_the_line
+from tests.refused import refused
 from tests.rig.wire.serial.strategies import same
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals on this system")
@@ -123,7 +124,7 @@ def test_a_port_can_be_opened_again_and_closed_twice(line, ends):
     host, device = ends
     host.close()
     host.close()
-    with pytest.raises(DaqDisconnected, match="is not open"):
+    with refused(DaqDisconnected, "is-not-open"):
         host.receive(0.01)
     host.open()
     device.send(Answer(1, 0))
@@ -136,15 +137,15 @@ def test_a_port_that_somebody_holds_is_busy(line, ends):
 
 
 def test_a_port_that_is_not_there_is_said_with_those_that_are():
-    with pytest.raises(DaqDisconnected, match="'/dev/no-such-port': it is not there; serial ports here: "):
+    with refused(DaqDisconnected, "dev-no-such-port-it-is-2"):
         SerialLink.port("/dev/no-such-port", BAUD).open()
 
 
 def test_a_port_that_is_almost_there_is_suggested(monkeypatch):
     monkeypatch.setattr("rig.wire.serial.port.port_names", lambda: ["/dev/no-such-port-0", "/dev/ttyS0"])
-    with pytest.raises(DaqDisconnected, match="is it '/dev/no-such-port-0'"):
+    with refused(DaqDisconnected, "is-it-dev-no-such-port"):
         SerialLink.port("/dev/no-such-port-1", BAUD).open()
-    with pytest.raises(DaqDisconnected, match=r"ttyS0$"):
+    with refused(DaqDisconnected, "tty"):
         SerialLink.port("/dev/another", BAUD).open()
 
 
@@ -174,7 +175,7 @@ def test_what_is_no_serial_port_is_refused(path):
 @pytest.mark.parametrize("made", [Path.touch, os.mkfifo])
 def test_a_file_of_any_kind_is_no_serial_port(tmp_path, made):
     made(tmp_path / "port")
-    with pytest.raises(DaqRefused, match="/port': it is no serial port"):
+    with refused(DaqRefused, "port-it-is-no-serial-port"):
         SerialLink.port(str(tmp_path / "port"), BAUD).open()
 
 
@@ -183,7 +184,7 @@ def test_a_port_without_permission_says_which_group_helps(monkeypatch):
         raise serial.SerialException(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr("serial.Serial", denied)
-    with pytest.raises(DaqRefused, match="no permission to open it; on Linux, join the group"):
+    with refused(DaqRefused, "no-permission-to-open-it-on"):
         SerialLink.port("/dev/ttyS0", BAUD).open()
 
 
@@ -193,7 +194,7 @@ def test_a_port_that_goes_while_it_is_being_opened_is_let_go_of(line, monkeypatc
 
     with monkeypatch.context() as patch:
         patch.setattr("rig.wire.serial.port.second_descriptor", gone)
-        with pytest.raises(DaqDisconnected, match="gone"):
+        with refused(DaqDisconnected, "gone"):
             SerialLink.port(line.path, BAUD).open()
     with contextlib.closing(SerialLink.port(line.path, BAUD)) as host:
         host.open()
@@ -208,7 +209,7 @@ def test_whatever_an_adapter_says_when_it_vanishes_the_port_is_gone(ends, monkey
         for name in ("read", "write"):
             with monkeypatch.context() as patch:
                 patch.setattr(os, name, vanished)
-                with pytest.raises(DaqDisconnected, match="the port is gone") as said:
+                with refused(DaqDisconnected, "the-port-is-gone") as said:
                     link.send(Request(1, 1)) if name == "write" else link.receive(0.0 if link is ends[1] else 1.0)
             assert os.strerror(number) in str(said.value)
 
@@ -217,7 +218,7 @@ def test_the_devices_end_sees_its_line_go_as_well(line, ends):
     device = ends[1]
     ends[0].close()
     os.close(line.far_descriptor)
-    with pytest.raises(DaqDisconnected, match="device: the port is gone"):
+    with refused(DaqDisconnected, "device-the-port-is-gone"):
         device.receive(PATIENCE_S)
 
 
@@ -243,7 +244,7 @@ def test_an_unplugged_cable_is_said_by_reading_and_by_writing(line, ends):
     line.close()
     with pytest.raises(DaqDisconnected, match=f"{line.path}: the port is gone"):
         host.receive(PATIENCE_S)
-    with pytest.raises(DaqDisconnected, match="unplugged"):
+    with refused(DaqDisconnected, "unplugged"):
         host.send(Request(1, 1))
 
 
@@ -263,7 +264,7 @@ def test_a_line_that_takes_no_more_is_said_in_bounded_time_and_frames_stay_whole
     host = ends[0]
     samples = messages()[1][1]
     numbers = itertools.count()
-    with pytest.raises(DaqTimeout, match="takes no more bytes"):
+    with refused(DaqTimeout, "takes-no-more-bytes"):
         any(device.send(samples._replace(first=number)) for number in numbers)
     sent = next(numbers) - 1  # the one that was not taken
     assert device.counters["unsent_frames"] == 1

@@ -151,11 +151,11 @@ def test_range_use_counts_the_force_and_the_states() -> None:
 
 def test_what_cannot_be_coupled_is_named() -> None:
     model, voltage = oscillator(rate_hz=RATE_HZ), np.zeros(100)
-    with pytest.raises(IdentificationError, match="model: has 0 forces among its inputs"):
+    with pytest.raises(IdentificationError, match="`model`: has 0 forces among its inputs"):
         coupled_run(driven_by_voltage(model), shaker(), voltage)
     with pytest.raises(IdentificationError, match="voltage_v"):
         coupled_run(model, shaker(), [0.0, np.nan])
-    with pytest.raises(IdentificationError, match="lowest_hz: is 390 Hz"):
+    with pytest.raises(IdentificationError, match="`lowest_hz` = 390 Hz"):
         coupled_run(model, shaker(), voltage, lowest_hz=390.0)
     without = replace(model, outputs=tuple(replace(channel, role="response") for channel in model.outputs))
     with pytest.raises(IdentificationError, match="drive"):

@@ -148,14 +148,14 @@ def test_what_does_not_go_together_is_refused() -> None:
     with pytest.raises(IdentificationError, match="'fundamental' of a model driven by a force needs an exciter"):
         frequency_response(force, 1.0, force="fundamental", largest_range_use=3.0)
     with pytest.raises(
-        IdentificationError, match="exciter: makes harmonics of the force; leave it out for 'pure-sine'"
+        IdentificationError, match="`exciter`: makes harmonics of the force; leave it out for 'pure-sine'"
     ):
         frequency_response(force, 1.0, force="pure-sine", exciter=shaker(), largest_range_use=3.0)
-    with pytest.raises(IdentificationError, match="exciter: is inside a model that is driven by a voltage"):
+    with pytest.raises(IdentificationError, match="`exciter`: is inside a model that is driven by a voltage"):
         frequency_response(voltage, 1.0, force="fundamental", exciter=shaker(), largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="answers 'fundamental', 'rms' or 'voltage'"):
         frequency_response(voltage, 1.0, force="pure-sine", largest_range_use=3.0)
-    with pytest.raises(IdentificationError, match="force: is 'loud', allowed are fundamental, rms, pure-sine, voltage"):
+    with pytest.raises(IdentificationError, match="`force` = 'loud'; allowed: fundamental, rms, pure-sine, voltage"):
         frequency_response(force, 1.0, force="loud", largest_range_use=3.0)  # type: ignore[arg-type]
     with pytest.raises(IdentificationError, match="force_n: is -1 N, must be finite and above zero"):
         frequency_response(force, -1.0, force="pure-sine", largest_range_use=3.0)

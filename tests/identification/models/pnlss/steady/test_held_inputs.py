@@ -91,16 +91,16 @@ def test_inputs_without_a_value_are_named() -> None:
         steady_state(one, 25.0, 1.0, force="pure-sine", held_inputs=held, largest_range_use=3.0)
 
     with pytest.raises(
-        IdentificationError, match="held_inputs: has no value for constant, which the model has beside force"
+        IdentificationError, match="`held_inputs`: has no value for constant, which the model has beside force"
     ):
         asked(model, None)
     with pytest.raises(IdentificationError, match="has no input 'offset', its inputs are force, constant"):
         asked(model, {"offset": 1.0})
     with pytest.raises(IdentificationError, match="'force' is the force, which drives"):
         asked(model, {"force": 1.0, "constant": 1.0})
-    with pytest.raises(IdentificationError, match="'constant' is nan, needs a finite value"):
+    with pytest.raises(IdentificationError, match="'constant' is nan; allowed: a finite value"):
         asked(model, {"constant": float("nan")})
-    with pytest.raises(IdentificationError, match="model: has 2 inputs, 0 of them forces and 0 held constant"):
+    with pytest.raises(IdentificationError, match="`model`: has 2 inputs, 0 of them forces and 0 held constant"):
         asked(offset(driven_by_voltage(oscillator())), None)
-    with pytest.raises(IdentificationError, match=r"model: has inputs beside its force \(constant\)"):
+    with pytest.raises(IdentificationError, match=r"`model`: has inputs beside its force \(constant\)"):
         coupled_run(model, shaker(), np.zeros(100))
