@@ -24,6 +24,7 @@ MOST_LEVELS = len(MARKERS)
 """Of more levels the legend would say nothing."""
 LINES = ("-", "--", "-.", ":")
 SIZE_IN = (9.0, 4.2)
+"""Width and height of the page, inches; chosen."""
 
 
 @dataclass(frozen=True)

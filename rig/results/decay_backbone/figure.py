@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _SMALL_CHANGE = 2e-4
+"""Least height of the frequency axis over the last frequency, so that rounding does not look like a change; chosen."""
 
 
 def draw_decay(page: "Figure", found: DecayBackbone) -> None:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DRAWS = 400
+"""Exciters drawn from the covariance for the 95 % band; chosen."""
 _DECADES = 5.0
+"""Largest over smallest value from which on the axis is logarithmic; chosen."""
 _DOTS: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0, "color": REJECTED, "alpha": 0.5}
 
 

@@ -19,6 +19,7 @@ from rig.results.force_surface.prediction_options import ForceSurfacePrediction
 from rig.results.predictions.references import stepped_sines
 
 _INTERVAL = 1.96
+"""Half of a 95 % interval of a normal distribution, in standard deviations."""
 
 
 def predict(model: Path, request: ForceSurfacePrediction) -> Predictions:

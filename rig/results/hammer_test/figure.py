@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_OUTPUTS = 6
+"""Largest number of outputs that are drawn; chosen for legibility."""
 
 
 def draw_hammer_test(page: "Figure", found: HammerTest) -> None:

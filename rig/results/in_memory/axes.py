@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LENGTHS = {"mm": 1e3, "µm": 1e6}
+"""Factors from metres."""
 
 
 def length_factor(amplitude_m: NDArray[np.float64]) -> tuple[float, str]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _FREQUENCY, _LAG = "frequency, Hz", "phase lag of displacement, deg"
 _LAGS_DEG = (30.0, 90.0, 150.0)
+"""Phase lags of the sections that are drawn, deg: resonance, and one on each side; chosen."""
 
 
 def draw_response(page: "Figure", response: FrequencyResponse) -> None:

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_OUTPUTS = 4
+"""Largest number of outputs that are drawn; chosen for legibility."""
 _MOST_DOTS = 4000
+"""Largest number of dots of a curve; chosen for the size of the file."""
 
 
 def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 _COLUMNS = ("force_n", "frequency_hz", "amplitude_m", "phase_error_deg")
 _PATTERNS = (".4f", ".4f", ".5f", ".2f")
 _SCALES = (1.0, 1.0, 1e3, 1.0)
+"""Factors from SI units to those of the table."""
 
 
 def _summarise(backbone: Backbone) -> dict[str, Any]:

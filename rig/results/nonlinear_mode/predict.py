@@ -29,6 +29,7 @@ _Compared = tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | 
 
 
 _DRAWS = 40
+"""Modes drawn from the standard errors for a band; chosen."""
 _POINTS = 401
 """Points of a branch of a response. Chosen."""
 

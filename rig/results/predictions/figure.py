@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_NAMED = 12
+"""Largest number of names in a legend; chosen for legibility."""
 _NEAR = 1.3
 _MARGIN = 0.15
 _MARKED = {"mfc": "white", "mec": "black", "mew": 0.8, "ls": "none"}

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _BEYOND = 1.5
 """Drawn displacements relative to the largest of the training data."""
 _POINTS = 301
+"""Points of a drawn law; chosen."""
 
 
 def draw_structured(page: "Figure", found: "IdentifiedStructured") -> None:

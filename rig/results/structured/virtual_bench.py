@@ -28,6 +28,7 @@ _FAITHFUL_DAMPING = 1e-3
 _STRIDES = (32, 16, 8, 4, 2, 1)
 """Distances of the nodes that are kept, in nodes of the model's tables."""
 _DIGITS = 10
+"""Significant digits of the numbers in the table; chosen."""
 _LEAST_FREE = 0.01
 """Mass line below the band, over that of the modes, from which on it becomes a mode."""
 _LEAST_SLIDER = 1e-12

@@ -14,8 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_CHANNELS, _MOST_LEVELS = 6, 8
+"""Largest numbers of channels and levels that are drawn; chosen for legibility."""
 _SEGMENT = 4096
+"""Samples of a segment of Welch's method; chosen."""
 _THIN = 0.7
+"""Width of lines, points; chosen."""
 
 
 def draw_time_data(page: "Figure", data: TimeRecords) -> None:
