@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,7 +11,8 @@ from rig.system.studies import load_study
 
 if TYPE_CHECKING:
     from rig.bench import Bench
-    from rig.loop.worker.probe import DeviceReport
+    from rig.loop.doctor import MachineReport
+    from rig.loop.worker.probe import Advice, DeviceReport, Tried
 
 UNITS = {"block": "samples", "queue_blocks": "blocks", "watchdog_s": "s", "largest_rate_hz": "Hz"}
 
@@ -82,7 +83,7 @@ def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], out
         load_study("matrix", "-o").read_rows(output)  # only rows of a matrix are replaced
 
 
-def _show(facts: Mapping[str, Any], json: bool) -> None:
+def _show(facts: "MachineReport | DeviceReport", json: bool) -> None:
     """Print what was found of this machine, or of a device."""
     from rig.text.console import print_json
     from vibrolock.printable import printable_strings
@@ -91,8 +92,9 @@ def _show(facts: Mapping[str, Any], json: bool) -> None:
         print_json(facts)
     else:
         advice = facts.get("recommendation")
-        for name, value in printable_strings({key: facts[key] for key in facts if key != "recommendation"}).items():
-            _print(name, value)
+        for name, value in printable_strings({**facts}).items():
+            if name != "recommendation":
+                _print(name, value)
         if advice is not None:
             _print_advice(printable_strings(advice))
     if facts.get("failure"):
@@ -105,10 +107,11 @@ def _print(name: str, value: object) -> None:
     print(f"{name.replace('_', ' '):22} {text}")
 
 
-def _print_advice(advice: Mapping[str, Any]) -> None:
+def _print_advice(advice: "Advice") -> None:
     """Print the recommended settings, each with its reason, what was tried, and lines for the bench file."""
     print("\nrecommended")
-    settings, reasons = advice["settings"], advice["reasons"]
+    settings: Mapping[str, object] = advice["settings"]
+    reasons = advice["reasons"]
     for name in (*settings, *(name for name in reasons if name not in settings)):
         value = f"{settings[name]:g} {UNITS[name]}" if name in settings else "as it is"
         print(f"  {name.replace('_', ' '):20} {value:14} {reasons.get(name, '')}")
@@ -120,10 +123,11 @@ def _print_advice(advice: Mapping[str, Any]) -> None:
         print("\nfor the bench file\n" + "\n".join(f"  {line}".rstrip() for line in advice["bench_lines"]))
 
 
-def _tried(told: Mapping[str, Any]) -> str:
+def _tried(told: "Tried") -> str:
     """Return one line on settings that were tried."""
     names = ("block", "queue_blocks", "watchdog_s", "sample_rate_hz")
-    what = ", ".join(f"{name} {told[name]:g}" for name in names if name in told)
+    given: Mapping[str, object] = told
+    what = ", ".join(f"{name} {given[name]:g}" for name in names if name in given)
     if told.get("latched") or told.get("failure"):
         return f"{what}: {told.get('latched') or told['failure']}"
     return (
