@@ -183,7 +183,7 @@ def compile_text(text: str, source: str = "definition") -> Layout:
         import cantools
 
     try:
-        database = cantools.db.can.Database()
+        database = cantools.database.can.Database()
         database.add_dbc_string(text)
     except Exception as error:  # cantools has no common base for what a broken file may raise
         line = " ".join(str(error).split())
