@@ -25,13 +25,13 @@ _LOWEST, _GUESSED = 0.8, 0.5
 """Default lowest frequency: share of the lowest trained frequency, or of the linear resonance if that is unknown."""
 
 
-CoupledRun = Simulation
-"""Former name of the type of a run with an exciter."""
+class CoupledRun(Simulation):
+    """A simulated run of a model with its exciter: the fields of `Simulation`."""
 
 
 def pnlss_coupled_run(
     model: PnlssModel, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
-) -> Simulation:
+) -> CoupledRun:
     """Simulate a model with the exciter at its force input, both from rest, under a recorded voltage.
 
     Parameters
@@ -63,7 +63,7 @@ def _lowest(model: PnlssModel) -> float:
     return _GUESSED * linear_resonance_hz(model)
 
 
-def _run(model: PnlssModel, passes: Passes, row: int, output: int) -> Simulation:
+def _run(model: PnlssModel, passes: Passes, row: int, output: int) -> CoupledRun:
     m, loop, n = model.matrices, passes.loop, passes.n
     tables = (model.state_features.table, model.output_features.table)
     x, y = np.empty((passes.count, model.states)), np.empty((passes.count, len(model.outputs)))
@@ -80,7 +80,7 @@ def _run(model: PnlssModel, passes: Passes, row: int, output: int) -> Simulation
     notes = passes.notes(reached, count, change)
     if np.max(np.abs(np.linalg.eigvals(model.a))) > 1.0:
         notes.append("the model's linear part is unstable")
-    return Simulation(
+    return CoupledRun(
         outputs=y.T,
         states=x.T,
         state_use=use_of(np.max(np.abs(x[:reached]), axis=0, initial=0.0), model.state_range),

@@ -26,13 +26,13 @@ _GUESSED = 0.5
 """Default lowest frequency relative to the resonance of small vibrations."""
 
 
-CoupledMotion = Motion
-"""Former name of the type of a run with an exciter."""
+class CoupledMotion(Motion):
+    """A simulated run of a structured model with its exciter: the fields of `Motion`."""
 
 
 def structured_coupled_run(
     model: StructuredModel, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
-) -> Motion:
+) -> CoupledMotion:
     """Simulate a structured model with the exciter at its force input, both from rest, under a recorded voltage.
 
     Parameters
@@ -73,8 +73,9 @@ def structured_coupled_run(
     valid = -(-reached // model.steps)
     states[valid:], force[valid:] = np.nan, np.nan
     found = motion_of(model, force[None], states, int(room.unsolved[0]))
-    return replace(
-        found,
+    known = {name: value for name, value in vars(found).items() if name not in ("force_n", "passes", "change", "notes")}
+    return CoupledMotion(
+        **known,
         force_n=force,
         passes=repeats,
         change=change,
