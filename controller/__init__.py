@@ -14,8 +14,7 @@ Names, of which ``help(controller.Law)`` and so on say more:
     Law, control_state          all parameters of the law in one record, and its state in another
     Detector, FrequencyLaw, AmplitudeLaw, ForceLoop, LockState    its parts
 
-The kernels that step the law stand in the modules of its parts: ``controller.detector.detect``, ``controller.frequency.follow``
-and so on.
+`controller.kernels` has the kernels that step the law (``detect``, ``follow`` and so on), `controller.tuning` computes gains.
 """
 
 from typing import TYPE_CHECKING

@@ -44,17 +44,19 @@ AMPLITUDE = np.dtype(
 )
 """Parameters of the amplitude law (one record), with one record for each of its loops."""
 
-OUTPUT = np.dtype([("amplitude_v", "f8"), ("turn", "f8"), ("behind", "i8"), ("turn_behind", "i8")])
+OUTPUT = np.dtype(
+    [("amplitude_v", "f8"), ("command_phase_rad", "f8"), ("saturation_sign", "i8"), ("phase_saturation_sign", "i8")]
+)
 """The last output (one record): amplitude and angle of ``u = Re(U exp(i theta))``.
 
-``behind``, ``turn_behind``: whether a limit holds amplitude and angle back from the demanded value: 1 while the value cannot
-rise as fast as demanded, -1 while it cannot fall as fast, else 0."""
+``saturation_sign``, ``phase_saturation_sign``: 1 while a limit keeps amplitude or angle from rising as fast as demanded, -1
+while it keeps them from falling as fast, else 0."""
 
 AMPLITUDE_STATE = np.dtype(
     [
         ("law", "i8"),
         ("demanded_v", "f8"),
-        ("demanded_turn", "f8"),
+        ("demanded_phase_rad", "f8"),
         ("saturated", "i8"),
         ("output", OUTPUT),
         ("force", FORCE_LOOP_STATE),
@@ -100,7 +102,7 @@ class AmplitudeSettings(ThroughResponseSettings, ResponseSettings, ForceSettings
 
 
 @inner_kernel
-def held_size(state: Record, vibration: Record) -> float:
+def held_amplitude(state: Record, vibration: Record) -> float:
     """Return the measured value of the held quantity: force (N), its RMS (N) or displacement (m); 0 without a loop."""
     if state.law == FORCE:
         return float(vibration.force_n)
@@ -116,12 +118,12 @@ def take_over(parameters: Record, state: Record, vibration: Record, law: int) ->
     All integrals start from the present output, so that the output does not jump.
     """
     state.law = law
-    state.demanded_turn = state.output.turn
-    state.output.turn_behind = 0
+    state.demanded_phase_rad = state.output.command_phase_rad
+    state.output.phase_saturation_sign = 0
     begin_force(parameters.force, state.force, state.output.amplitude_v)
     begin_response(parameters.response, state.response, vibration, state.output)
     begin_reference(state.reference, vibration.displacement_m)
-    return float(state.output.amplitude_v if law == VOLTAGE else held_size(state, vibration))
+    return float(state.output.amplitude_v if law == VOLTAGE else held_amplitude(state, vibration))
 
 
 @inner_kernel
@@ -130,16 +132,16 @@ def demand(
 ) -> float:
     """Evaluate the amplitude law for one sample: return the output amplitude (V) for ``level`` (V, N or m).
 
-    The output's angle is written to ``state.demanded_turn``. Loops that control the response keep their last demand while
+    The output's angle is written to ``state.demanded_phase_rad``. Loops that control the response keep their last demand while
     force and motion are not ``present``. ``by_loop``: the frequency law sets the frequency ``omega`` (rad/s) so as to reach
     ``wanted_lag`` (rad). If the plan gives the frequency there is no wanted lag.
     """
-    output, behind = state.output, state.output.behind
-    held = held_size(state, vibration)
+    output, saturation_sign = state.output, state.output.saturation_sign
+    held = held_amplitude(state, vibration)
     if state.law == VOLTAGE:
         state.demanded_v = level
     elif state.law != RESPONSE and parameters.force.loop != THROUGH_RESPONSE:
-        state.demanded_v = hold_force(parameters.force, state.force, level, held, behind)
+        state.demanded_v = hold_force(parameters.force, state.force, level, held, saturation_sign)
     elif vibration.present == 1:
         wanted_m = level
         if state.law != RESPONSE:
@@ -148,25 +150,25 @@ def demand(
                 active = force_at_lag(vibration, held, wanted_lag, state.law == FORCE_RMS)
                 slope = force_slope(parameters.reference, state.reference, vibration, wanted_lag, omega)
             wanted_m = wanted_displacement(
-                parameters.reference, state.reference, level, active, slope, state.saturated == 1, behind
+                parameters.reference, state.reference, level, active, slope, state.saturated == 1, saturation_sign
             )
-        state.demanded_v, turn = hold_response(parameters.response, state.response, vibration, output, wanted_m)
+        state.demanded_v, phase_rad = hold_response(parameters.response, state.response, vibration, output, wanted_m)
         if parameters.response.turns == 1:
-            state.demanded_turn = turn
+            state.demanded_phase_rad = phase_rad
     state.saturated = 1 if state.demanded_v >= parameters.largest_v else 0
     return float(state.demanded_v)
 
 
 @inner_kernel
-def see_output(state: Record, demanded_v: float, amplitude_v: float, turn: float) -> None:
+def track_saturation(state: Record, demanded_v: float, amplitude_v: float, phase_rad: float) -> None:
     """Store the actual output after all limits (V, rad), and which way it is held back from the demanded output."""
     output = state.output
-    output.amplitude_v, output.turn = amplitude_v, turn
-    output.behind = output.turn_behind = 0
+    output.amplitude_v, output.command_phase_rad = amplitude_v, phase_rad
+    output.saturation_sign = output.phase_saturation_sign = 0
     if abs(amplitude_v - demanded_v) > HELD_BACK * abs(demanded_v):
-        output.behind = 1 if demanded_v > amplitude_v else -1
-    if turn != state.demanded_turn:
-        output.turn_behind = 1 if wrap(state.demanded_turn - turn) > 0.0 else -1
+        output.saturation_sign = 1 if demanded_v > amplitude_v else -1
+    if phase_rad != state.demanded_phase_rad:
+        output.phase_saturation_sign = 1 if wrap(state.demanded_phase_rad - phase_rad) > 0.0 else -1
 
 
 def amplitude_state(parameters: np.ndarray) -> np.ndarray:

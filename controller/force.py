@@ -81,11 +81,11 @@ def begin_force(parameters: Record, state: Record, amplitude_v: float) -> None:
 
 
 @kernel
-def hold_force(parameters: Record, state: Record, wanted_n: float, held_n: float, behind: int) -> float:
+def hold_force(parameters: Record, state: Record, wanted_n: float, held_n: float, saturation_sign: int) -> float:
     """Evaluate the linear or the logarithmic loop for one sample: return the output amplitude (V) for the force ``wanted_n``.
 
-    ``behind``: 1 while the output cannot rise as fast as demanded, -1 while it cannot fall as fast; the integral does not move
-    further in that direction.
+    ``saturation_sign``: 1 while the output cannot rise as fast as demanded, -1 while it cannot fall as fast; the integral then
+    does not move further in that direction.
     """
     if parameters.loop == LINEAR:
         demanded_v, integral = proportional_integral(
@@ -98,7 +98,7 @@ def hold_force(parameters: Record, state: Record, wanted_n: float, held_n: float
             0.0,
             parameters.largest_v,
         )
-        if (integral - state.integral) * behind <= 0.0:
+        if (integral - state.integral) * saturation_sign <= 0.0:
             state.integral = integral
         return float(demanded_v)
     demanded_v, _, state.log_integral = log_proportional_integral(
@@ -109,6 +109,6 @@ def hold_force(parameters: Record, state: Record, wanted_n: float, held_n: float
         parameters.dt_s,
         parameters.smallest_v,
         parameters.largest_v,
-        behind,
+        saturation_sign,
     )
     return float(demanded_v)

@@ -12,7 +12,7 @@ from controller.harmonics.records import HARMONICS, HARMONICS_STATE
 from controller.harmonics.settings import HarmonicsSettings
 from controller.lock import LOCK, THRESHOLDS, LockRule
 from controller.period import PERIOD
-from controller.rest import REST, REST_STATE, see_rest, take_as_measured
+from controller.rest import REST, REST_STATE, estimate_steady_force, take_as_measured
 from controller.settings import Settings
 from vibrolock.compiled import Record, inner_kernel
 
@@ -142,7 +142,7 @@ def measure_phase(law: Record, control: Record, wanted_lag: float, lag_of_skew: 
     if closed:
         vibration.error_rad = phase_error(law.detector, control.detector, vibration, wanted_lag, lag_of_skew)
     if by_loop:
-        see_rest(law.rest, control.rest, vibration, control.frequency.omega, wanted_lag, lag_of_skew)
+        estimate_steady_force(law.rest, control.rest, vibration, control.frequency.omega, wanted_lag, lag_of_skew)
     else:
         take_as_measured(control.rest, vibration)
     return closed

@@ -45,16 +45,16 @@ THRESHOLDS = np.dtype(
 LOCK = np.dtype(
     [
         ("state", "i8"),
-        ("close_periods", "i8"),
-        ("far_periods", "i8"),
-        ("astray_periods", "i8"),
-        ("strays", "i8"),
+        ("in_band_periods", "i8"),
+        ("out_of_band_periods", "i8"),
+        ("net_out_of_band_periods", "i8"),
+        ("out_of_band", "i8"),
         ("gained", "i8"),
     ]
 )
-"""State of the phase lock (one record). ``close_periods``, ``far_periods``: in a row, up to the present one;
-``astray_periods``: far periods less close ones at a held level; ``strays``: the error of the present period exceeds that at
-which ramps wait; ``gained``: there has been a lock before."""
+"""State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
+``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``out_of_band``: the error of the
+present period exceeds that at which ramps wait; ``gained``: there has been a lock before."""
 
 
 class LockRule(Settings):
@@ -101,46 +101,46 @@ def next_lock_state(lock: Record, thresholds: Record, present: bool, held: bool,
     """
     size = abs(error)
     if not present:
-        lock.close_periods = 0
-        lock.strays = 0
+        lock.in_band_periods = 0
+        lock.out_of_band = 0
         if lock.state == LOCKED:
-            lock.far_periods += 1
-            if lock.far_periods >= thresholds.lost_periods:
+            lock.out_of_band_periods += 1
+            if lock.out_of_band_periods >= thresholds.lost_periods:
                 lock.state = LOST
         elif lock.state != LOST:
             lock.state = SEARCHING
         return
     if lock.state == SEARCHING:
         lock.state = ACQUIRING
-    lock.close_periods = lock.close_periods + 1 if size < thresholds.locked_rad else 0
-    lock.strays = 1 if size > thresholds.waiting_rad else 0
+    lock.in_band_periods = lock.in_band_periods + 1 if size < thresholds.locked_rad else 0
+    lock.out_of_band = 1 if size > thresholds.waiting_rad else 0
     if not held:
-        lock.astray_periods = 0
+        lock.net_out_of_band_periods = 0
     elif size > thresholds.lost_rad:
-        lock.astray_periods += 1
-    elif size < thresholds.locked_rad and lock.astray_periods > 0:
-        lock.astray_periods -= 1
+        lock.net_out_of_band_periods += 1
+    elif size < thresholds.locked_rad and lock.net_out_of_band_periods > 0:
+        lock.net_out_of_band_periods -= 1
     if size > thresholds.lost_rad and held:
-        lock.far_periods += 1
+        lock.out_of_band_periods += 1
     elif size > thresholds.lost_rad and lock.state == LOCKED:
         lock.state = ACQUIRING
     else:
-        lock.far_periods = 0
-    if lock.close_periods >= thresholds.locked_periods:
+        lock.out_of_band_periods = 0
+    if lock.in_band_periods >= thresholds.locked_periods:
         lock.state = LOCKED
         lock.gained = 1
-        lock.far_periods = 0
-        lock.astray_periods = 0
+        lock.out_of_band_periods = 0
+        lock.net_out_of_band_periods = 0
         return
-    gone = lock.state == LOCKED and lock.far_periods >= thresholds.lost_periods
-    if gone or (lock.gained == 1 and lock.astray_periods >= SWINGING * thresholds.lost_periods):
+    gone = lock.state == LOCKED and lock.out_of_band_periods >= thresholds.lost_periods
+    if gone or (lock.gained == 1 and lock.net_out_of_band_periods >= SWINGING * thresholds.lost_periods):
         lock.state = LOST
 
 
 @kernel
 def reacquire(lock: Record) -> None:
     """Return to ACQUIRING because a new level is being approached; a lost lock may be sought again."""
-    lock.far_periods = 0
-    lock.close_periods = 0
-    lock.astray_periods = 0
+    lock.out_of_band_periods = 0
+    lock.in_band_periods = 0
+    lock.net_out_of_band_periods = 0
     lock.state = ACQUIRING

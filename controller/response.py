@@ -78,7 +78,7 @@ def begin_response(parameters: Record, state: Record, vibration: Record, output:
     """Start the loop from the present ``output``; the response will be held at its present phase."""
     amplitude = output.amplitude_v
     state.log_integral = complex(
-        math.log(min(max(amplitude, parameters.smallest_v), parameters.largest_v)), output.turn
+        math.log(min(max(amplitude, parameters.smallest_v), parameters.largest_v)), output.command_phase_rad
     )
     state.reference_turn = math.atan2(vibration.drive.imag, vibration.drive.real)
     state.error = 0.0
@@ -94,9 +94,9 @@ def response_proportional(parameters: Record, state: Record, drive: complex, out
     """
     if parameters.plant_gain == 0.0:
         return complex(parameters.kp)
-    amplitude, turn = output.amplitude_v, output.turn
+    amplitude, phase_rad = output.amplitude_v, output.command_phase_rad
     if amplitude > 0.0:
-        now = drive * complex(math.cos(turn), -math.sin(turn)) / amplitude / parameters.plant_gain
+        now = drive * complex(math.cos(phase_rad), -math.sin(phase_rad)) / amplitude / parameters.plant_gain
         state.plant_ratio += 0.25 * parameters.ki * parameters.dt_s * (now - state.plant_ratio)
     ratio = size(state.plant_ratio)
     bounded = min(max(ratio, 1.0 / PLANT_VARIES), PLANT_VARIES) / ratio if ratio > 0.0 else 0.0
@@ -125,9 +125,9 @@ def hold_response(
         parameters.dt_s,
         parameters.smallest_v,
         parameters.largest_v,
-        output.behind,
+        output.saturation_sign,
     )
-    if (integral.imag - before) * output.turn_behind > 0.0:  # the output cannot turn this way
+    if (integral.imag - before) * output.phase_saturation_sign > 0.0:  # the phase cannot change this way
         angle -= integral.imag - before
         integral = complex(integral.real, before)
     state.log_integral = integral

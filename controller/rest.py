@@ -57,7 +57,7 @@ def take_as_measured(state: Record, vibration: Record) -> None:
 
 
 @inner_kernel
-def see_rest(
+def estimate_steady_force(
     parameters: Record, state: Record, vibration: Record, omega: float, wanted_lag: float, lag_of_skew: float
 ) -> None:
     """Update the estimate with one sample, for the oscillator's frequency ``omega`` (rad/s) and ``wanted_lag`` (rad).

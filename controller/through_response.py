@@ -96,13 +96,19 @@ def force_slope(parameters: Record, state: Record, vibration: Record, wanted_lag
 
 @kernel
 def wanted_displacement(
-    parameters: Record, state: Record, wanted_n: float, active_n: float, slope: float, saturated: bool, behind: int
+    parameters: Record,
+    state: Record,
+    wanted_n: float,
+    active_n: float,
+    slope: float,
+    saturated: bool,
+    saturation_sign: int,
 ) -> float:
     """Evaluate the loop for one sample: return the displacement (m) at which the active force should become ``wanted_n``.
 
     ``d ln X_ref/dt = (k/s) ln(F* sin psi*/(F sin psi))`` with the slope s. X_ref does not move while the output cannot follow.
     """
     error = log_ratio(wanted_n, active_n) / slope
-    if behind >= 0 if error < 0.0 else (not saturated and behind <= 0):
+    if saturation_sign >= 0 if error < 0.0 else (not saturated and saturation_sign <= 0):
         state.log_displacement += parameters.ki * parameters.dt_s * error
     return math.exp(state.log_displacement)

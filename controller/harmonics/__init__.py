@@ -1,6 +1,6 @@
 """The harmonics loop: drives harmonics of the output so that those of the measured force take their wanted values.
 
-The output is ``u = U Re[exp(i (theta + turn))] + Re[sum_h V_h exp(i h theta)]`` with a complex V_h for each harmonic 2 to H.
+The output is ``u = U Re[exp(i (theta + phase))] + Re[sum_h V_h exp(i h theta)]`` with a complex V_h for each harmonic 2 to H.
 An adaptive filter estimates the force's harmonics F_h in the oscillator's phase. Near a steady vibration
 ``F_h = D_h + P_h V_h``: D_h comes from structure and exciter, P_h is the plant from output to force at that harmonic. One
 complex integral law for each harmonic acts through it, with the wanted G_h:

@@ -91,10 +91,10 @@ class HarmonicsSettings(Settings):
         out["left_alone"][0, list(self.left_alone)] = 1
         return out
 
-    def check_frequency(self, sample_rate_hz: float, highest_hz: float, lead_samples: float) -> None:
+    def check_frequency(self, sample_rate_hz: float, highest_hz: float, loop_delay_samples: float) -> None:
         """Raise ValueError if ``highest_hz`` is too high for the filter, for a harmonic or for the delay of the output.
 
-        ``lead_samples``: samples from an output to the input that shows it.
+        ``loop_delay_samples``: samples from an output to the input that shows it.
         """
         turn = 2.0 * math.pi * highest_hz / sample_rate_hz
         at = f"at {highest_hz:g} Hz and {sample_rate_hz:g} samples/s"
@@ -107,10 +107,10 @@ class HarmonicsSettings(Settings):
             raise InputError(
                 f"allowed {at} is up to {most:.2g} with H = {self.highest}", field="harmonics.corner", value=self.corner
             )
-        margin = self.phase_margin_deg(turn * lead_samples)
+        margin = self.phase_margin_deg(turn * loop_delay_samples)
         if margin < SMALLEST_MARGIN_DEG:
             raise InputError(
-                f"its phase margin {at} is {margin:.0f} deg with {lead_samples:g} samples from output to input",
+                f"its phase margin {at} is {margin:.0f} deg with {loop_delay_samples:g} samples from output to input",
                 field="harmonics.integral",
                 value=self.integral,
                 allowed=f"at least {SMALLEST_MARGIN_DEG:g}: smaller, or shorter blocks, or a shorter queue",

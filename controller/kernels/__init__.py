@@ -11,9 +11,9 @@ if TYPE_CHECKING:
         RESPONSE as RESPONSE,
         VOLTAGE as VOLTAGE,
         demand as demand,
-        held_size as held_size,
-        see_output as see_output,
+        held_amplitude as held_amplitude,
         take_over as take_over,
+        track_saturation as track_saturation,
     )
     from controller.detector import ADAPTIVE as ADAPTIVE, detect as detect, force_rms as force_rms
     from controller.frequency import follow as follow

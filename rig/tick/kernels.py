@@ -21,11 +21,11 @@ from controller.kernels import (
     detect,
     follow,
     force_rms,
-    held_size,
+    held_amplitude,
     measure_phase,
-    see_output,
     size,
     take_over,
+    track_saturation,
 )
 from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
@@ -155,7 +155,7 @@ def step_sequencer(t: TickArrays) -> bool:
         begin_segment(t, t.segments[progress.segment])
     progress.sample = loop.sample
     progress.cycle = loop.cycles + loop.theta_in / TWO_PI
-    missed = amplitude.saturated == 1 and held_size(amplitude, t.control[0].vibration) < UNREACHED * progress.level
+    missed = amplitude.saturated == 1 and held_amplitude(amplitude, t.control[0].vibration) < UNREACHED * progress.level
     progress.unreached = 1 if missed else 0
     advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.control[0].lock, t.guard[0])
     running = t.guard[0].mode == ARMED and progress.finished == 0
@@ -191,11 +191,11 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
     amplitude, guard, limits = t.control[0].amplitude, t.guard[0], t.limits[0]
     if running and t.loop[0].drive == SILENT:
         release(guard)
-    before, turn = guard.amplitude_v, amplitude.output.turn
+    before, turn = guard.amplitude_v, amplitude.output.command_phase_rad
     permitted = permitted_amplitude(guard, limits, allowed, t.loop[0].sample)
     if running:
-        turn = permitted_command_phase(limits, turn, amplitude.demanded_turn, before, permitted)
-    see_output(amplitude, demanded, permitted, turn)
+        turn = permitted_command_phase(limits, turn, amplitude.demanded_phase_rad, before, permitted)
+    track_saturation(amplitude, demanded, permitted, turn)
     return permitted
 
 
@@ -288,7 +288,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         loop.cycles += 1
         close_period(t)
     loop.theta_in = theta_in
-    add_sample(control.period, vibration, held_size(amplitude, vibration))
+    add_sample(control.period, vibration, held_amplitude(amplitude, vibration))
 
     running = step_sequencer(t)
     demanded = allowed = 0.0
@@ -299,7 +299,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         allowed = demanded if amplitude.law == VOLTAGE else permitted_level(t.plausibility[0], demanded)
     permitted = permit_output(t, demanded, allowed, running)
     follow_harmonics(t, permitted, running)
-    output = oscillate(t, permitted, amplitude.output.turn)
+    output = oscillate(t, permitted, amplitude.output.command_phase_rad)
 
     flags |= HELD if loop.held == 1 else 0
     flags |= FREQUENCY_CLAMPED if running and frequency.clamped == 1 else 0

@@ -30,7 +30,7 @@ def judge_response(t: TickArrays) -> None:
             shut_down(guard, SENSOR_STUCK, channel, force if side == 1 else response, loop.sample, False)
     if law == VOLTAGE:
         return
-    slipping, tone = lock.state == LOCKED and lock.far_periods > 0, loop.drive == TONE
+    slipping, tone = lock.state == LOCKED and lock.out_of_band_periods > 0, loop.drive == TONE
     if check_held_level(t.expected[0], plausibility, control.period, t.progress[0].level, law, slipping, tone):
         channel = loop.drive_channel if law == RESPONSE else loop.force_channel
         value = response if law == RESPONSE else control.period.held
@@ -91,7 +91,7 @@ def close_period(t: TickArrays) -> None:
     if not open_loop:
         next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad)
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
-    behind = amplitude.output.behind != 0 and amplitude.law == VOLTAGE
+    behind = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE
     locked = (open_loop or lock.state == LOCKED) and not behind
     period.output_v = t.guard[0].amplitude_v
     period.saturated, period.clamped = amplitude.saturated, control.frequency.clamped

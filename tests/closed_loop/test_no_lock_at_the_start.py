@@ -81,7 +81,7 @@ def test_a_reversed_sensor_in_voltage_control_is_noticed_at_the_lowest_level(rol
 
 def _verdict(state, clamped, far, elapsed):
     settling, lock = np.zeros(1, SETTLING), np.zeros(1, LOCK)
-    settling["clamped_in_row"], lock["state"], lock["far_periods"] = clamped, state, far
+    settling["clamped_in_row"], lock["state"], lock["out_of_band_periods"] = clamped, state, far
     return Outcome(start_verdict(settling[0], lock[0], elapsed))
 
 

@@ -50,7 +50,7 @@ def test_a_response_that_keeps_still_has_no_slope_whatever_the_force_does():
 def test_the_proportional_gain_cancels_a_pole_that_has_moved_under_the_same_residue():
     parameters, state, output = _response_loop()
     moved = complex(-11.0, -12.0)
-    state["plant_ratio"], output["turn"], output["amplitude_v"] = 1.0, 0.4, 0.5
+    state["plant_ratio"], output["command_phase_rad"], output["amplitude_v"] = 1.0, 0.4, 0.5
     drive = complex(GAIN * -POLE / -moved * 0.5 * np.exp(0.4j))
     for _ in range(20_000):
         kp = response_proportional(parameters, state, drive, output)

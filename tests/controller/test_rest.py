@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controller.detector import VIBRATION
-from controller.rest import REST_STATE, RestSettings, see_rest
+from controller.rest import REST_STATE, RestSettings, estimate_steady_force
 
 W, ZETA, SHAPE = 2 * math.pi * 24.37, 0.004, 0.9
 OMEGA = 2 * math.pi * 24.3  # of the oscillator
@@ -23,14 +23,14 @@ def _records(share, corner=100.0):
 
 
 def _seen(rate, share=1.0):
-    """What `see_rest` makes of a displacement ``exp(rate t)`` in the oscillator's frame and the force that it takes exactly."""
+    """What `estimate_steady_force` makes of ``exp(rate t)`` in the oscillator's frame, and the force that it takes exactly."""
     parameters, state, vibration = _records(share)
     s = 1j * OMEGA + rate
     per_x = (s * s + 2 * ZETA * W * s + W * W) / SHAPE**2
     for k in range(1000):
         x = DISPLACEMENT_M * cmath.exp(rate / FS * (k - 1000))
         vibration["force"], vibration["drive"] = per_x * x, s * s * x
-        see_rest(parameters, state, vibration, OMEGA, LAG, 0.0)
+        estimate_steady_force(parameters, state, vibration, OMEGA, LAG, 0.0)
     at_rest = (W * W - OMEGA**2 + 2j * ZETA * W * OMEGA) / SHAPE**2 / -(OMEGA**2)  # force over acceleration
     lag = LAG - vibration["rest_error_rad"]
     found = vibration["rest_force_n"] / vibration["rest_drive_m_s2"] * cmath.exp(1j * lag)
@@ -53,7 +53,7 @@ def test_a_share_of_it_may_be_left():
 def test_without_a_corner_the_force_is_taken_as_it_is():
     parameters, state, vibration = _records(1.0, corner=0.0)
     vibration["force_n"], vibration["error_rad"] = 0.7, 0.1
-    see_rest(parameters, state, vibration, OMEGA, LAG, 0.0)
+    estimate_steady_force(parameters, state, vibration, OMEGA, LAG, 0.0)
     assert (vibration["rest_force_n"], vibration["rest_error_rad"]) == (0.7, 0.1)
 
 
@@ -61,5 +61,5 @@ def test_a_channel_that_is_late_is_turned_back():
     parameters, state, vibration = _records(1.0)
     for _ in range(1000):
         vibration["force"], vibration["drive"] = 1.0, 2.0 * cmath.exp(1j * (0.5 * math.pi - 0.02))
-        see_rest(parameters, state, vibration, OMEGA, LAG, 0.02)
+        estimate_steady_force(parameters, state, vibration, OMEGA, LAG, 0.02)
     assert vibration["rest_error_rad"] == pytest.approx(0.0, abs=1e-9)

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from controller import AmplitudeLaw, PhaseLockedLoop, control_state
-from controller.kernels import advance_phase, demand, detect, follow, measure_phase, see_output, take_over
+from controller.kernels import advance_phase, demand, detect, follow, measure_phase, take_over, track_saturation
 
 M, C, K, K3 = 1.0, 2.5, 15800.0, 1e9  # kg, N s/m, N/m, N/m^3; the exciter makes 1 N per volt
 DT, LAG = 1 / 5000, -0.5 * math.pi  # s; rad, phase resonance
@@ -37,7 +37,7 @@ for held, target in ((AmplitudeLaw.VOLTAGE, 0.1), *((AmplitudeLaw.RESPONSE, x_m)
         level = take_over(parameters["amplitude"], amplitude, vibration, held)
     start = level or target
     for k in range(round(3.0 / DT)):
-        force = volts * math.cos(theta + float(amplitude["demanded_turn"]))
+        force = volts * math.cos(theta + float(amplitude["demanded_phase_rad"]))
         a = (force - C * (v + 0.5 * DT * a) - K * x - K3 * x**3) / M
         v += a * DT
         x += v * DT
@@ -48,7 +48,7 @@ for held, target in ((AmplitudeLaw.VOLTAGE, 0.1), *((AmplitudeLaw.RESPONSE, x_m)
             follow(parameters["frequency"], frequency, vibration, LAG)
         level = start * (target / start) ** min(1.0, k * DT / 1.5)
         volts = demand(parameters["amplitude"], amplitude, vibration, level, LAG, omega, True)
-        see_output(amplitude, volts, volts, float(amplitude["demanded_turn"]))
+        track_saturation(amplitude, volts, volts, float(amplitude["demanded_phase_rad"]))
         theta = advance_phase(theta, float(frequency["omega"]), DT)
         if k % 100 == 0:
             history.append((float(vibration["displacement_m"]), omega / math.tau))

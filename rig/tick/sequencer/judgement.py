@@ -128,7 +128,7 @@ def is_slipping(lock: Record) -> bool:
 
     Any other failure of a segment is then put down to the loss of the lock.
     """
-    return bool(lock.state == LOCKED and lock.far_periods > 0)
+    return bool(lock.state == LOCKED and lock.out_of_band_periods > 0)
 
 
 @kernel
@@ -152,7 +152,7 @@ def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed:
 @kernel
 def was_always_far(lock: Record, elapsed: float) -> bool:
     """Return whether the phase error was that of a lost lock in every period of a segment, and in at least 100 periods."""
-    return bool(lock.far_periods >= max(FAR_PERIODS, math.floor(elapsed) - 1))
+    return bool(lock.out_of_band_periods >= max(FAR_PERIODS, math.floor(elapsed) - 1))
 
 
 @kernel
@@ -171,5 +171,5 @@ def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
         return OUTSIDE_WINDOW
     if was_always_far(lock, elapsed):
         return NOT_LOCKED
-    always_far = lock.far_periods > 0 and lock.far_periods >= math.floor(elapsed) - 1
+    always_far = lock.out_of_band_periods > 0 and lock.out_of_band_periods >= math.floor(elapsed) - 1
     return RUNNING if always_far or settling.clamped_in_row > 0 else DONE

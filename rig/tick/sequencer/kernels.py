@@ -204,7 +204,9 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
 @kernel
 def must_wait(progress: Record, segment: Record, lock: Record) -> bool:
     """Return whether an upward ramp waits because the phase of a loop that has been locked is off; sweeps do not."""
-    return bool(segment.kind == RAMP and segment.drive == LOOP_DRIVE and progress.unlocked == 0 and lock.strays == 1)
+    return bool(
+        segment.kind == RAMP and segment.drive == LOOP_DRIVE and progress.unlocked == 0 and lock.out_of_band == 1
+    )
 
 
 @kernel
