@@ -45,7 +45,7 @@ def on_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]],
     ``help`` of such a package prints its docstring, which is therefore where the names are introduced. `pydoc` finds what it
     prints by `inspect.getmembers`, which would import every name; all classes in full are 8500 lines for ``identification``.
     """
-    module_of = _modules(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
+    module_of = module_of_names(Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8"))
 
     def get(name: str) -> Any:
         if name not in module_of:
@@ -62,7 +62,7 @@ def on_use(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]],
     return get, names, sorted(module_of)
 
 
-def _modules(source: str) -> dict[str, str]:
+def module_of_names(source: str) -> dict[str, str]:
     """Return the module of each name that a package imports under ``if TYPE_CHECKING``."""
     for statement in ast.parse(source).body:
         match statement:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import grimp
 
+from vibrolock.on_use import module_of_names
+
 PRODUCT = ("vibrolock", "rig", "controller", "simulators", "identification")
 PACKAGES = (*PRODUCT, "benchmarks", "studies", "tests")
 
@@ -58,7 +60,7 @@ def complete(graph: grimp.ImportGraph, text: Mapping[str, str], drivers: list[st
     - Drivers are entry points, and a result that draws or shows itself needs figures and tables.
     """
     product = (module for module in text if module.startswith(PRODUCT))
-    on_use = {module: names for module in product if (names := _names_on_use(module, text[module]))}
+    on_use = {module: names for module in product if (names := _names_on_use(text[module]))}
     for package, module_of in on_use.items():
         _part(graph, text, package, module_of)
     modules = graph.modules
@@ -105,10 +107,9 @@ def packages_around(module: str) -> Iterator[str]:
         yield module
 
 
-def _names_on_use(package: str, text: str) -> dict[str, str]:
-    """Return the names that a package gives to `on_use`, with their modules."""
-    found = re.search(r"__dir__ = on_use\(\s*__name__,\s*(\{.*?\})", text, re.DOTALL)
-    return {name: f"{package}.{module}" for name, module in ast.literal_eval(found[1]).items()} if found else {}
+def _names_on_use(text: str) -> dict[str, str]:
+    """Return the names that a package imports on use (`on_use`), with their modules."""
+    return module_of_names(text) if "__dir__, __all__ = on_use(__name__)" in text else {}
 
 
 def _part(graph: grimp.ImportGraph, text: Mapping[str, str], package: str, module_of: Mapping[str, str]) -> None:

@@ -47,7 +47,7 @@ def on_use(package: str, module_of: dict[str, str]) -> str:
     imports = "".join(f"    from {package}.{module} import {name}\n" for name, module in module_of.items())
     return (
         "from vibrolock.on_use import on_use\n"
-        f"if TYPE_CHECKING:\n{imports}else:\n    __getattr__, __dir__ = on_use(__name__, {module_of!r})\n"
+        f"if TYPE_CHECKING:\n{imports}else:\n    __getattr__, __dir__, __all__ = on_use(__name__)\n"
     )
 
 
