@@ -224,7 +224,7 @@ def test_levels_out_of_reach_end_the_table_with_a_note_and_status_one(command, m
     def ends_early(rig, forces_n, **how):
         raise NotConvergedError("no vibration at 7 N", phase_resonance_backbone(rig, forces_n=forces_n[:2], **how))
 
-    monkeypatch.setattr("rig.analysis.backbone.phase_resonance_backbone", ends_early)
+    monkeypatch.setattr("rig.analysis.balance.phase_resonance_backbone", ends_early)
     status, out, err = command("analyse backbone --bench magnet-beam --from-n 0.1 --to-n 0.5 --points 3 --json")
     assert (status, err) == (1, "")
     summary = json.loads(out)
@@ -237,7 +237,7 @@ def test_where_nothing_at_all_is_found_one_line_says_so(command, monkeypatch):
     def finds_nothing(*_, **__):
         raise NotConvergedError("no vibration at 0.1 N")
 
-    monkeypatch.setattr("rig.analysis.backbone.phase_resonance_backbone", finds_nothing)
+    monkeypatch.setattr("rig.analysis.balance.phase_resonance_backbone", finds_nothing)
     status, out, err = command("analyse backbone --bench magnet-beam --from-n 0.1 --to-n 0.5")
     assert (status, out) == (1, "")
     assert err.startswith("rig: no vibration at resonance found at the lowest level: no vibration at 0.1 N")
