@@ -164,7 +164,7 @@ def response_band(
         If the model has no standard errors, or ``draws`` is below 20.
     """
     if draws < 20:
-        raise IdentificationError(f"draws: is {draws}, needs at least 20")
+        raise IdentificationError(field="draws", value=draws, allowed="at least 20")
     found = dynamic_model(model)
     return band_of_responses(
         frequency_response(
