@@ -6,7 +6,6 @@ from typing import ClassVar, Self
 
 from pydantic import model_validator
 
-from identification.models import LARGEST_RANGE_USE
 from rig.errors import ConfigurationError
 from rig.results.predictions.options import Crossings, Planned, PredictionOptions, Sweeps
 
@@ -33,6 +32,8 @@ class NonlinearModePrediction(PredictionOptions):
     @property
     def largest_range_use(self) -> float:
         """Largest modal amplitude over the largest identified."""
+        from identification.models import LARGEST_RANGE_USE  # only on use: it loads what makes machine code
+
         return math.inf if self.allow_extrapolation else LARGEST_RANGE_USE
 
     @model_validator(mode="after")
