@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification import NonlinearMode
-from identification.storage import decode, encode
+from identification.common import decode, encode
 from rig.exchange.conversion import put_together, taken_apart
 from rig.exchange.export import write_contents
 from rig.exchange.mat import read_mat, stored_objects
