@@ -101,7 +101,7 @@ def test_a_block_beyond_the_sequence_numbers_is_refused_when_opening() -> None:
     channel = uuid4().hex
     with (
         device_on(virtual_bus(channel, False), False),
-        pytest.raises(DaqRefused, match=r"block = 64: allowed .* is 1 to 32"),
+        pytest.raises(DaqRefused, match=r"`block` = 64: allowed .* is 1 to 32"),
     ):
         CanDAQ(bench_on("virtual", channel, 64, fd=False)).open()
 
@@ -147,7 +147,7 @@ def test_a_missing_interface_port_or_backend_is_one_clear_line() -> None:
         CanDAQ(bench_on("socketcan", "nocan7")).open()
     with pytest.raises(DaqRefused, match="no such backend"):
         CanDAQ(bench_on("carrier-pigeon", "0")).open()
-    with pytest.raises(ConfigurationError, match="node = 16"):
+    with pytest.raises(ConfigurationError, match="`node` = 16"):
         CanDAQ(bench_on("virtual", "x", node=16))
 
 

@@ -62,7 +62,7 @@ def test_a_rate_that_the_line_does_not_carry_is_refused_with_the_sum(bench, monk
     [
         ({"port": ""}, {"field": "port", "value": ""}),
         ({"port": "x", "baud": 110}, {"field": "baud", "value": 110}),
-        ({"port": "x", {"field": "bauds"}: 9600}, {"field": "bauds"}),
+        ({"port": "x", "bauds": 9600}, {"field": "bauds"}),
         ({}, {"says": "missing", "field": "port"}),
     ],
 )
