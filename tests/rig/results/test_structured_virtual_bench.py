@@ -201,7 +201,7 @@ def test_from_the_command_line(command, tmp_path):
         ("--from none.h5 --bench magnet-beam", "none.h5"),
         ("--from model.h5", "--bench: is missing, a bench or a recording of one"),
         ("--from own.h5 --bench magnet-beam", "is not imported unless you trust it: --trust-code"),
-        ("--from model.h5 --bench magnet-beam --shaker none", "shaker = 'none': allowed is one of"),
+        ("--from model.h5 --bench magnet-beam --shaker none", "shaker = 'none'; allowed: "),
         ("--shaker lds-v203", "--shaker: is for a rig that begins with a model, --from"),
     ):
         status, out, err = command(f"new rig {line} -o mine.toml")
@@ -209,7 +209,7 @@ def test_from_the_command_line(command, tmp_path):
         assert message in err
     assert not (tmp_path / "mine.toml").exists()
     status, _, err = command("new plan --from model.h5 --bench magnet-beam -o mine.toml")
-    assert (status, "allowed is `rig new rig`" in err) == (1, True)
+    assert (status, "`rig new rig`" in err) == (1, True)
     made = command("new rig --from own.h5 --bench magnet-beam --trust-code -o mine.toml").succeeded()
     assert made.out.startswith("mine.toml: structured model of a specimen behind the exciter of the bench magnet-beam;")
     kinds = [element["kind"] for element in load_bench("mine.toml").driver.options["elements"]]
