@@ -171,7 +171,7 @@ def test_mixed_units_are_refused_until_one_is_chosen(tmp_path, choice, factor):
     ("datasets", "message"),
     [
         ([response(np.ones(20))], r"the ordinate has no unit.*`units` si"),
-        ([units(), response(np.ones(20), label="furlong")], r"is 'furlong', understood are m, mm"),
+        ([units(), response(np.ones(20), label="furlong")], r"is 'furlong'; allowed: m, mm"),
         ([units(), units(2, 3.28, 0.22), response(np.ones(20))], r"units \(dataset 164\): 2 different ones"),
         ([units(), response(np.ones(20)), response(np.ones(20))], r"a second response of 1\+Z to 1\+Z"),
         (
