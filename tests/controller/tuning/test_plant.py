@@ -84,9 +84,9 @@ def test_a_plant_survives_being_written_to_a_table():
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        ({{"field": "damping_ratio", "value": -0.1}: -0.1}, {"field": "damping_ratio", "value": -0.1}),
+        ({"damping_ratio": -0.1}, {"field": "damping_ratio", "value": -0.1}),
         (
-            {{"says": "band-hz", "field": "plant.band_hz", "value": [1.0]}: [1.0]},
+            {"band_hz": [1.0]},
             {"says": "band-hz", "field": "plant.band_hz", "value": [1.0]},
         ),
         ({"mass": 1.0}, {"says": "not-known", "field": "plant.mass"}),
@@ -136,7 +136,7 @@ def test_a_mode_narrower_than_the_lines_is_found_whatever_sign_noise_gives_its_d
     assert 0.0 < found.damping_ratio < 2e-3
 
 
-@pytest.mark.parametrize({"field": "damping_ratio", "value": -0.1}, [0.02, 0.05])
+@pytest.mark.parametrize("damping_ratio", [0.02, 0.05])
 def test_a_mode_wider_than_the_lines_needs_a_damping_above_zero(damping_ratio):
     found = PlantModel.from_frequency_responses(*one_mode(damping_ratio, 1e-4), **RATE)
     assert found.damping_ratio == pytest.approx(damping_ratio, rel=0.02)

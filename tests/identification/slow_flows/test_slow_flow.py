@@ -25,10 +25,8 @@ LEVEL = half_cosine(3e-4, 3e-4, 2.0)
 
 
 def flow_of(record: Ramp, **options: Any) -> SlowFlow:
-    given: dict[str, Any] = {"sample_rate_hz": RATE_HZ, {"field": "drive_mode_shape", "value": 0.0}: PHI, **options}
-    return slow_flow(
-        record.theta, given.pop({"field": "samples"}, record.samples), given.pop("channels", CHANNELS), **given
-    )
+    given: dict[str, Any] = {"sample_rate_hz": RATE_HZ, "drive_mode_shape": PHI, **options}
+    return slow_flow(record.theta, given.pop("samples", record.samples), given.pop("channels", CHANNELS), **given)
 
 
 def inner(flow: SlowFlow) -> slice:
@@ -162,14 +160,14 @@ def test_a_rig_driven_open_loop_from_rest_tells_its_properties_before_it_has_set
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({{"field": "drive_mode_shape", "value": 0.0}: 0.0}, {"field": "drive_mode_shape", "value": 0.0}),
-        ({{"field": "harmonics", "value": 0}: 0}, {"field": "harmonics", "value": 0}),
-        ({{"field": "harmonics", "value": 0}: 150}, {"says": "samples-per-period", "field": "harmonics"}),
-        ({{"field": "fit_periods", "value": 0.5}: 0.5}, {"field": "fit_periods", "value": 0.5}),
-        ({{"field": "fit_periods", "value": 0.5}: 60.0}, {"says": "covers", "field": "theta_rad"}),
-        ({{"field": "points_per_period", "value": 0}: 0}, {"field": "points_per_period", "value": 0}),
-        ({{"field": "skew_samples"}: [1.0]}, {"field": "skew_samples"}),
-        ({{"field": "samples"}: np.zeros((3, 5))}, {"field": "samples"}),
+        ({"drive_mode_shape": 0.0}, {"field": "drive_mode_shape", "value": 0.0}),
+        ({"harmonics": 0}, {"field": "harmonics", "value": 0}),
+        ({"harmonics": 150}, {"says": "samples-per-period", "field": "harmonics"}),
+        ({"fit_periods": 0.5}, {"field": "fit_periods", "value": 0.5}),
+        ({"fit_periods": 60.0}, {"says": "covers", "field": "theta_rad"}),
+        ({"points_per_period": 0}, {"field": "points_per_period", "value": 0}),
+        ({"skew_samples": [1.0]}, {"field": "skew_samples"}),
+        ({"samples": np.zeros((3, 5))}, {"field": "samples"}),
     ],
 )
 def test_bad_input_is_refused_by_name(changes: dict[str, Any], message: str) -> None:

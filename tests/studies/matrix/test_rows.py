@@ -11,13 +11,13 @@ from studies.matrix.table import print_matrix
 from tests.refused import refused
 
 OURS = {
-    {"says": "bench", "field": "row[0].bench"}: "magnet-beam",
+    "bench": "magnet-beam",
     "driver": "serial",
     "utc": "2026-11-23T12:00:00+00:00",
     "version": "0.1.0",
 }
 THEIRS = {
-    {"says": "bench", "field": "row[0].bench"}: "their-beam",
+    "bench": "their-beam",
     "driver": "can",
     "utc": "2027-02-01T09:30:00+00:00",
     "version": "0.2.0",
