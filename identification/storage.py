@@ -123,7 +123,7 @@ def decode(kind: type[T], arrays: Arrays, attributes: Attributes, where: str = "
     """
     layout = _layout_of(kind)
     if not isinstance(attributes, Mapping):
-        raise IdentificationError(where=_label(kind, where), allowed="a mapping of fields")
+        raise IdentificationError(f"is {attributes!r:.60}", where=_label(kind, where), allowed="a mapping of fields")
     held, told = dict(arrays), dict(attributes)
     if layout.kinds is not None:
         kind = _concrete(kind, layout.kinds(), told.pop("kind", None))

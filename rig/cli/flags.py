@@ -23,12 +23,15 @@ _OTHER_FIELDS = {"largest_range_use": "allow_extrapolation"}
 """Fields of the library whose option turns something on, by the name of the parameter."""
 
 
-def flags(app: typer.Typer, arguments: Sequence[str] = ()) -> dict[str, str]:
-    """Return the option for each field name, of the commands that ``arguments`` name; of all commands without."""
+def flags(app: typer.Typer, arguments: Sequence[str] = (), *, studies: bool = True) -> dict[str, str]:
+    """Return the option for each field name, of the commands that ``arguments`` name; of all commands without.
+
+    Options of installed ``studies`` are among them if asked for, which imports the studies.
+    """
     found: dict[str, str] = {}
     waiting: list[Command] = [get_command(app)]
     while waiting:
-        command = installed_command(waiting.pop())
+        command = installed_command(waiting.pop()) if studies else waiting.pop()
         inner = getattr(command, "commands", {})
         waiting += [inner[name] for name in (inner.keys() & arguments or inner)]
         for parameter in command.params:
@@ -40,6 +43,6 @@ def flags(app: typer.Typer, arguments: Sequence[str] = ()) -> dict[str, str]:
 
 def with_flags(error: StatedError, app: typer.Typer, arguments: Sequence[str]) -> str:
     """Return the line of an error, in which an option of the command stands in place of its field; keys of a file stay."""
-    known, own = flags(app), flags(app, arguments)
+    known, own = flags(app, studies=False), flags(app, arguments)
     line = error.line(lambda one: one.field if one.where else own.get(one.field, one.field))
     return re.sub(r"`([a-z_]+)`", lambda field: known.get(field[1], field[0]), line)

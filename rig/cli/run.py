@@ -88,7 +88,7 @@ def resume(
 
 def _with_rehearsal(options: "RunOptions", rehearsal: Path | None, override: str) -> "RunOptions":
     if rehearsal is not None:
-        from rig.rehearsal.forecast import rehearsed_in
+        from rig.rehearsal.forecasting import rehearsed_in
         from rig.results.rehearsal.rehearse import load_rehearsal
 
         options = replace(options, rehearsal=rehearsed_in(load_rehearsal(rehearsal), str(rehearsal)))

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from rig.campaigns.evaluation.point import Point, point_name
-from rig.check.assessment import assess
 from rig.check.recorded import is_check
 from rig.recording.reader import Recording
 from rig.report.document import Block, Chapter, Section, Table, Text, blocks_of
@@ -158,6 +157,8 @@ def _loop(path: Path, summary: Mapping[str, Any], pictures: Pictures) -> list[Bl
 
 def _check(recording: Recording, pictures: Pictures) -> Chapter:
     """Return the chapter on a check: its verdict, and every test."""
+    from rig.check.assessment import assess  # it needs scipy
+
     found = assess(recording)
     tests = found.findings
     marked = frozenset(i for i, one in enumerate(tests) if one.verdict == "fail")

@@ -94,7 +94,7 @@ def test_a_field_that_a_file_lacks_takes_its_default_and_others_are_named():
         ({"channels": 3}, "whole: channels is 3, which does not fit"),
         ({"later": 1}, "whole: 'later' is missing or unknown"),
         ({"many": [{"name": 5}]}, "inner many_0: name is 5, which does not fit"),
-        ({"inner": 3}, "inner inner: is 3, needs a mapping of fields"),
+        ({"inner": 3}, "inner inner: is 3; allowed: a mapping of fields"),
     ):
         with pytest.raises(IdentificationError, match=said):
             decode(Whole, held, {**told, **change})
@@ -142,5 +142,5 @@ def test_a_type_declares_where_its_layout_differs():
     both = replace(sent, copy=sent)
     assert "second" not in encode(both).attributes
     assert passed(both).second == 0.25
-    with pytest.raises(IdentificationError, match="kind is 'circle', allowed are square"):
+    with pytest.raises(IdentificationError, match="kind is 'circle'; allowed: square"):
         decode(Declared, held, {**told, "shapes": [{"kind": "circle"}]})

@@ -14,7 +14,7 @@ from rig.recording.reader import Recording
 from rig.rehearsal.comparison import Comparison, compare
 from rig.rehearsal.effect import Effect
 from rig.rehearsal.files import write_bench, write_plan
-from rig.rehearsal.forecast import forecast
+from rig.rehearsal.forecasting import forecast
 from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
 from rig.rehearsal.knowledge import collect_knowledge
 from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse

@@ -86,7 +86,7 @@ def test_an_initial_state_is_estimated_where_the_experiment_asks_for_it():
 def test_an_output_that_is_zero_has_no_relative_error():
     dead = experiment()
     dead = replace(dead, name="dead", outputs=dead.outputs * [[1.0], [0.0]])
-    with refused(IdentificationError, "output-tip-is-zero-where-it", field="experiment 'dead'"):
+    with refused(IdentificationError, "output-tip-is-zero-where-it"):
         simulated_run(model(), dead)
 
 

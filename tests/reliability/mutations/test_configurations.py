@@ -60,4 +60,4 @@ def test_any_other_exception_and_a_long_time_are_faults_of_ours(monkeypatch):
 def test_a_file_of_little_is_refused_by_what_is_missing(tmp_path):
     verdict = judge(Spoilt("plan nothing", (), b'kind = "backbone"\n'), tmp_path)
     assert verdict.outcome == "refused"
-    assert "bench: is missing" in verdict.text
+    assert "`bench`: is missing" in verdict.text

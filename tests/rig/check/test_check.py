@@ -40,7 +40,7 @@ def test_nothing_is_wrong_with_the_shipped_benches(name, tmp_path):
     assert [f for f in found.findings if f.verdict in ("warn", "fail") and f.name != "limits"] == []
     # The multisines of the paper leave the friction beam no room between its limits and its sensors' ranges.
     said = [f.text.split(" = ")[0] for f in found.findings if f.name == "limits"]
-    assert said == (["limits.force_n", "limits.acceleration_m_s2"] if name == "friction-beam" else [])
+    assert said == (["`limits.force_n`", "`limits.acceleration_m_s2`"] if name == "friction-beam" else [])
 
 
 def test_the_mode_is_that_of_the_rig(sound):

@@ -203,7 +203,7 @@ def test_doctor_looks_at_the_device_of_a_bench(command):
 @pytest.mark.parametrize(
     ("line", "status", "named"),
     [
-        ("run nosuch -o x.h5", 1, "allowed is one of those that `rig list` shows, such as "),
+        ("run nosuch -o x.h5", 1, "allowed: one of those that `rig list` shows, such as "),
         ("run magnet-beam/bakbone -o x.h5", 1, "magnet-beam/backbone"),
         ("run magnet-beam/backbone", 2, "--output"),
         ("run magnet-beam/backbone -o nowhere/x.h5", 1, "no such folder"),

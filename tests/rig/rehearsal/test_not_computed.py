@@ -8,7 +8,7 @@ import pytest
 from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.errors import ConfigurationError
-from rig.rehearsal.forecast import rehearsed_in
+from rig.rehearsal.forecasting import rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.report import lines, summary, verdict_in_one_line
 from rig.rehearsal.statistics import Proportion

@@ -157,9 +157,9 @@ def test_what_does_not_go_together_is_refused() -> None:
         frequency_response(voltage, 1.0, force="pure-sine", largest_range_use=3.0)
     with pytest.raises(IdentificationError, match="`force` = 'loud'; allowed: fundamental, rms, pure-sine, voltage"):
         frequency_response(force, 1.0, force="loud", largest_range_use=3.0)  # type: ignore[arg-type]
-    with pytest.raises(IdentificationError, match="force_n: is -1 N, must be finite and above zero"):
+    with pytest.raises(IdentificationError, match="`force_n` = -1 N; allowed: finite and above zero"):
         frequency_response(force, -1.0, force="pure-sine", largest_range_use=3.0)
-    with pytest.raises(IdentificationError, match="are 30 and 20 Hz, need to rise between 0 and 1600 Hz"):
+    with pytest.raises(IdentificationError, match="is 30 to 20 Hz, needs to rise between 0 and 1600 Hz"):
         frequency_response(force, 1.0, force="pure-sine", band_hz=(30.0, 20.0), largest_range_use=3.0)
-    with pytest.raises(IdentificationError, match="samples: is 10, needs at least 15 for 7 harmonics"):
+    with pytest.raises(IdentificationError, match="`samples` = 10; allowed: at least 15 for 7 harmonics"):
         frequency_response(force, 1.0, force="pure-sine", samples=10, largest_range_use=3.0)

@@ -71,5 +71,5 @@ def test_what_cannot_be_coupled_is_named():
     model, voltage = smooth(), np.zeros(100)
     with pytest.raises(IdentificationError, match="voltage_v"):
         coupled_run(model, shaker(), [0.0, np.nan])
-    with pytest.raises(IdentificationError, match="lowest_hz: is 490 Hz"):
+    with pytest.raises(IdentificationError, match="`lowest_hz` = 490 Hz"):
         coupled_run(model, shaker(), voltage, lowest_hz=490.0)

@@ -13,7 +13,7 @@ from rig.campaigns.running.runner import resume_run, run_plan
 from rig.errors import NotArmed
 from rig.recording.reader import Recording
 from rig.rehearsal.comparison import compare
-from rig.rehearsal.forecast import forecast, rehearsed_in
+from rig.rehearsal.forecasting import forecast, rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.show.summary import summarise
 from rig.show.tables import print_summary
