@@ -1,6 +1,7 @@
 """Text for one line of a terminal: without characters that move the cursor or change the colour, and of limited length."""
 
 from collections.abc import Mapping
+from pathlib import PurePath
 from typing import Any
 from unicodedata import category
 
@@ -56,7 +57,7 @@ def shown(value: Any) -> str:
     if isinstance(value, Mapping | list | tuple) and len(value) > LONGEST_VALUE:
         return f"{'a table' if isinstance(value, Mapping) else 'a list'} ({len(value)} items)"
     try:
-        text = repr(value)
+        text = repr(str(value) if isinstance(value, PurePath) else value)
     except (ValueError, RecursionError) as error:  # an integer of more digits than Python prints; nested too deeply
         return f"a value that cannot be shown ({error})"
     return text if len(text) <= 3 * LONGEST_VALUE else f"{text[: 2 * LONGEST_VALUE]}... ({len(text)} characters)"

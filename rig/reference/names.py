@@ -44,6 +44,7 @@ def documentation(module: str, name: str) -> str:
 
 def _under_assignment(module: str, name: str) -> str:
     body = ast.parse(inspect.getsource(import_module(module))).body
+    body = [*body, *(inner for line in body if isinstance(line, ast.If) for inner in line.body)]  # names of a face
     for line, after in pairwise([*body, ast.Pass()]):
         match line, after:
             case ast.ImportFrom(module=str(source)), _ if name in [alias.name for alias in line.names]:

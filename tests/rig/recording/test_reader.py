@@ -61,10 +61,10 @@ def test_a_folder_is_no_recording(tmp_path):
 
 
 def test_a_file_without_permission_is_named(output, monkeypatch):
-    def refused(*_args, **_kwargs):
+    def no_permission(*_args, **_kwargs):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    monkeypatch.setattr(Path, "open", refused)
+    monkeypatch.setattr(Path, "open", no_permission)
     with refused(RecordingError, "cannot-be-read-permission-denied"):
         Recording(output)
 

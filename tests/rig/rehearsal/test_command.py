@@ -60,7 +60,7 @@ def test_a_twin_is_written_and_an_improved_plan_too(command):
         (["plan.toml", "--exact", "-o", "r.h5", "--improve", "p.h5"], "plans are written as .toml"),
         (
             ["plan.toml", "--exact", "-o", "r.h5", "--improve", "r.toml"],
-            "--improve = r.toml: its own rehearsal would be",
+            "--improve = 'r.toml': its own rehearsal would be",
         ),
         (["plan.toml", "--exact", "--twin", "9", "-n", "3", "-o", "t.toml"], "--twin = 9; allowed: 1 to 3"),
         (["plan.toml", "--from", "plan.toml", "-o", "r.h5"], "plan.toml"),

@@ -38,7 +38,7 @@ def test_a_trip_is_named_with_channel_and_level():
 def test_a_plan_that_the_bench_refuses_is_a_result_and_not_an_error():
     trial = run_trial(SHORT.model_copy(update={"levels_v": (20.0,)}), magnet_beam(), 0)
     assert trial.end == "REFUSED"
-    assert "levels_v[0] = 20 V" in trial.text
+    assert "`levels_v[0]` = 20 V" in trial.text
     assert not trial.points
 
 

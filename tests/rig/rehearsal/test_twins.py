@@ -101,7 +101,7 @@ def test_a_device_of_another_driver_keeps_its_block_and_its_latency():
     ("text", "says"),
     [
         ("hardening = 0.7\nsoftening = 0.7", "hardening + softening = 1.4: allowed is up to 1"),
-        ("shift = [0.1, 0.05]", "shift = [0.1, 0.05]"),
+        ("shift = [0.1, 0.05]", "`shift` = [0.1, 0.05]"),
         ("stop = 2.0", "stop"),
         ("nonsense = 1", "nonsense"),
     ],

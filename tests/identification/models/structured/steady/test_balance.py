@@ -144,7 +144,10 @@ def test_unknown_settings_are_refused_in_a_line():
         ({"harmonics": 0}, "harmonics: is 0, needs at least 1"),
         ({"samples": 10}, "samples: is 10, needs at least 15 for 7 harmonics"),
         ({"force": "fundamental"}, "'fundamental' of a model driven by a force needs an exciter"),
-        ({"exciter": shaker(), "force": "pure-sine"}, "exciter`: makes harmonics of the force; leave it out for 'pure-sine'"),
+        (
+            {"exciter": shaker(), "force": "pure-sine"},
+            "exciter`: makes harmonics of the force; leave it out for 'pure-sine'",
+        ),
         ({"band_hz": (30.0, 20.0)}, "band_hz: is 30 to 20 Hz"),
     ):
         with pytest.raises(IdentificationError, match=message):
