@@ -74,7 +74,7 @@ class LockRule(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.lost_deg <= self.locked_deg:
-            raise InputError(field="lost_deg", value=self.lost_deg, allowed=f"above locked_deg = {self.locked_deg:g}")
+            raise InputError(field="lost_deg", value=self.lost_deg, allowed=f"above `locked_deg` = {self.locked_deg:g}")
         return self
 
     def build(self, smallest_force_n: float = 0.0, smallest_response: float = 0.0) -> np.ndarray:

@@ -145,7 +145,7 @@ def forced(
     low = positive("from_hz", _SPAN[0] * subject.frequency_hz if from_hz is None else from_hz)
     high = positive("to_hz", _SPAN[1] * subject.frequency_hz if to_hz is None else to_hz)
     if low >= high:
-        raise ConfigurationError(field="from_hz", value=low, allowed=f"less than to_hz = {high:g}")
+        raise ConfigurationError(field="from_hz", value=low, allowed=f"less than `to_hz` = {high:g}")
     grid = _grid(low, high, checked_points(points, 4), _resonance(balance, voltage))
     up, up_ends = _followed(balance, voltage, grid)
     down, down_ends = _followed(balance, voltage, grid[::-1])

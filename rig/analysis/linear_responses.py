@@ -102,7 +102,7 @@ def responses(
     low = positive("from_hz", lowest if from_hz is None else from_hz)
     high = positive("to_hz", max(highest, 2.0 * low) if to_hz is None else to_hz)
     if low >= high:
-        raise ConfigurationError(field="from_hz", value=low, allowed=f"less than to_hz = {high:g}")
+        raise ConfigurationError(field="from_hz", value=low, allowed=f"less than `to_hz` = {high:g}")
     row = [np.geomspace(low, high, checked_points(points, 2))]
     for several in (modes, rig.coupled_modes):
         for frequency_hz, damping_ratio in zip(several.frequency_hz, several.damping_ratio, strict=True):

@@ -61,7 +61,7 @@ class TuningRequest:
     def __post_init__(self) -> None:
         ConfigurationError.unless_one_of("law", self.law, get_args(LawName))
         if self.level_rms_v is not None and not self.level_rms_v > 0.0:
-            raise ConfigurationError(f"`level_rms_v` = {self.level_rms_v:g} V RMS: allowed is above 0")
+            raise ConfigurationError(field="level_rms_v", value=self.level_rms_v, unit="V RMS", allowed="above 0")
         ConfigurationError.unless_at_least("points", self.points, 1)
         if self.from_m is not None and self.to_m is not None and self.from_m >= self.to_m:
             raise ConfigurationError(field="from_m", value=self.from_m, allowed=f"below `to_m` = {self.to_m:g} m")

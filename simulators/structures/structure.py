@@ -83,7 +83,7 @@ class LapJointedBeam(MeshedBeam):
     def _lap_fits(self) -> "LapJointedBeam":
         if not self.lap_length_m < self.length_m:
             raise InputError(
-                field="lap_length_m", value=self.lap_length_m, allowed=f"less than length_m = {self.length_m!r}"
+                field="lap_length_m", value=self.lap_length_m, allowed=f"less than `length_m` = {self.length_m!r}"
             )
         first, last = (self.length_m - self.lap_length_m) / 2.0, (self.length_m + self.lap_length_m) / 2.0
         named = {f"sites_m.{name}": position_m for name, position_m in self.sites_m.items()}

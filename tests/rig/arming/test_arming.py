@@ -414,7 +414,7 @@ def test_a_campaign_that_dies_leaves_a_caution(monkeypatch, tmp_path):
     def dies(execution, information):
         raise SystemExit(9)
 
-    monkeypatch.setattr("rig.campaigns.running.runner.Execution.go", dies)
+    monkeypatch.setattr("rig.campaigns.running.runner.Execution.run", dies)
     with pytest.raises(SystemExit):
         rig.run(PLAN, bench=bench(), output=tmp_path / "run.h5", arm=True)
     with refused(NotArmed, "run-into-run-was-under-way"):

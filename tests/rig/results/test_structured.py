@@ -242,7 +242,7 @@ def test_functions_that_a_file_names_are_imported_by_predictions_of_who_trusts_t
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda told: told["model"]["elements"][0]["laws"][0].update(kind="magic"), "kind is 'magic', allowed are"),
+        (lambda told: told["model"]["elements"][0]["laws"][0].update(kind="magic"), "kind is 'magic'; allowed: "),
         (lambda told: told["model"]["elements"][0].pop("laws"), "'laws' is missing or unknown"),
         (lambda told: told["model"]["elements"][0].update(laws=[3]), "does not hold what makes a structured"),
         (lambda told: told["model"].update(steps="many"), "does not hold what makes a structured"),

@@ -55,7 +55,7 @@ def test_a_level_asked_for_that_takes_the_tip_beyond_its_limit_is_refused(tmp_pa
 def test_the_plan_refuses_a_level_that_a_person_raised_beyond_the_limit_of_the_tip(tuned):
     raised = tuned.plan.model_copy(update={"levels_m": (1e-4, 1e-3)})
     with pytest.raises(
-        ConfigurationError, match=r"levels_m\[1\] = 0\.001 m: means 0\.0051\d m at channel 'acc_magnet'"
+        ConfigurationError, match=r"`levels_m\[1\]` = 0\.001 m: means 0\.0051\d m at channel 'acc_magnet'"
     ):
         raised.check(tuned.bench)
     tuned.plan.check(tuned.bench)

@@ -142,7 +142,7 @@ TABLE: dict[str, Any] = {
 BAD = [
     ({"sites_m": {"joint": 0.2}}, "`?sites_m.joint`? = 0.2; allowed: the lap, 0.3 to 0.42"),
     ({"bolts_m": [0.5]}, r"`?bolts_m\[0\]`? = 0.5(?: \S+)?; allowed: the lap"),
-    ({"lap_length_m": 0.8}, r"`?lap_length_m`? = 0.8(?: \S+)?; allowed: less than length_m = 0.72"),
+    ({"lap_length_m": 0.8}, r"`?lap_length_m`? = 0.8(?: \S+)?; allowed: less than `length_m` = 0.72"),
     ({"sites_m": {"drive": 0.35}}, "`?sites_m.drive`?: is also in points_m"),
     ({"tangential_stiffness_n_m": -1.0}, "greater than or equal to 0"),
     ({"damping_ratio": [0.01] * 99}, "has 99 modes; allowed: 1 to 40"),

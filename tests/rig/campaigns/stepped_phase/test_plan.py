@@ -88,7 +88,7 @@ def test_a_finished_plan_has_no_segments_left():
     [
         ({"start_deg": -190.0}, {"field": "start_deg", "value": -190.0, "allowed": "-175 to -5"}),
         ({"approach_deg": 10.0}, {"field": "approach_deg", "value": 10.0, "allowed": "-175 to -5"}),
-        ({"stop_deg": -130.0}, {"field": "stop_deg", "value": -130.0, "allowed": "above start_deg"}),
+        ({"stop_deg": -130.0}, {"field": "stop_deg", "value": -130.0, "allowed": "above `start_deg`"}),
         ({"phase_lags_deg": [-90.0]}, {"says": "exactly-one-of-the-two"}),
         ({"stop_deg": None}, {"says": "exactly-one-of-the-two"}),
         ({"step_deg": 0.001}, {"says": "step-deg-are-points", "field": "step_deg", "allowed": "up to 10000"}),

@@ -241,7 +241,7 @@ def test_two_frames_that_contradict_each_other_spoil_their_block() -> None:
 def test_what_frames_cannot_carry_is_refused() -> None:
     device, _ = ends(4, False, 1)
     for stream, error, said in (
-        (Stream(4, 33, 100.0), DaqRefused, "block = 33: allowed over classical CAN with 4 channels is 1 to 32"),
+        (Stream(4, 33, 100.0), DaqRefused, "`block` = 33: allowed over classical CAN with 4 channels is 1 to 32"),
         (Stream(4, 1, 100.0, 32), DaqRefused, "counts of 32 bits: allowed over CAN is 16"),
         (Stream(5, 1, 100.0), DaqMismatch, "5 channels, but the bus is defined for 4"),
     ):
