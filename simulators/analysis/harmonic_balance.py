@@ -84,7 +84,7 @@ def phase_resonance_backbone(
     if excitation == "pure-sine" and held == "voltage":
         raise InputError("allowed with excitation = 'exciter', a pure sine has forces_n", field="voltages_v")
     if excitation == "pure-sine" and force_harmonics is not None:
-        raise InputError("allowed with excitation = 'exciter', a pure sine has none", field="force_harmonics")
+        raise InputError(field="force_harmonics", allowed="with excitation = 'exciter', a pure sine has none")
     lag = float(lags_rad("phase_lag_deg", [phase_lag_deg])[0])
     paths = ModePaths.of(rig, near_hz, harmonics, samples, force_harmonics, pure_sine=excitation == "pure-sine")
     goals = [Conditions(held_as if held == "force" else held, float(level), "lag", lag) for level in values]

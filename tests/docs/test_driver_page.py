@@ -75,7 +75,7 @@ def test_a_rate_beyond_the_box_is_refused_at_open_with_the_numbers():
 
 
 def test_an_option_that_is_missing_is_named():
-    with pytest.raises(ConfigurationError, match=r"driver\.options: serial_number: is missing"):
+    with pytest.raises(ConfigurationError, match=r"driver\.options: `serial_number`: is missing"):
         make_daq(bench(driver={"name": "box"}))
 
 

@@ -209,5 +209,5 @@ def test_a_port_that_is_held_or_a_rate_without_a_command_is_refused(line: Pseudo
     host.close()
     with pytest.raises(DaqRefused, match="bitrate` = 900000"):
         SlcanBus(line.path, BusTiming(bit_rate_hz=900_000)).open()
-    with pytest.raises(DaqRefused, match="data_bitrate = 3000000"):
+    with pytest.raises(DaqRefused, match="data_bitrate` = 3000000"):
         SlcanBus(line.path, BusTiming(True, data_bit_rate_hz=3_000_000)).open()
