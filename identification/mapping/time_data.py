@@ -133,7 +133,9 @@ class TimeDataMapping(MappingTable):
         if (self.lowest_hz is None) != (self.highest_hz is None):
             raise ValueError("lowest_hz and highest_hz: give both or none")
         if self.lowest_hz is not None and self.highest_hz is not None and self.lowest_hz >= self.highest_hz:
-            raise InputError(field="lowest_hz", value=self.lowest_hz, allowed=f"below `highest_hz` = {self.highest_hz:g}")
+            raise InputError(
+                field="lowest_hz", value=self.lowest_hz, allowed=f"below `highest_hz` = {self.highest_hz:g}"
+            )
         if self.transient_periods and not self.is_periodic:
             raise InputError(
                 "is for periodic data", field="transient_periods", hint="add period_samples, or leave it out"

@@ -69,16 +69,16 @@ def test_modules_that_stand_in_strings_or_are_found_by_name_count_as_imported(ow
 @pytest.mark.parametrize(
     ("own", "module"),
     [
-        ("DRAW = 'rig.drawing.curves:draw'", "rig.drawing.curves"),
+        ("DRAW = 'rig.figures.curves:draw'", "rig.figures.curves"),
         ("run([sys.executable, '-m', 'rig.figures'])", "rig.figures"),
-        ("resolve_name(f'rig.figures.{name}')", "rig.drawing.curves"),
+        ("resolve_name(f'rig.figures.{name}')", "rig.figures.curves"),
         ("resolve_name(f'rig.figures.{folder_and_name}')", "rig.figures.kind.points"),
     ],
 )
 def test_addresses_in_the_product_count_as_imported_and_its_prose_does_not(own, module):
     more = {"rig__figures__curves": "", "rig__figures__kind": "", "rig__figures__kind__points": ""}
     assert module in reached("import rig.text", rig__text=own, **more)
-    assert module not in reached("import rig.text", rig__text='"""See `rig.drawing.curves`."""', **more)
+    assert module not in reached("import rig.text", rig__text='"""See `rig.figures.curves`."""', **more)
 
 
 @pytest.mark.parametrize(

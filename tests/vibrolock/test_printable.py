@@ -64,8 +64,11 @@ def test_the_summary_of_a_file_shows_names_in_it_escaped(capsys):
         "kind": "check",
         "bench": "b\x1b[31m",
         "specimen": "s\x07",
+        "recording": "check.h5",
         "level_rms_v": None,
-        "verdict": "ok",
+        "mode": None,
+        "verdict": "passed",
+        "failed": [],
         "integrity": "verified",
     }
     print_summary({**head, "findings": [finding]})

@@ -67,7 +67,10 @@ class SteppedPhasePlan(SettledPlan):
                 raise InputError(field=name, value=lag, allowed=f"{low:g} to {high:g}")
         if self.start_deg is not None and self.stop_deg is not None and not self.start_deg < self.stop_deg:
             raise InputError(
-                field="stop_deg", value=self.stop_deg, allowed="above `start_deg`", hint="`direction` says which way to go"
+                field="stop_deg",
+                value=self.stop_deg,
+                allowed="above `start_deg`",
+                hint="`direction` says which way to go",
             )
         if len(set(self.lags)) != len(self.lags):
             raise InputError("a lag is given twice", field="phase_lags_deg", hint="use repeats to measure lags again")

@@ -68,7 +68,9 @@ def test_the_file_holds_what_was_predicted(at_shelf, shelf, tmp_path):
     held = load(tmp_path / "P.h5")
     with Recording(shelf / "sweep.h5") as recording:
         sweep = sweeps(recording)[1]
-    again = predict_sweep(load(shelf / "NM.h5"), sweep, exciter=load(shelf / "EX.h5"), linear_modes=modes_in(shelf / "LIN.h5"))
+    again = predict_sweep(
+        load(shelf / "NM.h5"), sweep, exciter=load(shelf / "EX.h5"), linear_modes=modes_in(shelf / "LIN.h5")
+    )
     np.testing.assert_array_equal(held.sweeps[1].drive_m, again.drive_m)
     np.testing.assert_array_equal(held.sweep_references[1].force, sweep.force)
     assert held.steady_references[:2] == (None, None)

@@ -52,7 +52,7 @@ positive = st.floats(1e-6, 1e6)
     )
 )
 def test_rows_are_read_as_they_were_written(tmp_path_factory, suffix, made):
-    path = tmp_path_factory.getbasetemp() / {"field": "row"}
+    path = tmp_path_factory.getbasetemp() / f"rows{suffix}"
     write_rows(path, [made, row()])
     assert read_rows(path) == [made, row()]
 
