@@ -12,7 +12,7 @@
 
 enum { MOST_INSTANTS = 600, STEP_US = 211, LARGEST_COUNT_16 = 20480 };
 enum { REQUEST = 1, OUTPUT = 4, EMERGENCY_STOP = 6 }; /* types of payloads on a serial line */
-enum { CLASSICAL_ROWS = 4, CLASSICAL_WRAP = 32, FD_ROWS = 31, FD_WRAP = 256 };
+enum { CLASSICAL_ROWS = 4, CLASSICAL_CYCLE = 32, FD_ROWS = 31, FD_CYCLE = 256 };
 
 static const uint8_t *at, *end;
 static uint64_t now_us;
@@ -135,7 +135,7 @@ static void send_groups(uint64_t block_number, const uint8_t *counts, uint8_t ho
 {
     bool fd = FUZZ_WIRE == BENCH_CAN_FD;
     uint32_t block = vl_settings.block, rows = fd ? FD_ROWS : CLASSICAL_ROWS, groups = (block + rows - 1) / rows;
-    uint32_t wrap = fd ? FD_WRAP - FD_WRAP % groups : CLASSICAL_WRAP - CLASSICAL_WRAP % groups;
+    uint32_t wrap = fd ? FD_CYCLE - FD_CYCLE % groups : CLASSICAL_CYCLE - CLASSICAL_CYCLE % groups;
     uint32_t sequence = (uint32_t)(block_number * groups % wrap);
     for (uint32_t group = 0; group < groups; group++) {
         uint32_t left = block - group * rows, n = 2 * (left < rows ? left : rows);

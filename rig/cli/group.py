@@ -1,14 +1,18 @@
 """A group of commands whose help shows the first paragraph of each command in full."""
 
-from typer._click.core import Context
-from typer._click.formatting import HelpFormatter
+from typing import TYPE_CHECKING
+
 from typer.core import TyperGroup
+
+if TYPE_CHECKING:  # where the lowest version of typer that is allowed does not have them
+    from typer._click.core import Context
+    from typer._click.formatting import HelpFormatter
 
 
 class Group(TyperGroup):
     """Lists its commands with whole sentences; typer cuts them off where a line ends."""
 
-    def format_commands(self, ctx: Context, formatter: HelpFormatter) -> None:
+    def format_commands(self, ctx: "Context", formatter: "HelpFormatter") -> None:
         """Write the list of commands."""
         commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
         with formatter.section("Commands"):
