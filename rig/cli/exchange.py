@@ -37,7 +37,9 @@ def export_(
     file: Annotated[Path, typer.Argument(help="Recording, model or imported measurement.")],
     output: Output,
     to: Annotated[str, typer.Option("--to", help="uff, mat or csv; by the ending of OUTPUT.")] = "",
-    data: Annotated[str, typer.Option(help="Of a recording: results, or time (samples of its points).")] = "results",
+    data: Annotated[
+        str, typer.Option(help="What to export of a recording: results, or time (samples of its points).")
+    ] = "results",
     point: Annotated[
         list[int] | None, typer.Option(help="Point whose samples are wanted, from 1; may be repeated.", min=1)
     ] = None,

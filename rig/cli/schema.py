@@ -38,17 +38,15 @@ def new(
     files: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="Of a mapping: file of time data that is looked into, and others with channels of the same test."
+            help="File of time data from which a mapping is proposed, and others with channels of the same test."
         ),
     ] = None,
-    format_: Annotated[
-        str, typer.Option("--format", help="Of a mapping: format of the file, as `rig import` takes it.")
-    ] = "",
+    format_: Annotated[str, typer.Option("--format", help="Format of that file, as `rig import` takes it.")] = "",
     plan_kind: Annotated[str, typer.Option("--kind", help="Kind of a plan.")] = "backbone",
     bench: Annotated[
         str | None,
         typer.Option(
-            help="Of a plan: its bench; default: that of the shipped plan. With --from: bench, or recording, whose limits, "
+            help="Bench of a plan; default: that of the shipped plan. With --from: bench, or recording, whose limits, "
             "sensors and exciter a rig has."
         ),
     ] = None,
