@@ -160,7 +160,7 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
         raise IdentificationError(
             f"{2.0 * np.pi / fastest:.2f} samples per period of the mode at {candidate.track.start_hz:.4g} Hz",
             field="samples",
-            allowed=f"{_MIN_SAMPLES_PER_PERIOD:g}",
+            allowed=f"at least {_MIN_SAMPLES_PER_PERIOD:g}",
         )
     found = demodulated(theta, record.data, record.rate_hz, periods)
     variance = noise_variance(theta, record.data, periods)
@@ -175,7 +175,7 @@ def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, sh
             f"the mode at {candidate.track.start_hz:.4g} Hz is above the noise for {lasting} periods of its "
             f"decay, beside the window of {4 * periods}",
             field="samples",
-            allowed=f"{_FEWEST_INSTANTS * periods // 2}",
+            allowed=f"at least {_FEWEST_INSTANTS * periods // 2}",
         )
     kept = slice(start, stop)
     seen = Demodulated(

@@ -114,7 +114,7 @@ def ridge(signal: Float, rate_hz: float, near_hz: float) -> Ridge | None:
         raise IdentificationError(
             f"{signal.size} samples of the decay are too few periods at {near_hz:g} Hz",
             field="samples",
-            allowed=f"{3 * _FEWEST_PERIODS:g}",
+            allowed=f"at least {3 * _FEWEST_PERIODS:g}",
         )
     best, largest = None, 0.0
     for length in lengths:

@@ -185,7 +185,7 @@ def _check(data: WeightedResponses, start: StateSpace) -> None:
         raise IdentificationError(
             f"{lines} lines are too few for the {free} free parameters of {n} states",
             field="frequency_hz",
-            allowed=f"{-(-free // (2 * outputs * inputs))}",
+            allowed=f"at least {-(-free // (2 * outputs * inputs))}",
             hint="lower the order",
         )
 

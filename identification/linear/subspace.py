@@ -75,7 +75,7 @@ def observable_space(data: WeightedResponses, z: Complex, block_rows: int) -> Ob
         raise IdentificationError(
             f"{lines} lines are too few for {block_rows} block rows of {outputs} outputs and {inputs} inputs",
             field="frequency_hz",
-            allowed=f"{-(-block_rows * (outputs + inputs) // (2 * inputs))}",
+            allowed=f"at least {-(-block_rows * (outputs + inputs) // (2 * inputs))}",
             hint="lower the order",
         )
     # One weight per line keeps the equations exact; lines with small errors have more weight.

@@ -76,7 +76,7 @@ def short_point(flow: SlowFlow, *, start_s: float | None = None, stop_s: float |
         raise IdentificationError(
             f"{periods:.2f} periods between the first and the last instant",
             field="start_s, stop_s",
-            allowed=f"{_FEWEST_PERIODS:g}",
+            allowed=f"at least {_FEWEST_PERIODS:g}",
         )
     level = np.log(part.amplitude_m)
     change = float(np.ptp(level))

@@ -73,10 +73,10 @@ class KindCommand(typer.core.TyperCommand):
         try:
             parsed: list[str] = super().parse_args(ctx, args)
         except Exception as error:
-            if hasattr(error, "possibilities") and hasattr(error, "option_name"):
-                known = ", ".join(one.opts[-1] for one in self.get_params(ctx) if one.param_type_name == "option")
+            if not getattr(error, "possibilities", True) and hasattr(error, "option_name"):
+                known = ", ".join(one.opts[0] for one in self.params if one.param_type_name == "option")
                 vars(error).update(
-                    message=f"{error.option_name}: means nothing to `{ctx.command_path}`; allowed are {known}",
+                    message=f"{error.option_name}: means nothing to `{ctx.command_path.strip()}`; allowed are {known}",
                     possibilities=None,
                 )
             raise

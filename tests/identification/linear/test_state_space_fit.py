@@ -109,5 +109,5 @@ def test_what_cannot_be_is_named() -> None:
         fit_state_space(responses, StateSpace(exact.a, np.ones((4, 2)), *exact[2:]), sample_rate_hz=RATE_HZ)
     with refused(IdentificationError, field="sample_rate_hz", value=38.0, allowed="more than twice 19 Hz"):
         fit_state_space(responses, exact, sample_rate_hz=38.0)
-    with refused(IdentificationError, "lines-are-too-few-for-the", field="frequency_hz", allowed="4"):
+    with refused(IdentificationError, "lines-are-too-few-for-the", field="frequency_hz", allowed="at least 4"):
         fit_state_space(responses.select(highest_hz=3.0), exact, sample_rate_hz=RATE_HZ)
