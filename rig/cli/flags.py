@@ -43,6 +43,7 @@ def flags(app: typer.Typer, arguments: Sequence[str] = (), *, studies: bool = Tr
 
 def with_flags(error: StatedError, app: typer.Typer, arguments: Sequence[str]) -> str:
     """Return the line of an error, in which an option of the command stands in place of its field; keys of a file stay."""
-    known, own = flags(app, studies=False), flags(app, arguments)
+    own = flags(app, arguments)
+    known = {**flags(app, studies=False), **own}
     line = error.line(lambda one: one.field if one.where else own.get(one.field, one.field))
     return re.sub(r"`([a-z_]+)`", lambda field: known.get(field[1], field[0]), line)

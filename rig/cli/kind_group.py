@@ -74,7 +74,7 @@ class KindCommand(typer.core.TyperCommand):
             parsed: list[str] = super().parse_args(ctx, args)
         except Exception as error:
             if not getattr(error, "possibilities", True) and hasattr(error, "option_name"):
-                known = ", ".join(one.opts[0] for one in self.params if one.param_type_name == "option")
+                known = ", ".join(max(one.opts, key=len) for one in self.params if one.param_type_name == "option")
                 vars(error).update(
                     message=f"{error.option_name}: means nothing to `{ctx.command_path.strip()}`; allowed are {known}",
                     possibilities=None,
