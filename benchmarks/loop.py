@@ -26,7 +26,7 @@ from rig.campaigns.plans import load_plan
 from rig.drivers import make_daq
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.tick.kernels import tick_block
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from simulators.kernels import run_open_loop
 
 ROUNDS = 9
@@ -51,7 +51,9 @@ def _started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
     daq.open()
     daq.start(block)
     lead = block + daq.latency_samples
-    return daq, Tick(bench, plan.controller, plan.amplitude_law, plan.settle, plan.segments(bench.sample_rate_hz), lead)
+    return daq, Tick(
+        TickSettings(bench, plan.controller, plan.amplitude_law, plan.settle, plan.segments(bench.sample_rate_hz)), lead
+    )
 
 
 def fused(bench: Bench) -> Callable[[], float]:

@@ -32,18 +32,16 @@ from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, Ti
 from rig.tick.measure import bridge_lost_sample, read_inputs
 from rig.tick.periods import close_period
 from rig.tick.safety.kernels import (
-    NON_FINITE_OUTPUT,
-    PLANT_CONTRADICTED,
     permitted_amplitude,
     permitted_command_phase,
     release,
     shut_down,
     watch_frequency,
 )
-from rig.tick.safety.layout import ARMED, RAMPING
+from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.response_plausibility import contradicts_exciter, permitted_level, reset_output, set_reference
 from rig.tick.sequencer.kernels import advance, is_ramp
-from rig.tick.sequencer.layout import LOOP_DRIVE, RELEASE, SILENT, TONE, WAVEFORM
+from rig.tick.sequencer.layout import Drive, SegmentKind
 from vibrolock.compiled import Record, inner_kernel, kernel
 
 SMALLEST_V = 1e-12  # lower bound of a divisor, against an output of zero
@@ -89,16 +87,16 @@ def tell_continuation(t: TickArrays, continuation: np.ndarray) -> None:
     An output of 0 V has none.
     """
     loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]
-    played = loop.waveform + 1 if loop.drive == WAVEFORM else 0
+    played = loop.waveform + 1 if loop.drive == Drive.WAVEFORM else 0
     changes = played != loop.played
     loop.played = played
     told = continuation[0]
     told.period_samples = told.ramp_samples = 0.0
-    if changes or guard.amplitude_v == 0.0 or loop.drive == SILENT:
+    if changes or guard.amplitude_v == 0.0 or loop.drive == Drive.SILENT:
         return
     omega = t.control[0].frequency.omega
     told.period_samples = t.waveforms.shape[1] if played > 0 else TWO_PI / (omega * loop.dt_s)
-    if guard.mode == RAMPING:
+    if guard.mode == GuardMode.RAMPING:
         told.ramp_samples = max(guard.ramp_sample + limits.ramp_down_samples - loop.sample, 0.0)
 
 
@@ -117,13 +115,15 @@ def judge_by_exciter(t: TickArrays, seen: Record) -> None:
     ``seen`` is the entry of the history with that output.
     """
     loop, guard, plausibility, vibration = t.loop[0], t.guard[0], t.plausibility[0], t.control[0].vibration
-    if guard.mode != ARMED or loop.drive in (WAVEFORM, SILENT):
+    if guard.mode != GuardMode.ARMED or loop.drive in (Drive.WAVEFORM, Drive.SILENT):
         return
-    sent = complex(seen.amplitude_v * math.cos(seen.turn), seen.amplitude_v * math.sin(seen.turn))
+    sent = complex(
+        seen.amplitude_v * math.cos(seen.command_phase_rad), seen.amplitude_v * math.sin(seen.command_phase_rad)
+    )
     gain = t.law[0].detector.gain
     if contradicts_exciter(t.expected[0], plausibility, sent, vibration.force, vibration.drive, gain, loop.dt_s):
         ratio = size(plausibility.needed) / max(size(plausibility.late_sent), SMALLEST_V)
-        shut_down(guard, PLANT_CONTRADICTED, -1, ratio, loop.sample, False)
+        shut_down(guard, EndReason.PLANT_CONTRADICTED, -1, ratio, loop.sample, False)
 
 
 @kernel
@@ -131,11 +131,11 @@ def begin_segment(t: TickArrays, segment: Record) -> None:
     """Switch to the drive and amplitude law of a new segment, starting from the present output and frequency without a jump."""
     loop, control, progress = t.loop[0], t.control[0], t.progress[0]
     amplitude = control.amplitude
-    if segment.drive == LOOP_DRIVE and loop.drive != LOOP_DRIVE:
+    if segment.drive == Drive.LOOP and loop.drive != Drive.LOOP:
         control.frequency.taking_over = 1
-    if segment.drive == TONE and loop.drive == LOOP_DRIVE:
+    if segment.drive == Drive.TONE and loop.drive == Drive.LOOP:
         progress.omega = control.frequency.omega  # from where the tone's ramp goes to its own frequency
-    if loop.drive == SILENT and segment.drive != SILENT:
+    if loop.drive == Drive.SILENT and segment.drive != Drive.SILENT:
         reset_output(t.plausibility[0])
     loop.drive = segment.drive
     if t.law[0].harmonics.highest > 0:
@@ -158,11 +158,11 @@ def step_sequencer(t: TickArrays) -> bool:
     missed = amplitude.saturated == 1 and held_amplitude(amplitude, t.control[0].vibration) < UNREACHED * progress.level
     progress.unreached = 1 if missed else 0
     advance(progress, t.segments, t.outcomes, t.settling[0], t.rule[0], t.control[0].lock, t.guard[0])
-    running = t.guard[0].mode == ARMED and progress.finished == 0
+    running = t.guard[0].mode == GuardMode.ARMED and progress.finished == 0
     loop.held = 0
     if running and progress.entered == 1:
         segment = t.segments[progress.segment]
-        loop.held = 0 if is_ramp(segment.kind) or segment.kind == RELEASE else 1
+        loop.held = 0 if is_ramp(segment.kind) or segment.kind == SegmentKind.RELEASE else 1
         loop.waveform = segment.waveform
     return bool(running)
 
@@ -171,13 +171,13 @@ def step_sequencer(t: TickArrays) -> bool:
 def choose_frequency(t: TickArrays) -> None:
     """Set the frequency of this sample: from the loop (held while no phase can be read) or from the plan."""
     control, loop, progress = t.control[0], t.loop[0], t.progress[0]
-    if loop.drive == WAVEFORM:
+    if loop.drive == Drive.WAVEFORM:
         control.frequency.omega = TWO_PI / (t.waveforms.shape[1] * loop.dt_s)
-    elif loop.drive == TONE:
+    elif loop.drive == Drive.TONE:
         control.frequency.omega = progress.omega
-    elif loop.drive == LOOP_DRIVE and control.vibration.present == 1:
+    elif loop.drive == Drive.LOOP and control.vibration.present == 1:
         follow(t.law[0].frequency, control.frequency, control.vibration, progress.lag)
-    if loop.drive != WAVEFORM:
+    if loop.drive != Drive.WAVEFORM:
         watch_frequency(t.guard[0], t.limits[0], control.frequency.omega, loop.sample)
 
 
@@ -189,13 +189,13 @@ def permit_output(t: TickArrays, demanded: float, allowed: float, running: bool)
     output; the limits apply to it.
     """
     amplitude, guard, limits = t.control[0].amplitude, t.guard[0], t.limits[0]
-    if running and t.loop[0].drive == SILENT:
+    if running and t.loop[0].drive == Drive.SILENT:
         release(guard)
-    before, turn = guard.amplitude_v, amplitude.output.command_phase_rad
+    before, phase_rad = guard.amplitude_v, amplitude.output.command_phase_rad
     permitted = permitted_amplitude(guard, limits, allowed, t.loop[0].sample)
     if running:
-        turn = permitted_command_phase(limits, turn, amplitude.demanded_phase_rad, before, permitted)
-    track_saturation(amplitude, demanded, permitted, turn)
+        phase_rad = permitted_command_phase(limits, phase_rad, amplitude.demanded_phase_rad, before, permitted)
+    track_saturation(amplitude, demanded, permitted, phase_rad)
     return permitted
 
 
@@ -208,36 +208,36 @@ def follow_harmonics(t: TickArrays, permitted: float, running: bool) -> None:
     law, control, loop = t.law[0], t.control[0], t.loop[0]
     if law.harmonics.highest == 0:
         return
-    followed = control.lock.state != LOST_LOCK if loop.drive == LOOP_DRIVE else loop.drive == TONE
+    followed = control.lock.state != LOST_LOCK if loop.drive == Drive.LOOP else loop.drive == Drive.TONE
     acts = running and followed and control.vibration.present == 1
     drive_harmonics(law.harmonics, control.harmonics, permitted, control.frequency.omega, running, acts)
 
 
 @inner_kernel
-def oscillate(t: TickArrays, amplitude: float, turn: float) -> float:
+def oscillate(t: TickArrays, amplitude: float, command_phase_rad: float) -> float:
     """Return the output (V) of this sample, ``Re(U exp(i theta))`` and harmonics, and advance the oscillator by one sample.
 
     A waveform is read from its table, one entry a sample.
     """
     loop, omega = t.loop[0], t.control[0].frequency.omega
-    if loop.drive == WAVEFORM:
+    if loop.drive == Drive.WAVEFORM:
         period = t.waveforms.shape[1]
         output = amplitude * t.waveforms[loop.waveform, loop.play]
         loop.play = loop.play + 1 if loop.play + 1 < period else 0
         theta = TWO_PI * loop.play / period
     else:
-        output = amplitude * math.cos(loop.theta + turn)
-        if t.law[0].harmonics.highest > 0 and loop.drive != SILENT:
+        output = amplitude * math.cos(loop.theta + command_phase_rad)
+        if t.law[0].harmonics.highest > 0 and loop.drive != Drive.SILENT:
             output += harmonics_at(t.law[0].harmonics, t.control[0].harmonics, loop.theta)
         theta = advance_phase(loop.theta, omega, loop.dt_s)
     if not math.isfinite(output):
-        shut_down(t.guard[0], NON_FINITE_OUTPUT, -1, output, loop.sample, True)
+        shut_down(t.guard[0], EndReason.NON_FINITE_OUTPUT, -1, output, loop.sample, True)
         output = 0.0
     sent = t.history[loop.sample % t.history.size]
     sent.theta = loop.theta
     sent.omega = omega
     sent.amplitude_v = amplitude
-    sent.turn = turn
+    sent.command_phase_rad = command_phase_rad
     sent.output_v = output
     loop.theta = theta
     loop.sample += 1
@@ -261,8 +261,10 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
     row.frequency_hz = seen.omega / TWO_PI
     row.output_v = seen.output_v
     row.command_v = (
-        complex(seen.amplitude_v * math.cos(seen.turn), seen.amplitude_v * math.sin(seen.turn))
-        if seen.turn != 0.0
+        complex(
+            seen.amplitude_v * math.cos(seen.command_phase_rad), seen.amplitude_v * math.sin(seen.command_phase_rad)
+        )
+        if seen.command_phase_rad != 0.0
         else complex(seen.amplitude_v, 0.0)
     )
 
@@ -282,7 +284,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
         if t.expected[0].known == 1:
             judge_by_exciter(t, seen)
     lag_of_skew = frequency.omega * loop.skew_samples * loop.dt_s
-    closed = measure_phase(law, control, progress.lag, lag_of_skew, loop.drive == LOOP_DRIVE)
+    closed = measure_phase(law, control, progress.lag, lag_of_skew, loop.drive == Drive.LOOP)
 
     if theta_in < loop.theta_in:
         loop.cycles += 1
@@ -294,7 +296,7 @@ def tick(t: TickArrays, volts: np.ndarray, lost: bool, readings: np.ndarray, row
     demanded = allowed = 0.0
     if running:
         choose_frequency(t)
-        by_loop = loop.drive == LOOP_DRIVE
+        by_loop = loop.drive == Drive.LOOP
         demanded = demand(law.amplitude, amplitude, vibration, progress.level, progress.lag, frequency.omega, by_loop)
         allowed = demanded if amplitude.law == VOLTAGE else permitted_level(t.plausibility[0], demanded)
     permitted = permit_output(t, demanded, allowed, running)

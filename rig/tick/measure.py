@@ -6,9 +6,9 @@ import numpy as np
 
 from controller.kernels import track
 from rig.tick.layout import SENSOR_AT_RANGE, TickArrays
-from rig.tick.safety.kernels import SENSOR_OVERLOAD, check_gap, extrapolate_motion, watch_input, watch_motion
-from rig.tick.safety.layout import ARMED
-from rig.tick.sequencer.layout import WAVEFORM
+from rig.tick.safety.kernels import check_gap, extrapolate_motion, watch_input, watch_motion
+from rig.tick.safety.layout import EndReason, GuardMode
+from rig.tick.sequencer.layout import Drive
 from vibrolock.compiled import kernel
 
 STUCK_SAMPLES = 16  # equal readings in a row; more than occur at a turning point of any vibration worth watching
@@ -25,7 +25,7 @@ def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tupl
     channel, watch = t.inputs[index], t.watches[index]
     usable = watch_input(guard, limits, channel, watch, index, volts, loop.sample, driven)
     within = usable and abs(volts * channel.unit_per_volt) <= channel.limit
-    if not within or (guard.channel == index and guard.reason >= SENSOR_OVERLOAD):
+    if not within or (guard.channel == index and guard.reason >= EndReason.SENSOR_OVERLOAD):
         watch.distrusted = 1
     return usable, watch.distrusted == 0 and watch.same_samples < STUCK_SAMPLES
 
@@ -34,7 +34,7 @@ def examine_input(t: TickArrays, index: int, volts: float, driven: bool) -> tupl
 def read_inputs(t: TickArrays, volts: np.ndarray, readings: np.ndarray) -> int:
     """Check and convert every input channel; return the telemetry flags of the inputs."""
     loop, guard, limits = t.loop[0], t.guard[0], t.limits[0]
-    armed = guard.mode == ARMED
+    armed = guard.mode == GuardMode.ARMED
     driven = armed and (loop.held == 1 or t.progress[0].start_level > 0.0)  # in a ramp from a level, too
     # Start with the mean of all samples so far: noise or ambient vibration in one sample would be integrated to displacement.
     mean_gain = max(t.law[0].detector.mean_gain, 1.0 / (loop.seen + 1.0))
@@ -81,7 +81,7 @@ def bridge_lost_sample(t: TickArrays, readings: np.ndarray, cos_theta: float, si
     dt, mean_gain = loop.dt_s, t.law[0].detector.mean_gain
     readings[:] = math.nan
     loop.lost += 1
-    omega = limits.resonance_rad_s if loop.drive == WAVEFORM else t.control[0].frequency.omega
+    omega = limits.resonance_rad_s if loop.drive == Drive.WAVEFORM else t.control[0].frequency.omega
     cos_step, sin_step = math.cos(omega * dt), math.sin(omega * dt)
     for index in range(t.inputs.size):
         if t.inputs[index].watch_displacement == 1:

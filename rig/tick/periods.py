@@ -6,11 +6,11 @@ from controller.harmonics import end_harmonics_period, left_alone
 from controller.kernels import LOCKED, RESPONSE, VOLTAGE, end_period, next_lock_state, size
 from rig.tick.layout import TickArrays
 from rig.tick.safety.keeping import begin_level, foretold_level, gain_has_changed, is_far_above
-from rig.tick.safety.kernels import GAIN_CHANGED, LEVEL_NOT_FOLLOWED, OVER_LEVEL, SENSOR_STUCK, shut_down
-from rig.tick.safety.layout import ARMED
-from rig.tick.safety.response_plausibility import check_held_level, see_frequency, silent_side
+from rig.tick.safety.kernels import shut_down
+from rig.tick.safety.layout import EndReason, GuardMode
+from rig.tick.safety.response_plausibility import check_held_level, evaluate_exciter, silent_side
 from rig.tick.sequencer.judgement import judge_period
-from rig.tick.sequencer.layout import LOOP_DRIVE, RECORD, SILENT, TONE, WAVEFORM
+from rig.tick.sequencer.layout import Drive, SegmentKind
 from vibrolock.compiled import kernel
 
 
@@ -20,28 +20,28 @@ def judge_response(t: TickArrays) -> None:
     loop, control, guard, plausibility = t.loop[0], t.control[0], t.guard[0], t.plausibility[0]
     law, lock = control.amplitude.law, control.lock
     force, response = control.period.force_n, control.period.drive_m_s2
-    see_frequency(t.expected[0], plausibility, control.frequency.omega)
-    if guard.mode != ARMED:
+    evaluate_exciter(t.expected[0], plausibility, control.frequency.omega)
+    if guard.mode != GuardMode.ARMED:
         return
-    if loop.drive == LOOP_DRIVE and t.progress[0].unlocked == 1:
+    if loop.drive == Drive.LOOP and t.progress[0].unlocked == 1:
         side = silent_side(t.expected[0], plausibility, force, response)
         if side > 0:
             channel = loop.force_channel if side == 1 else loop.drive_channel
-            shut_down(guard, SENSOR_STUCK, channel, force if side == 1 else response, loop.sample, False)
+            shut_down(guard, EndReason.SENSOR_STUCK, channel, force if side == 1 else response, loop.sample, False)
     if law == VOLTAGE:
         return
-    slipping, tone = lock.state == LOCKED and lock.out_of_band_periods > 0, loop.drive == TONE
+    slipping, tone = lock.state == LOCKED and lock.out_of_band_periods > 0, loop.drive == Drive.TONE
     if check_held_level(t.expected[0], plausibility, control.period, t.progress[0].level, law, slipping, tone):
         channel = loop.drive_channel if law == RESPONSE else loop.force_channel
         value = response if law == RESPONSE else control.period.held
-        shut_down(guard, LEVEL_NOT_FOLLOWED, channel, value, loop.sample, False)
+        shut_down(guard, EndReason.LEVEL_NOT_FOLLOWED, channel, value, loop.sample, False)
 
 
 @kernel
 def judge_keeping(t: TickArrays) -> None:
     """Trip if a level is far exceeded under a phase lock, or if it takes another output than before."""
     loop, control, guard, plausibility = t.loop[0], t.control[0], t.guard[0], t.plausibility[0]
-    if guard.mode != ARMED or loop.drive != LOOP_DRIVE:
+    if guard.mode != GuardMode.ARMED or loop.drive != Drive.LOOP:
         return
     kept, period, law, lag = plausibility.kept, control.period, control.amplitude.law, t.progress[0].lag
     locked, volts = control.lock.state == LOCKED, law == VOLTAGE
@@ -51,12 +51,12 @@ def judge_keeping(t: TickArrays) -> None:
     seen = foretold_level(t.expected[0], kept, period) if volts else period.held
     if is_far_above(kept, seen, level, locked):
         value = period.drive_m_s2 if volts or law == RESPONSE else period.held
-        shut_down(guard, OVER_LEVEL, channel, value, loop.sample, False)
+        shut_down(guard, EndReason.OVER_LEVEL, channel, value, loop.sample, False)
     if volts:
         return
     needed_v = size(plausibility.needed) if plausibility.told == 1 else 0.0
     if gain_has_changed(kept, period.held, period.output_v, needed_v, locked, loop.held == 1):
-        shut_down(guard, GAIN_CHANGED, channel, kept.factor, loop.sample, False)
+        shut_down(guard, EndReason.GAIN_CHANGED, channel, kept.factor, loop.sample, False)
 
 
 @kernel
@@ -66,9 +66,9 @@ def end_harmonics(t: TickArrays) -> float:
     law, state = t.law[0].harmonics, control.harmonics
     if law.highest == 0:
         return 0.0
-    recording = progress.entered == 1 and t.segments[progress.segment].kind == RECORD
+    recording = progress.entered == 1 and t.segments[progress.segment].kind == SegmentKind.RECORD
     free, amplitude_v = loop.held == 1 and not recording, control.amplitude.output.amplitude_v
-    locked = loop.drive == TONE or control.lock.state == LOCKED
+    locked = loop.drive == Drive.TONE or control.lock.state == LOCKED
     end_harmonics_period(law, state, amplitude_v, locked, settling.steady == 1, free)
     settling.left_alone = left_alone(law, state)
     return float(state.miss)
@@ -82,17 +82,17 @@ def close_period(t: TickArrays) -> None:
     if not end_period(period):
         return
     control.frequency.mean_error_rad = period.error_rad
-    if loop.drive in (WAVEFORM, SILENT):
+    if loop.drive in (Drive.WAVEFORM, Drive.SILENT):
         return
     present = control.vibration.present == 1
     if not present:
         period.error_rad = math.nan
-    open_loop = loop.drive == TONE
+    open_loop = loop.drive == Drive.TONE
     if not open_loop:
         next_lock_state(lock, t.law[0].lock, present, loop.held == 1, period.error_rad)
     # If a loop holds the level, its own error decides; limits may clip the ripple of its output all the time.
-    behind = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE
-    locked = (open_loop or lock.state == LOCKED) and not behind
+    saturated = amplitude.output.saturation_sign != 0 and amplitude.law == VOLTAGE
+    locked = (open_loop or lock.state == LOCKED) and not saturated
     period.output_v = t.guard[0].amplitude_v
     period.saturated, period.clamped = amplitude.saturated, control.frequency.clamped
     wanted = t.progress[0].level if amplitude.law != VOLTAGE else 0.0

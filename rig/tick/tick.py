@@ -14,7 +14,7 @@ from rig.tick.layout import HISTORY, LOOP, ROW, TickArrays, recorded_row
 from rig.tick.safety.expected import expected_record
 from rig.tick.safety.kernels import is_over
 from rig.tick.safety.limits import guard_record, input_records, limits_record, watch_records
-from rig.tick.safety.response_plausibility import PLAUSIBILITY, see_frequency
+from rig.tick.safety.response_plausibility import PLAUSIBILITY, evaluate_exciter
 from rig.tick.sequencer.judgement import SETTLING
 from rig.tick.sequencer.layout import PROGRESS, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule, highest_frequency_hz, segment_table
@@ -23,39 +23,50 @@ JUDGED_AGAIN = 11.0  # periods
 SMALLEST_BITS = 0.4  # a phase can be read down to about this many converter bits of amplitude
 
 
+@dataclass(frozen=True, eq=False)
+class TickSettings:
+    """Arguments of a tick except the device's latency, which is known later; can be passed to another process."""
+
+    bench: Bench
+    law: Law
+    amplitude_law: AmplitudeLaw
+    settle: SettleRule
+    segments: Sequence[Segment]
+    waveforms: np.ndarray | None = None
+    """Waveforms of unit peak that segments can play, [n, period]."""
+    exciter: PlantModel | None = None
+    """A known plant: the fundamentals are checked against its exciter, and the law uses its mode shape, not the bench's."""
+    retries: int = 0
+    """How often a record that is refused for something that passes is measured again at most."""
+    armed: bool = True
+    """False keeps the output at 0 V."""
+    start_judged: bool = False
+    """Whether a start segment lasts until `Tick.release_start`, so that a caller can judge the vibration there."""
+    per_volt: tuple[float, float] | None = None
+    """Force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts."""
+
+    def build(self, latency_samples: float) -> "Tick":
+        """Build the tick for a device of this latency; its outputs show one block later in addition."""
+        return Tick(self, self.bench.block + latency_samples)
+
+
 class Tick:
     """The control state of a run.
 
     ``loop_delay_samples`` is the delay from an output computed by the tick to the input that shows it: the block plus the
-    device's latency, including the fraction. ``waveforms`` [n, period] of unit peak can be played by segments. If the plant is
-    known, the fundamentals are checked against its ``exciter``, and the law uses its mode shape in place of the bench's.
-    ``per_volt``: force (N/V) and motion (m/s^2/V) at resonance in the last check, if there was one, for levels in volts. A
-    record that is refused for something that passes is measured again up to ``retries`` times. ``armed = False`` keeps the
-    output at 0 V. With ``start_judged`` a start segment lasts until `release_start`, so that a caller can judge the vibration
-    there.
+    device's latency, including the fraction.
 
     Raises `ConfigurationError` if the law does not suit the bench.
     """
 
-    def __init__(
-        self,
-        bench: Bench,
-        law: Law,
-        amplitude_law: AmplitudeLaw,
-        settle: SettleRule,
-        segments: Sequence[Segment],
-        loop_delay_samples: float,
-        *,
-        waveforms: np.ndarray | None = None,
-        exciter: PlantModel | None = None,
-        per_volt: tuple[float, float] | None = None,
-        retries: int = 0,
-        armed: bool = True,
-        start_judged: bool = False,
-    ) -> None:
+    def __init__(self, settings: TickSettings, loop_delay_samples: float) -> None:
+        bench, law, amplitude_law = settings.bench, settings.law, settings.amplitude_law
+        segments, waveforms, exciter = settings.segments, settings.waveforms, settings.exciter
         shape = bench.specimen.drive_mode_shape if exciter is None else exciter.drive_shape
         try:
-            _check_harmonics(law, bench, segments, loop_delay_samples)
+            if law.harmonics is not None:
+                highest_hz = highest_frequency_hz(law, segments)
+                law.harmonics.check_frequency(bench.sample_rate_hz, highest_hz, loop_delay_samples)
             law_record = law.build(bench.sample_rate_hz, amplitude_law, bench.limits.voltage_v, shape)
         except ValueError as error:
             raise ConfigurationError.of(error, within="controller") from None
@@ -96,16 +107,16 @@ class Tick:
         progress["unlocked"] = 1
         progress["lag"] = table["lag_rad"][:1] if len(segments) else lag_rad
         progress["segments"] = len(segments)
-        progress["retries"], progress["point"] = retries, -1
-        progress["held_back"] = int(start_judged and any(one.kind is SegmentKind.START for one in segments))
-        expected = expected_record(bench, smallest[force], smallest[drive], exciter, per_volt)
+        progress["retries"], progress["point"] = settings.retries, -1
+        progress["held_back"] = int(settings.start_judged and any(one.kind is SegmentKind.START for one in segments))
+        expected = expected_record(bench, smallest[force], smallest[drive], exciter, settings.per_volt)
         plausibility = np.zeros(1, PLAUSIBILITY)
         plausibility["reference_v"] = expected["floor_v"]
-        see_frequency(expected[0], plausibility[0], omega)
+        evaluate_exciter(expected[0], plausibility[0], omega)
         self.bench = bench
         self.arrays = TickArrays(
             law=law_record,
-            rule=settle.build(),
+            rule=settings.settle.build(),
             limits=limits,
             inputs=input_records(bench),
             expected=expected,
@@ -113,7 +124,7 @@ class Tick:
             waveforms=np.zeros((1, 1)) if waveforms is None else np.ascontiguousarray(waveforms, float),
             loop=loop,
             control=control,
-            guard=guard_record(armed),
+            guard=guard_record(settings.armed),
             watches=watch_records(len(bench.channels)),
             plausibility=plausibility,
             settling=np.zeros(1, SETTLING),
@@ -203,40 +214,6 @@ class Tick:
         return out
 
 
-@dataclass(frozen=True, eq=False)
-class TickSettings:
-    """Arguments of a tick except the device's latency, which is known later; can be passed to another process."""
-
-    bench: Bench
-    law: Law
-    amplitude_law: AmplitudeLaw
-    settle: SettleRule
-    segments: Sequence[Segment]
-    waveforms: np.ndarray | None = None
-    exciter: PlantModel | None = None
-    retries: int = 0
-    armed: bool = True
-    start_judged: bool = False
-    per_volt: tuple[float, float] | None = None
-
-    def build(self, latency_samples: float) -> Tick:
-        """Build the tick for a device of this latency; its outputs show one block later in addition."""
-        return Tick(
-            self.bench,
-            self.law,
-            self.amplitude_law,
-            self.settle,
-            self.segments,
-            self.bench.block + latency_samples,
-            waveforms=self.waveforms,
-            exciter=self.exciter,
-            per_volt=self.per_volt,
-            retries=self.retries,
-            armed=self.armed,
-            start_judged=self.start_judged,
-        )
-
-
 def _history(size: int, omega: float, dt: float) -> np.ndarray:
     """Return the ring of past outputs, as if the oscillator had been running before at zero amplitude."""
     out = np.zeros(size, HISTORY)
@@ -244,10 +221,3 @@ def _history(size: int, omega: float, dt: float) -> np.ndarray:
     out["theta"] = np.mod(-ago * omega * dt, 2.0 * math.pi)
     out["omega"] = omega
     return out
-
-
-def _check_harmonics(law: Law, bench: Bench, segments: Sequence[Segment], loop_delay_samples: float) -> None:
-    """Raise ValueError if the harmonics loop cannot follow the highest frequency of the run."""
-    if law.harmonics is None:
-        return
-    law.harmonics.check_frequency(bench.sample_rate_hz, highest_frequency_hz(law, segments), loop_delay_samples)

@@ -14,7 +14,7 @@ from rig.drivers import make_daq
 from rig.drivers.virtual.driver import VirtualDAQ
 from rig.loop.loop import Loop
 from rig.tick.sequencer.segments import Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 
 FREQUENCY_HZ = {"magnet-beam": 24.37, "friction-beam": 149.0}
 POLE_RAD_S = {"magnet-beam": (-11.5, 3.9), "friction-beam": (-5.8, -24.2)}
@@ -57,7 +57,7 @@ def carried_out(
     with make_daq(bench, seed) as daq:
         daq.start(bench.block)
         lead = bench.block + daq.latency_samples
-        tick = Tick(bench, law, AmplitudeLaw.VOLTAGE, settle or SettleRule(), segments, lead)
+        tick = Tick(TickSettings(bench, law, AmplitudeLaw.VOLTAGE, settle or SettleRule(), segments), lead)
         return np.concatenate(list(Loop(daq, tick).run())), tick
 
 

@@ -9,7 +9,7 @@ from rig.loop.loop import Loop
 from rig.tick.kernels import tick_block
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from tests.closed_loop.laws import law_of
 from tests.rig.rigs import bench_with, tick_for
 
@@ -118,7 +118,7 @@ def _through_all_laws(bench, lead, force_loop):
         for kind in (SegmentKind.RAMP, SegmentKind.HOLD)
     ]
     law = law_of("magnet-beam", force_loop=force_loop, k4=10.0)
-    return Tick(bench, law, laws.VOLTAGE, SettleRule(), segments, lead)
+    return Tick(TickSettings(bench, law, laws.VOLTAGE, SettleRule(), segments), lead)
 
 
 @pytest.mark.parametrize("force_loop", ["linear", "logarithmic", "through-response"])

@@ -20,7 +20,7 @@ from rig.loop.loop import Loop
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import GuardMode
 from rig.tick.sequencer.segments import SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response, phase_resonance_backbone
 from tests.closed_loop.true_force import TruePoint, true_points
@@ -283,7 +283,9 @@ def test_a_run_that_ends_brings_the_whole_output_down_smoothly_from_every_stage(
     rows = []
     with make_daq(bench, 1) as daq:
         daq.start(bench.block)
-        tick = Tick(bench, law, AmplitudeLaw.VOLTAGE, SettleRule(), segments, bench.block + daq.latency_samples)
+        tick = Tick(
+            TickSettings(bench, law, AmplitudeLaw.VOLTAGE, SettleRule(), segments), bench.block + daq.latency_samples
+        )
         loop = Loop(daq, tick)
         for chunk in loop.run():
             rows.append(chunk)

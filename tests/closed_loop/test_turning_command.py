@@ -13,7 +13,7 @@ from rig.tick.safety.kernels import permitted_amplitude, permitted_command_phase
 from rig.tick.safety.limits import guard_record, limits_record
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from tests.closed_loop.laws import law_of
 from tests.rig.rigs import bench_with
 
@@ -85,7 +85,10 @@ def _turned_round(slew_v_per_s):
     chunks, mark = [], 0
     with make_daq(bench, 0) as daq:
         daq.start(bench.block)
-        tick = Tick(bench, law_of("magnet-beam"), V, SettleRule(), _segments(4e-4), bench.block + daq.latency_samples)
+        tick = Tick(
+            TickSettings(bench, law_of("magnet-beam"), V, SettleRule(), _segments(4e-4)),
+            bench.block + daq.latency_samples,
+        )
         for rows in Loop(daq, tick).run():
             chunks.append(rows)
             if mark == 0 and tick.arrays.progress["segment"][0] == 3 and tick.sample > 18000:

@@ -6,7 +6,7 @@ from controller import AmplitudeLaw, PhaseLockedLoop, preset
 from rig.bench import Bench, load_bench
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 
 SETTLE = SettleRule(longest_periods=300)
 
@@ -42,4 +42,4 @@ def tick_for(
 ) -> Tick:
     """A tick with the paper's controller, going through voltage levels."""
     segments = point_segments(*(levels or (0.5, 1.0)), **kwargs)
-    return Tick(bench, law or preset("magnet-beam"), amplitude_law, SETTLE, segments, lead)
+    return Tick(TickSettings(bench, law or preset("magnet-beam"), amplitude_law, SETTLE, segments), lead)

@@ -16,8 +16,7 @@ degrees from resonance are not compared. Where the exciter is known, what it exp
 
 import math
 
-import numpy as np
-
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 
 FAR = 3.0  # times its level; the build-up of a vibration does not take a force as large as this
@@ -35,25 +34,9 @@ NEAR = 0.1  # of its level; what is held is in order within it
 IN_ORDER_PERIODS = 10  # in order in a row, after which the output of a level is known
 COMPARED = 0.7  # sine of a lag below which levels are not compared: exciter and structure may cancel each other there
 
-KEPT = np.dtype(
-    [
-        ("law", "i8"),
-        ("level", "f8"),
-        ("lag", "f8"),
-        ("trusted_periods", "i8"),
-        ("bound", "f8"),
-        ("far_periods", "i8"),
-        ("highest", "f8"),
-        ("in_order_periods", "i8"),
-        ("gain", "f8"),
-        ("first_gain", "f8"),
-        ("first_level", "f8"),
-        ("first_lag", "f8"),
-        ("first_needed", "f8"),
-        ("factor", "f8"),
-        ("changed_periods", "i8"),
-        ("most_changed_periods", "i8"),
-    ]
+KEPT = record(
+    i8="law trusted_periods far_periods in_order_periods changed_periods most_changed_periods",
+    f8="level lag bound highest gain first_gain first_level first_lag first_needed factor",
 )
 """State of both checks (one record).
 

@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-import numpy as np
+from vibrolock.arrays import record
 
 
 class GuardMode(IntEnum):
@@ -86,72 +86,26 @@ TEXT = {
 POLARITY_HINT = "is a sensor's polarity reversed, or the resonance outside the frequency window?"
 """What to look for where a loop finds no lock."""
 
-DISARMED, ARMED, RAMPING, OFF = (int(mode) for mode in GuardMode)
-
-LIMITS = np.dtype(
-    [
-        ("voltage_v", "f8"),
-        ("displacement_m", "f8"),
-        ("lowest_rad_s", "f8"),
-        ("highest_rad_s", "f8"),
-        ("slew_v_per_sample", "f8"),
-        ("overload_samples", "i8"),
-        ("stuck_samples", "i8"),
-        ("lost_samples", "i8"),
-        ("ramp_down_samples", "i8"),
-        ("integrator_gain", "f8"),
-        ("integrator_leak", "f8"),
-        ("resonance_rad_s", "f8"),
-    ]
+LIMITS = record(
+    f8="voltage_v displacement_m lowest_rad_s highest_rad_s slew_v_per_sample integrator_gain integrator_leak "
+    "resonance_rad_s",
+    i8="overload_samples stuck_samples lost_samples ramp_down_samples",
 )
 """Limits of a bench in samples and SI units (one record), and the resonance frequency that dominates the motion."""
 
-INPUT = np.dtype(
-    [
-        ("unit_per_volt", "f8"),
-        ("overload_v", "f8"),
-        ("alarm_v", "f8"),
-        ("limit", "f8"),
-        ("role", "i8"),
-        ("skew_samples", "f8"),
-        ("watch_displacement", "i8"),
-        ("emergency_stop", "i8"),
-        ("stop_below_v", "f8"),
-        ("stop_above_v", "f8"),
-    ]
+INPUT = record(
+    f8="unit_per_volt overload_v alarm_v limit skew_samples stop_below_v stop_above_v",
+    i8="role watch_displacement emergency_stop",
 )
 """Parameters of an input channel (one record a channel). A channel with ``emergency_stop`` is a switch: a reading outside
 ``stop_below_v`` to ``stop_above_v`` drops the output. Otherwise its reading may stay constant."""
 
-INPUT_WATCH = np.dtype(
-    [
-        ("mean", "f8"),
-        ("velocity", "f8"),
-        ("displacement", "f8"),
-        ("last_v", "f8"),
-        ("same_samples", "i8"),
-        ("overload_samples", "i8"),
-        ("distrusted", "i8"),
-        ("alert", "i8"),
-    ]
-)
+INPUT_WATCH = record(f8="mean velocity displacement last_v", i8="same_samples overload_samples distrusted alert")
 """Running state of an input channel (one record a channel)."""
 
-GUARD = np.dtype(
-    [
-        ("mode", "i8"),
-        ("reason", "i8"),
-        ("channel", "i8"),
-        ("sample", "i8"),
-        ("value", "f8"),
-        ("ramp_sample", "i8"),
-        ("ramp_from_v", "f8"),
-        ("amplitude_v", "f8"),
-        ("stop_requested", "i8"),
-        ("dropped", "i8"),
-        ("off_samples", "i8"),
-        ("lock", "i8"),
-    ]
+GUARD = record(
+    i8="mode reason channel sample ramp_sample stop_requested dropped off_samples lock",
+    f8="value ramp_from_v amplitude_v",
 )
 """State of the guard (one record). ``reason``, ``channel``, ``sample``, ``value`` are written once, for the first cause.
 ``off_samples``: samples since the output went off; ``dropped``: the output was dropped instead of ramped; ``lock``: lock state

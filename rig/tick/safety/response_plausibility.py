@@ -12,6 +12,7 @@ import numpy as np
 
 from controller.kernels import RESPONSE, TWO_PI, size
 from rig.tick.safety.keeping import FAR, KEPT
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 
 LARGEST_RISE = 2.0  # largest output over the output that last sufficed; this also bounds the rise within one period
@@ -38,27 +39,14 @@ WIDE = 3.0  # times its band; within it the known exciter can still show an ampl
 DOUBTED = 3.0  # standard errors of the exciter that are left to it
 UNLIKE_PERIODS = 1.0  # duration of a contradiction that trips, in periods at the centre frequency of the known exciter
 
-EXPECTED = np.dtype(
-    [
-        ("known", "i8"),
-        ("force_v_n", "f8", (4,)),
-        ("acceleration_v_s2_m", "f8", (4,)),
-        ("centre_rad_s", "f8"),
-        ("force_v_n_std", "f8"),
-        ("mode", "f8", (3,)),
-        ("residual_per_kg", "f8", (2,)),
-        ("lowest_rad_s", "f8"),
-        ("highest_rad_s", "f8"),
-        ("noise_n", "f8"),
-        ("noise_m_s2", "f8"),
-        ("visible_n", "f8"),
-        ("visible_m_s2", "f8"),
-        ("floor_v", "f8"),
-        ("force_skew_s", "f8"),
-        ("drive_skew_s", "f8"),
-        ("checked_n_v", "f8"),
-        ("checked_m_s2_v", "f8"),
-    ]
+EXPECTED = record(
+    ("force_v_n", "f8", (4,)),
+    ("acceleration_v_s2_m", "f8", (4,)),
+    ("mode", "f8", (3,)),
+    ("residual_per_kg", "f8", (2,)),
+    i8="known",
+    f8="centre_rad_s force_v_n_std lowest_rad_s highest_rad_s noise_n noise_m_s2 visible_n visible_m_s2 floor_v "
+    "force_skew_s drive_skew_s checked_n_v checked_m_s2_v",
 )
 """Knowledge before the run (one record).
 
@@ -69,31 +57,11 @@ amplitudes below which the exciter is not judged. ``visible_``: amplitudes above
 from noise. ``floor_v``: output that is always allowed. ``_skew_s``: delays of the two channels. ``checked_``: force (N) and
 motion (m/s^2) per volt at resonance in the last check, 0 if unknown."""
 
-PLAUSIBILITY = np.dtype(
-    [
-        ("alpha", "c16"),
-        ("beta", "c16"),
-        ("alpha_rate", "c16"),
-        ("beta_rate", "c16"),
-        ("force_doubt", "c16"),
-        ("drive_doubt", "c16"),
-        ("sent", "c16"),
-        ("late_sent", "c16"),
-        ("late_force", "c16"),
-        ("late_drive", "c16"),
-        ("needed", "c16"),
-        ("told", "i8"),
-        ("unlike_s", "f8"),
-        ("most_unlike_s", "f8"),
-        ("silent_periods", "i8"),
-        ("reference_v", "f8"),
-        ("reference_level", "f8"),
-        ("reference_other", "f8"),
-        ("out_of_band_periods", "i8"),
-        ("largest_rise", "f8"),
-        ("most_periods", "i8"),
-        ("kept", KEPT),
-    ]
+PLAUSIBILITY = record(
+    ("kept", KEPT),
+    c16="alpha beta alpha_rate beta_rate force_doubt drive_doubt sent late_sent late_force late_drive needed",
+    i8="told silent_periods out_of_band_periods most_periods",
+    f8="unlike_s most_unlike_s reference_v reference_level reference_other largest_rise",
 )
 """State of the supervision (one record).
 
@@ -117,7 +85,7 @@ def polynomial(coefficients: np.ndarray, z: complex) -> tuple[complex, complex]:
 
 
 @kernel
-def see_frequency(expected: Record, plausibility: Record, omega: float) -> None:
+def evaluate_exciter(expected: Record, plausibility: Record, omega: float) -> None:
     """Evaluate the known exciter at the present frequency (rad/s), once a period; set it to zero outside its range.
 
     Alpha and beta are individually known (``told``) within the exciter's band. Within `WIDE` times the band they can still show

@@ -5,17 +5,9 @@ import math
 import numpy as np
 
 from controller.kernels import LOCKED, LOST, SEARCHING
-from rig.tick.sequencer.layout import RECORD, SETTLE, Outcome
+from rig.tick.sequencer.layout import Outcome, SegmentKind
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
-
-RUNNING = int(Outcome.RUNNING)
-DONE = int(Outcome.DONE)
-NOT_SETTLED = int(Outcome.NOT_SETTLED)
-DISTURBED = int(Outcome.DISTURBED)
-LOST_LOCK = int(Outcome.LOST_LOCK)
-UNREACHABLE = int(Outcome.UNREACHABLE)
-OUTSIDE_WINDOW = int(Outcome.OUTSIDE_WINDOW)
-NOT_LOCKED = int(Outcome.NOT_LOCKED)
 
 SATURATED_PERIODS = 20  # in a row at the voltage limit after which a level is out of reach; chosen
 CLAMPED_PERIODS = 20  # in a row at an end of the window after which there is no lock; chosen
@@ -24,29 +16,18 @@ FAR_PERIODS = (
 )
 LOST_FACTOR = 3.0  # while recording, an averaged error or drift beyond this multiple of the tolerance spoils the point
 
-SETTLE_RULE = np.dtype([("phase_rad", "f8"), ("amplitude", "f8"), ("average_periods", "i8"), ("settled_periods", "i8")])
+SETTLE_RULE = record(f8="phase_rad amplitude", i8="average_periods settled_periods")
 """The settle rule (one record); see `judge_period`."""
 
 LONGEST_AVERAGE = 64  # periods that the ring holds
 
-SETTLING = np.dtype(
-    [
-        ("errors", "f8", (2 * LONGEST_AVERAGE,)),
-        ("responses", "f8", (2 * LONGEST_AVERAGE,)),
-        ("forces", "f8", (2 * LONGEST_AVERAGE,)),
-        ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
-        ("count", "i8"),
-        ("steady", "i8"),
-        ("distortion", "f8"),
-        ("left_alone", "i8"),
-        ("good_periods", "i8"),
-        ("bad_periods", "i8"),
-        ("saturated_periods", "i8"),
-        ("clamped_periods", "i8"),
-        ("clamped_in_row", "i8"),
-        ("mean_error_rad", "f8"),
-        ("drift", "f8"),
-    ]
+SETTLING = record(
+    ("errors", "f8", (2 * LONGEST_AVERAGE,)),
+    ("responses", "f8", (2 * LONGEST_AVERAGE,)),
+    ("forces", "f8", (2 * LONGEST_AVERAGE,)),
+    ("controlled", "f8", (2 * LONGEST_AVERAGE,)),
+    i8="count steady left_alone good_periods bad_periods saturated_periods clamped_periods clamped_in_row",
+    f8="distortion mean_error_rad drift",
 )
 """Means of the last periods, as rings, and the state of the settle rule (one record). ``clamped_in_row`` counts the present run
 of periods with clamped frequency; ``clamped_periods`` counts those of that run that the settle rule has judged."""
@@ -135,18 +116,18 @@ def is_slipping(lock: Record) -> bool:
 def failure_of(kind: int, settling: Record, rule: Record, lock: Record, elapsed: float, periods: float) -> int:
     """Return the outcome code of a held segment that has failed, or RUNNING."""
     if lock.state == LOST:
-        return LOST_LOCK
+        return Outcome.LOST_LOCK
     if settling.saturated_periods >= SATURATED_PERIODS:
-        return UNREACHABLE
+        return Outcome.UNREACHABLE
     if settling.clamped_periods >= CLAMPED_PERIODS:
-        return OUTSIDE_WINDOW
+        return Outcome.OUTSIDE_WINDOW
     if is_slipping(lock):
-        return RUNNING
-    if kind == RECORD and settling.bad_periods >= rule.average_periods:
-        return DISTURBED
-    if kind == SETTLE and elapsed >= periods:
-        return NOT_SETTLED
-    return RUNNING
+        return Outcome.RUNNING
+    if kind == SegmentKind.RECORD and settling.bad_periods >= rule.average_periods:
+        return Outcome.DISTURBED
+    if kind == SegmentKind.SETTLE and elapsed >= periods:
+        return Outcome.NOT_SETTLED
+    return Outcome.RUNNING
 
 
 @kernel
@@ -164,12 +145,12 @@ def start_verdict(settling: Record, lock: Record, elapsed: float) -> int:
     in every period so far and in at least 100 periods.
     """
     if lock.state == LOCKED:
-        return DONE
+        return Outcome.DONE
     if lock.state == SEARCHING:
-        return NOT_SETTLED
+        return Outcome.NOT_SETTLED
     if settling.clamped_in_row >= CLAMPED_PERIODS:
-        return OUTSIDE_WINDOW
+        return Outcome.OUTSIDE_WINDOW
     if was_always_far(lock, elapsed):
-        return NOT_LOCKED
+        return Outcome.NOT_LOCKED
     always_far = lock.out_of_band_periods > 0 and lock.out_of_band_periods >= math.floor(elapsed) - 1
-    return RUNNING if always_far or settling.clamped_in_row > 0 else DONE
+    return Outcome.RUNNING if always_far or settling.clamped_in_row > 0 else Outcome.DONE

@@ -6,49 +6,19 @@ import numpy as np
 
 from controller.kernels import LOCKED, LOST, VOLTAGE, reacquire
 from rig.tick.safety.kernels import shut_down
-from rig.tick.safety.layout import ARMED, EndReason
+from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.judgement import (
     CLAMPED_PERIODS,
-    DISTURBED,
-    DONE,
-    LOST_LOCK,
-    OUTSIDE_WINDOW,
-    RUNNING,
     SATURATED_PERIODS,
-    UNREACHABLE,
     failure_of,
     forget_periods,
     is_slipping,
     start_verdict,
     was_always_far,
 )
-from rig.tick.sequencer.layout import (
-    HOLD,
-    LEVEL_SWEEP,
-    LOOP_DRIVE,
-    RAMP,
-    RECORD,
-    RELEASE,
-    SETTLE,
-    START,
-    SWEEP,
-    OnFailure,
-    Outcome,
-)
-from rig.tick.sequencer.repetition import measure_again, step_is_over, too_many_faults
+from rig.tick.sequencer.layout import Drive, OnFailure, Outcome, SegmentKind
+from rig.tick.sequencer.repetition import measure_again, note_result, step_is_over, too_many_faults
 from vibrolock.compiled import Record, kernel
-
-COMPLETED = int(EndReason.COMPLETED)
-STOP_REQUESTED = int(EndReason.STOP_REQUESTED)
-PLAN_STOPPED = int(EndReason.PLAN_STOPPED)
-TRIP_LOST_LOCK = int(EndReason.LOST_LOCK)
-NO_LOCK_IN_WINDOW = int(EndReason.NO_LOCK_IN_WINDOW)
-NO_LOCK = int(EndReason.NO_LOCK)
-
-SKIPPED = int(Outcome.SKIPPED)
-INTERRUPTED = int(Outcome.INTERRUPTED)
-OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
-STOP = int(OnFailure.STOP)
 
 LONGEST_WAIT = 200.0  # periods of a ramp that waits for the phase; a loop that hunts at a level hunts more at the next
 LONGEST_WAIT_FOR_HARMONICS = (
@@ -63,15 +33,8 @@ ARRIVED = 1e-3  # a ramp has ended if the output is this close to its end, relat
 def close_segment(progress: Record, outcomes: np.ndarray, settling: Record, outcome: int) -> None:
     """Record how the present segment ended and move to the next segment."""
     entry = outcomes[progress.segment]
-    entry.outcome = outcome
-    entry.end_sample = progress.sample
-    entry.periods = progress.cycle - progress.start_cycle
-    entry.mean_error_rad = settling.mean_error_rad
-    entry.drift = settling.drift
+    note_result(entry, progress, settling, outcome)
     entry.distortion, entry.left_alone = settling.distortion, settling.left_alone
-    entry.held = progress.held
-    entry.continued = progress.continued
-    entry.lost = progress.lost
     progress.segment += 1
     progress.entered = 0
 
@@ -86,7 +49,7 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, los
         if segment.point != failed.point and not above:
             return
         entry = outcomes[progress.segment]
-        entry.outcome = SKIPPED
+        entry.outcome = Outcome.SKIPPED
         entry.first_sample = progress.sample
         entry.end_sample = progress.sample
         progress.segment += 1
@@ -95,7 +58,7 @@ def skip_point(progress: Record, segments: np.ndarray, outcomes: np.ndarray, los
 @kernel
 def is_ramp(kind: int) -> bool:
     """Return whether a segment of this kind changes the level."""
-    return kind in (RAMP, LEVEL_SWEEP)
+    return kind in (SegmentKind.RAMP, SegmentKind.LEVEL_SWEEP)
 
 
 @kernel
@@ -116,17 +79,19 @@ def give_up(
     segment = segments[progress.segment]
     elapsed = progress.cycle - progress.start_cycle
     close_segment(progress, outcomes, settling, failure)
-    far_off = failure == OUTSIDE_WINDOW or was_always_far(lock, elapsed)
-    if segment.kind == START or (progress.unlocked == 1 and segment.drive == LOOP_DRIVE and far_off):
+    far_off = failure == Outcome.OUTSIDE_WINDOW or was_always_far(lock, elapsed)
+    if segment.kind == SegmentKind.START or (progress.unlocked == 1 and segment.drive == Drive.LOOP and far_off):
         progress.finished = 1
-        shut_down(guard, NO_LOCK_IN_WINDOW if failure == OUTSIDE_WINDOW else NO_LOCK, -1, 0.0, progress.sample, False)
-    elif (segment.on_lost_lock if failure == LOST_LOCK else segment.on_failure) == STOP:
+        reason = EndReason.NO_LOCK_IN_WINDOW if failure == Outcome.OUTSIDE_WINDOW else EndReason.NO_LOCK
+        shut_down(guard, reason, -1, 0.0, progress.sample, False)
+    elif (segment.on_lost_lock if failure == Outcome.LOST_LOCK else segment.on_failure) == OnFailure.STOP:
         progress.finished = 1
-        shut_down(guard, TRIP_LOST_LOCK if failure == LOST_LOCK else PLAN_STOPPED, -1, 0.0, progress.sample, False)
+        reason = EndReason.LOST_LOCK if failure == Outcome.LOST_LOCK else EndReason.PLAN_STOPPED
+        shut_down(guard, reason, -1, 0.0, progress.sample, False)
     else:
-        if failure == LOST_LOCK:
+        if failure == Outcome.LOST_LOCK:
             lock.state = LOST
-        skip_point(progress, segments, outcomes, failure == LOST_LOCK)
+        skip_point(progress, segments, outcomes, failure == Outcome.LOST_LOCK)
 
 
 @kernel
@@ -135,8 +100,8 @@ def swept(segment: Record, start_omega: float, samples: int) -> float:
 
     Holding it over the interval gives the exact phase of a linear sweep.
     """
-    way = segment.rate * (samples + 0.5)
-    omega = start_omega * math.exp(way) if segment.logarithmic else start_omega + way
+    increment = segment.rate * (samples + 0.5)
+    omega = start_omega * math.exp(increment) if segment.logarithmic else start_omega + increment
     return float(min(omega, segment.omega) if segment.rate > 0.0 else max(omega, segment.omega))
 
 
@@ -163,7 +128,7 @@ def has_arrived(segment: Record, start_level: float, amplitude_v: float) -> bool
 
     Only ramps of the voltage of a tone or waveform wait for the output.
     """
-    if segment.drive == LOOP_DRIVE or segment.amplitude_law != VOLTAGE:
+    if segment.drive == Drive.LOOP or segment.amplitude_law != VOLTAGE:
         return True  # the settle rule waits for the output
     return bool(abs(amplitude_v - segment.level) <= ARRIVED * max(start_level, segment.level))
 
@@ -188,14 +153,14 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
         progress.point = segment.point
         progress.tries_left = progress.retries
         progress.faulty_before = math.inf
-    entry.outcome = RUNNING
+    entry.outcome = Outcome.RUNNING
     entry.first_sample = progress.sample
     if is_ramp(segment.kind) and lock.state == LOST:
         reacquire(lock)
         progress.returning = 1 if 0.0 < progress.kept_level < progress.level else 0
-    if segment.kind == SETTLE:
+    if segment.kind == SegmentKind.SETTLE:
         forget_periods(settling)
-    if segment.kind == RELEASE:
+    if segment.kind == SegmentKind.RELEASE:
         reacquire(lock)  # the lock is given up, not lost
         progress.start_level = 0.0  # readings that do not change are no fault while nothing drives
         progress.kept_level = 0.0
@@ -205,7 +170,10 @@ def enter_segment(progress: Record, segments: np.ndarray, outcomes: np.ndarray, 
 def must_wait(progress: Record, segment: Record, lock: Record) -> bool:
     """Return whether an upward ramp waits because the phase of a loop that has been locked is off; sweeps do not."""
     return bool(
-        segment.kind == RAMP and segment.drive == LOOP_DRIVE and progress.unlocked == 0 and lock.out_of_band == 1
+        segment.kind == SegmentKind.RAMP
+        and segment.drive == Drive.LOOP
+        and progress.unlocked == 0
+        and lock.out_of_band == 1
     )
 
 
@@ -213,7 +181,7 @@ def must_wait(progress: Record, segment: Record, lock: Record) -> bool:
 def is_held_by_window(progress: Record, segment: Record, settling: Record) -> bool:
     """Return whether the frequency stands at an end of its window during a ramp before the first lock, or one that waits."""
     watched = progress.unlocked == 1 or progress.waited_cycles > 0.0
-    return bool(watched and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == LOOP_DRIVE)
+    return bool(watched and settling.clamped_in_row >= CLAMPED_PERIODS and segment.drive == Drive.LOOP)
 
 
 @kernel
@@ -252,8 +220,10 @@ def is_refused_for_faults(
     With too many of them it is measured again, or its point given up. After a held output it is measured again if it may be.
     """
     fault = too_many_faults(progress, planned)
-    if fault == DONE:
-        return bool(step_is_over(progress, over) and measure_again(progress, segments, outcomes, settling, OUTPUT_HELD))
+    if fault == Outcome.DONE:
+        return bool(
+            step_is_over(progress, over) and measure_again(progress, segments, outcomes, settling, Outcome.OUTPUT_HELD)
+        )
     if not measure_again(progress, segments, outcomes, settling, fault, True):
         close_segment(progress, outcomes, settling, fault)
         skip_point(progress, segments, outcomes, False)
@@ -277,17 +247,17 @@ def advance(
     """
     if progress.finished:
         return
-    if guard.stop_requested == 1 and guard.mode == ARMED:
-        shut_down(guard, STOP_REQUESTED, -1, 0.0, progress.sample, False)
-    if guard.mode != ARMED:
+    if guard.stop_requested == 1 and guard.mode == GuardMode.ARMED:
+        shut_down(guard, EndReason.STOP_REQUESTED, -1, 0.0, progress.sample, False)
+    if guard.mode != GuardMode.ARMED:
         guard.lock = lock.state
         if progress.entered:
-            close_segment(progress, outcomes, settling, INTERRUPTED)
+            close_segment(progress, outcomes, settling, Outcome.INTERRUPTED)
         progress.finished = 1
         return
     if progress.segment >= progress.segments:
         progress.finished = 1
-        shut_down(guard, COMPLETED, -1, 0.0, progress.sample, False)
+        shut_down(guard, EndReason.COMPLETED, -1, 0.0, progress.sample, False)
         return
     segment, cycle = segments[progress.segment], progress.cycle
     if not progress.entered:
@@ -311,56 +281,58 @@ def advance(
         progress.lag = between(progress.start_lag, segment.lag_rad, rise)
         progress.omega = between(progress.start_omega, segment.omega, rise)
         if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
-            if lock.state == LOCKED and segment.kind == LEVEL_SWEEP:
+            if lock.state == LOCKED and segment.kind == SegmentKind.LEVEL_SWEEP:
                 progress.kept_level = segment.level
-            close_segment(progress, outcomes, settling, DONE)
+            close_segment(progress, outcomes, settling, Outcome.DONE)
         elif is_held_by_window(progress, segment, settling):
-            give_up(progress, segments, outcomes, settling, lock, guard, OUTSIDE_WINDOW)
+            give_up(progress, segments, outcomes, settling, lock, guard, Outcome.OUTSIDE_WINDOW)
         elif progress.frozen_cycles >= SATURATED_PERIODS:
-            give_up(progress, segments, outcomes, settling, lock, guard, UNREACHABLE)
+            give_up(progress, segments, outcomes, settling, lock, guard, Outcome.UNREACHABLE)
         elif progress.waited_cycles >= LONGEST_WAIT:
-            give_up(progress, segments, outcomes, settling, lock, guard, LOST_LOCK)
+            give_up(progress, segments, outcomes, settling, lock, guard, Outcome.LOST_LOCK)
         return
     progress.level = segment.level
-    if segment.kind == SWEEP:
+    if segment.kind == SegmentKind.SWEEP:
         progress.omega = swept(segment, progress.start_omega, samples)
         if progress.omega == segment.omega:
-            close_segment(progress, outcomes, settling, DONE)
+            close_segment(progress, outcomes, settling, Outcome.DONE)
         return
     progress.omega = segment.omega
     progress.lag = segment.lag_rad
-    if segment.kind == SETTLE and settling.good_periods >= rule.settled_periods:
-        close_segment(progress, outcomes, settling, DONE)
+    if segment.kind == SegmentKind.SETTLE and settling.good_periods >= rule.settled_periods:
+        close_segment(progress, outcomes, settling, Outcome.DONE)
         return
-    if segment.kind == SETTLE or segment.kind == RECORD:
+    if segment.kind == SegmentKind.SETTLE or segment.kind == SegmentKind.RECORD:
         failure = failure_of(segment.kind, settling, rule, lock, elapsed, segment.periods)
-        if failure == DISTURBED and measure_again(progress, segments, outcomes, settling, DISTURBED):
+        if failure == Outcome.DISTURBED and measure_again(progress, segments, outcomes, settling, Outcome.DISTURBED):
             return
-        if failure != RUNNING:
+        if failure != Outcome.RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, failure)
             return
-    if segment.kind == START and elapsed >= segment.periods:
+    if segment.kind == SegmentKind.START and elapsed >= segment.periods:
         verdict = start_verdict(settling, lock, elapsed)
-        if verdict == DONE and lock.state == LOCKED and wants_harmonics(segment, settling, elapsed):
+        if verdict == Outcome.DONE and lock.state == LOCKED and wants_harmonics(segment, settling, elapsed):
             return
-        if verdict == DONE and progress.held_back == 1:
+        if verdict == Outcome.DONE and progress.held_back == 1:
             return
-        if verdict == DONE:
-            close_segment(progress, outcomes, settling, DONE)
-        elif verdict != RUNNING:
+        if verdict == Outcome.DONE:
+            close_segment(progress, outcomes, settling, Outcome.DONE)
+        elif verdict != Outcome.RUNNING:
             give_up(progress, segments, outcomes, settling, lock, guard, verdict)
         return
     over = samples >= segment.samples if segment.samples > 0 else elapsed >= segment.periods
-    if segment.kind == RECORD and progress.held + progress.continued + progress.lost > 0:
+    if segment.kind == SegmentKind.RECORD and progress.held + progress.continued + progress.lost > 0:
         planned = samples_of(segment, samples, elapsed)
         if is_refused_for_faults(progress, segments, outcomes, settling, planned, over):
             return
-    if segment.kind == HOLD and wants_harmonics(segment, settling, elapsed):
+    if segment.kind == SegmentKind.HOLD and wants_harmonics(segment, settling, elapsed):
         return
-    if segment.kind != SETTLE and over and not (segment.kind == RECORD and is_slipping(lock)):
-        spoilt = segment.kind == RECORD and settling.bad_periods > 0  # it began to fail shortly before its end
-        if spoilt and measure_again(progress, segments, outcomes, settling, DISTURBED):
+    if segment.kind != SegmentKind.SETTLE and over and not (segment.kind == SegmentKind.RECORD and is_slipping(lock)):
+        spoilt = (
+            segment.kind == SegmentKind.RECORD and settling.bad_periods > 0
+        )  # it began to fail shortly before its end
+        if spoilt and measure_again(progress, segments, outcomes, settling, Outcome.DISTURBED):
             return
         if lock.state == LOCKED and not spoilt:
             progress.kept_level = segment.level
-        close_segment(progress, outcomes, settling, DISTURBED if spoilt else DONE)
+        close_segment(progress, outcomes, settling, Outcome.DISTURBED if spoilt else Outcome.DONE)

@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from controller.harmonics import ORDERS
+from vibrolock.arrays import record
 
 
 class SegmentKind(IntEnum):
@@ -78,29 +79,10 @@ class OnFailure(IntEnum):
     STOP = 1
 
 
-RAMP, SETTLE, RECORD, HOLD, SWEEP, LEVEL_SWEEP, START, RELEASE = (int(kind) for kind in SegmentKind)
-LOOP_DRIVE, TONE, WAVEFORM, SILENT = (int(drive) for drive in Drive)
-
-SEGMENT = np.dtype(
-    [
-        ("kind", "i8"),
-        ("point", "i8"),
-        ("level", "f8"),
-        ("amplitude_law", "i8"),
-        ("geometric", "i8"),
-        ("lag_rad", "f8"),
-        ("periods", "f8"),
-        ("samples", "i8"),
-        ("on_failure", "i8"),
-        ("on_lost_lock", "i8"),
-        ("drive", "i8"),
-        ("omega", "f8"),
-        ("rate", "f8"),
-        ("logarithmic", "i8"),
-        ("waveform", "i8"),
-        ("again", "i8"),
-        ("harmonics", "c16", ORDERS),
-    ]
+SEGMENT = record(
+    ("harmonics", "c16", ORDERS),
+    i8="kind point amplitude_law geometric samples on_failure on_lost_lock drive logarithmic waveform again",
+    f8="level lag_rad periods omega rate",
 )
 """One segment of a plan, ``periods`` long, or ``samples`` where these are not 0.
 
@@ -109,20 +91,8 @@ SEGMENT = np.dtype(
 ``waveform``: number of the waveform that is played. ``again``: of a record, the number of the segment with which its
 repetition begins; else -1. ``harmonics``: those that the harmonics loop makes, as ratios to the fundamental."""
 
-OUTCOME = np.dtype(
-    [
-        ("outcome", "i8"),
-        ("first_sample", "i8"),
-        ("end_sample", "i8"),
-        ("periods", "f8"),
-        ("mean_error_rad", "f8"),
-        ("drift", "f8"),
-        ("held", "i8"),
-        ("continued", "i8"),
-        ("lost", "i8"),
-        ("distortion", "f8"),
-        ("left_alone", "i8"),
-    ]
+OUTCOME = record(
+    i8="outcome first_sample end_sample held continued lost left_alone", f8="periods mean_error_rad drift distortion"
 )
 """Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, number
 of samples with a held output, with a continued one, and of lost ones. ``distortion``: last error of the controlled harmonics
@@ -149,42 +119,12 @@ REFUSED = np.dtype(
 RING = 64
 """Refused records that are kept for the campaign, which reads them every few hundredths of a second."""
 
-PROGRESS = np.dtype(
-    [
-        ("segment", "i8"),
-        ("segments", "i8"),
-        ("cycle", "f8"),
-        ("sample", "i8"),
-        ("unreached", "i8"),
-        ("start_cycle", "f8"),
-        ("last_cycle", "f8"),
-        ("frozen_cycles", "f8"),
-        ("waited_cycles", "f8"),
-        ("kept_level", "f8"),
-        ("returning", "i8"),
-        ("held_back", "i8"),
-        ("start_sample", "i8"),
-        ("start_level", "f8"),
-        ("level", "f8"),
-        ("start_lag", "f8"),
-        ("lag", "f8"),
-        ("start_omega", "f8"),
-        ("omega", "f8"),
-        ("finished", "i8"),
-        ("entered", "i8"),
-        ("unlocked", "i8"),
-        ("point", "i8"),
-        ("tries_left", "i8"),
-        ("retries", "i8"),
-        ("held", "i8"),
-        ("continued", "i8"),
-        ("lost", "i8"),
-        ("disturbed", "i8"),
-        ("faulty_share", "f8"),
-        ("faulty_before", "f8"),
-        ("n_refused", "i8"),
-        ("refused", REFUSED, (RING,)),
-    ]
+PROGRESS = record(
+    ("refused", REFUSED, (RING,)),
+    i8="segment segments sample unreached returning held_back start_sample finished entered unlocked point "
+    "tries_left retries held continued lost disturbed n_refused",
+    f8="cycle start_cycle last_cycle frozen_cycles waited_cycles kept_level start_level level start_lag lag "
+    "start_omega omega faulty_share faulty_before",
 )
 """Position of the run in the plan (one record). ``cycle``: oscillator periods at the inputs so far, with the fraction;
 ``unreached``: the output is at its limit and the present level is not reached; ``frozen_cycles``: periods for which a ramp

@@ -7,11 +7,6 @@ import numpy as np
 from rig.tick.sequencer.layout import RING, Outcome
 from vibrolock.compiled import Record, kernel
 
-PENDING = int(Outcome.PENDING)
-DONE = int(Outcome.DONE)
-OUTPUT_HELD = int(Outcome.OUTPUT_HELD)
-SAMPLES_LOST = int(Outcome.SAMPLES_LOST)
-OUTPUT_CONTINUED = int(Outcome.OUTPUT_CONTINUED)
 LARGEST_HELD = 0.05  # of the samples of a record; measured to do no harm
 LARGEST_CONTINUED = 0.25  # of the samples of a record; measured to do no harm
 LARGEST_LOST = 0.05
@@ -20,15 +15,25 @@ MOST_ATTEMPTS = 6  # at a record, beyond the retries of the plan, while fewer of
 
 
 @kernel
+def note_result(entry: Record, progress: Record, settling: Record, outcome: int) -> None:
+    """Write how the present segment ended into an ``entry`` of the outcomes or of the refused records."""
+    entry.outcome = outcome
+    entry.end_sample = progress.sample
+    entry.periods = progress.cycle - progress.start_cycle
+    entry.mean_error_rad, entry.drift = settling.mean_error_rad, settling.drift
+    entry.held, entry.continued, entry.lost = progress.held, progress.continued, progress.lost
+
+
+@kernel
 def too_many_faults(progress: Record, samples: float) -> int:
     """Return for which fault of the device a record that will have so many ``samples`` is certain to be refused, or DONE."""
     if progress.held > LARGEST_HELD * samples:
-        return OUTPUT_HELD
+        return Outcome.OUTPUT_HELD
     if progress.continued > LARGEST_CONTINUED * samples:
-        return OUTPUT_CONTINUED
+        return Outcome.OUTPUT_CONTINUED
     if progress.lost > LARGEST_LOST * samples:
-        return SAMPLES_LOST
-    return DONE
+        return Outcome.SAMPLES_LOST
+    return Outcome.DONE
 
 
 @kernel
@@ -71,20 +76,13 @@ def measure_again(
     progress.faulty_before = progress.faulty_share
     entry = progress.refused[progress.n_refused % RING]
     entry.segment = progress.segment
-    entry.outcome = outcome
     entry.first_sample = outcomes[progress.segment].first_sample
-    entry.end_sample = progress.sample
-    entry.periods = progress.cycle - progress.start_cycle
-    entry.mean_error_rad = settling.mean_error_rad
-    entry.drift = settling.drift
-    entry.held = progress.held
-    entry.continued = progress.continued
-    entry.lost = progress.lost
+    note_result(entry, progress, settling, outcome)
     entry.force_n = settling.forces[(settling.count - 1) % settling.forces.size] if settling.count > 0 else math.nan
     progress.n_refused += 1
     progress.tries_left -= 1
     for index in range(segment.again, progress.segment + 1):
-        outcomes[index].outcome = PENDING
+        outcomes[index].outcome = Outcome.PENDING
     progress.segment = segment.again
     progress.entered = 0
     return True

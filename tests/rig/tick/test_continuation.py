@@ -8,7 +8,7 @@ from rig.drivers import make_daq
 from rig.loop.loop import Loop
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Excitation, Segment
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from tests.rig.rigs import SETTLE, bench_with, tick_for
 
 BLOCK = 14
@@ -78,7 +78,10 @@ def playing(*numbers):
             for number in numbers
             for kind in (SegmentKind.RAMP, SegmentKind.HOLD)
         ]
-        return Tick(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SETTLE, segments, lead, waveforms=waveforms)
+        return Tick(
+            TickSettings(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SETTLE, segments, waveforms=waveforms),
+            lead,
+        )
 
     return tick_of
 

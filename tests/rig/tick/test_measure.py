@@ -10,7 +10,7 @@ from controller import AmplitudeLaw, preset
 from rig.tick.measure import bridge_lost_sample
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from tests.rig.rigs import bench_with
 
 FORCE, DRIVE = cmath.rect(3.0, 0.7), cmath.rect(20.0, -1.1)
@@ -20,7 +20,7 @@ FORCE, DRIVE = cmath.rect(3.0, 0.7), cmath.rect(20.0, -1.1)
 def tick():
     bench = bench_with()
     segments = [Segment(SegmentKind.RAMP, -1, 0.5, 2.0), Segment(SegmentKind.HOLD, -1, 0.5, 1000.0)]
-    made = Tick(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), segments, 1.5)
+    made = Tick(TickSettings(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), segments), 1.5)
     vibration = made.arrays.control["vibration"]
     vibration["force"], vibration["drive"] = FORCE, DRIVE
     return made

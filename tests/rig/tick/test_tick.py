@@ -11,7 +11,7 @@ from rig.tick.kernels import tick_block
 from rig.tick.layout import ROW_COLUMNS
 from rig.tick.sequencer.layout import SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from tests.refused import refused
 from tests.rig.rigs import bench_with
 from tests.rig.tick.blocks import nothing_told
@@ -20,7 +20,10 @@ HELD = [Segment(SegmentKind.RAMP, -1, 0.5, 2.0), Segment(SegmentKind.HOLD, -1, 0
 
 
 def _tick(lead, bench=None, law=None):
-    return Tick(bench or bench_with(), law or preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), HELD, lead)
+    return Tick(
+        TickSettings(bench or bench_with(), law or preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), HELD),
+        lead,
+    )
 
 
 def _wired(delay_whole, delay_fraction, samples=20_000, bench=None, skew=(0.0, 0.0), law=None):

@@ -116,12 +116,12 @@ def test_a_limit_trips_during_the_decay_and_latches():
     from rig.tick.safety.layout import EndReason
     from rig.tick.sequencer.layout import SegmentKind
     from rig.tick.sequencer.segments import Segment, SettleRule
-    from rig.tick.tick import Tick
+    from rig.tick.tick import Tick, TickSettings
     from tests.rig.rigs import bench_with
 
     bench = bench_with()
     held = [Segment(SegmentKind.HOLD, -1, 0.5, 5.0), Segment(SegmentKind.RELEASE, -1, 0.5, 1000.0)]
-    tick = Tick(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), held, 1.5)
+    tick = Tick(TickSettings(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), held), 1.5)
     outputs, reasons = [], []
     for sample in range(6000):
         theta = 2.0 * math.pi * 24.0 * sample / bench.sample_rate_hz
@@ -147,12 +147,12 @@ def test_a_stop_during_the_decay_ends_the_run(tmp_path):
     from rig.tick.safety.layout import EndReason
     from rig.tick.sequencer.layout import SegmentKind
     from rig.tick.sequencer.segments import Segment, SettleRule
-    from rig.tick.tick import Tick
+    from rig.tick.tick import Tick, TickSettings
     from tests.rig.rigs import bench_with
 
     bench = bench_with()
     segments = [Segment(SegmentKind.RELEASE, -1, 0.5, 1000.0)]
-    tick = Tick(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), segments, 1.5)
+    tick = Tick(TickSettings(bench, preset("magnet-beam"), AmplitudeLaw.VOLTAGE, SettleRule(), segments), 1.5)
     readings, rows = tick.buffers(1)
     noise = np.random.default_rng(0).normal(size=(4000, 1, len(bench.channels))) * 1e-3
     for sample, volts in enumerate(noise):

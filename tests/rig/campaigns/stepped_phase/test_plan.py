@@ -9,7 +9,7 @@ from rig.campaigns.plans import load_plan, shipped_plans
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import SegmentKind
-from rig.tick.tick import Tick
+from rig.tick.tick import Tick, TickSettings
 from tests.refused import refused
 
 TABLE = {
@@ -136,4 +136,4 @@ def test_a_tick_can_be_built_of_every_shipped_plan(name):
     shipped = load_plan(name)
     bench = load_bench(shipped.bench)
     shipped.check(bench)
-    Tick(bench, shipped.law, shipped.amplitude_law, shipped.settle_rule, shipped.segments(5000.0), 2.0)
+    Tick(TickSettings(bench, shipped.law, shipped.amplitude_law, shipped.settle_rule, shipped.segments(5000.0)), 2.0)

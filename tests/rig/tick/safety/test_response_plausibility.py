@@ -23,8 +23,8 @@ from rig.tick.safety.response_plausibility import (
     PLAUSIBILITY,
     check_held_level,
     contradicts_exciter,
+    evaluate_exciter,
     permitted_level,
-    see_frequency,
     set_reference,
 )
 from rig.tick.tick import TickSettings
@@ -210,7 +210,7 @@ def test_the_exciter_is_held_against_amplitudes_that_grow_and_turn(rate, turn, r
     s = complex(rate, omega + turn)
     alpha, beta = (complex(value) for value in PLANT.exciter(s))
     expected, plausibility = _fresh(PLANT)
-    see_frequency(expected, plausibility, omega)
+    evaluate_exciter(expected, plausibility, omega)
     force, drive = 1.0 + 0.0j, 20.0 * ratio
     for step in range(1500):
         growth = cmath.exp((s - 1j * omega) * step * dt)
@@ -298,7 +298,7 @@ def _contradicted(plant, hardened, amplifier=1.0):
     """Whether a force source on an oscillator that has hardened by this factor contradicts a plant; at phase resonance."""
     expected, plausibility = _fresh(plant)
     omega = hardened * FORCE_SOURCE.frequency_rad_s
-    see_frequency(expected, plausibility, omega)
+    evaluate_exciter(expected, plausibility, omega)
     drive = 1j * omega / (2.0 * FORCE_SOURCE.damping_ratio * FORCE_SOURCE.frequency_rad_s)  # of 1 N, phi_d = 1
     sent = complex(0.5 / amplifier)
     return any(contradicts_exciter(expected, plausibility, sent, 1.0, drive, 0.05, 2e-4) for _ in range(3000))
@@ -320,6 +320,6 @@ def test_an_amplifier_of_another_gain_still_contradicts_it_where_the_structure_i
 
 def test_frequencies_outside_the_band_of_the_known_plant_are_not_judged():
     expected, plausibility = _fresh(PLANT)
-    see_frequency(expected, plausibility, 2.0 * 2.0 * math.pi * PLANT.band_hz[1])
+    evaluate_exciter(expected, plausibility, 2.0 * 2.0 * math.pi * PLANT.band_hz[1])
     assert plausibility["alpha"] == 0.0
     assert not any(contradicts_exciter(expected, plausibility, 1.0, 0.0, 0.0, 0.1, 1e-3) for _ in range(1000))
