@@ -7,7 +7,6 @@ in a process of its own. ``--page`` puts the table under the version and the mac
 there. The wall-clock loop is measured where ``cyclictest`` is installed and ``--minutes`` is above 0.
 """
 
-import argparse
 import json
 import os
 import platform
@@ -24,8 +23,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import typer
 
 import vibrolock
+from benchmarks.frame import in_turn
+from studies.matrix.measuring import machine
 
 ROUNDS = 5
 
@@ -48,9 +50,8 @@ def loop() -> Iterator[Ratio]:
         yield Ratio(f"integrator, {bench}", "fused loop", found["share_of_integrator"])
         yield Ratio(f"tick, {bench}", "fused loop", found["share_of_tick"])
         yield Ratio(f"exchange in blocks of 64, {bench}", "fused loop", found["exchange_64_over_fused"])
-        if "recorded_us_per_sample" in found:
-            fused, whole = found["fused_us_per_sample"], found["recorded_us_per_sample"]
-            yield Ratio(f"a whole backbone with journal and file, {bench}", "fused loop", whole / fused)
+        whole = found["recorded_us_per_sample"] / found["fused_us_per_sample"]
+        yield Ratio(f"a whole backbone with journal and file, {bench}", "fused loop", whole)
     yield Ratio("real time, magnet-beam", "fused loop", measured["magnet-beam"]["fused_realtime_factor"])
 
 
@@ -68,13 +69,10 @@ def commands() -> Iterator[Ratio]:
             "rig identify": ("identify", recording, "-o", str(Path(folder) / "model.h5"), "--overwrite"),
             "rig run magnet-beam/backbone": ("run", "magnet-beam/backbone", "-o", recording, "--overwrite"),
         }
-        times: dict[str, list[float]] = {name: [] for name in ("", *asked)}
-        for number in range(ROUNDS + 1):
-            for name, arguments in asked.items():
-                times[name].append(_processor_s(partial(_rig, *arguments)))
-            times[""].append(_processor_s(partial(_python, "-c", "import numpy")))
-            if number == 0:
-                times = {name: [] for name in times}  # the first round compiles and fills caches
+        work = {name: partial(_processor_s, partial(_rig, *arguments)) for name, arguments in asked.items()}
+        work[""] = partial(_processor_s, partial(_python, "-c", "import numpy"))
+        in_turn(work, 1)  # compiles and fills caches
+        times = in_turn(work, ROUNDS)
         base = statistics.median(times.pop(""))
         for name, values in times.items():
             yield Ratio(name, f"starting Python with numpy ({base:.2f} s)", statistics.median(values) / base)
@@ -91,19 +89,10 @@ def pnlss() -> Iterator[Ratio]:
 
 def wall_clock(minutes: float) -> Iterator[Ratio]:
     """Lateness of the loop by the clock."""
-    rates = ("2000", "5000")
-    for rate, found in _json("benchmarks.wall_clock", "--minutes", str(minutes), "--rates", *rates, "--json").items():
-        for name, value in _leaves(found):
-            if "over_cyclictest" in name:
-                yield Ratio(f"loop by the clock, {rate}, {name}", "cyclictest", value)
-
-
-def _leaves(found: dict[str, Any], path: str = "") -> Iterator[tuple[str, float]]:
-    for key, value in found.items():
-        if isinstance(value, dict):
-            yield from _leaves(value, f"{path}{key} ")
-        elif isinstance(value, float):
-            yield f"{path}{key}", value
+    rates = ("--rate", "2000", "--rate", "5000")
+    for rate, found in _json("benchmarks.wall_clock", "--minutes", str(minutes), *rates, "--json").items():
+        for name, value in found["wake_up_over_cyclictest"].items():
+            yield Ratio(f"loop by the clock, {rate}, wake_up_over_cyclictest {name}", "cyclictest", value)
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -126,20 +115,10 @@ def _processor_s(work: Callable[[], object]) -> float:
     return after.children_user + after.children_system - before.children_user - before.children_system
 
 
-def machine() -> str:
-    """What the table was measured on."""
-    cpu = platform.processor() or platform.machine()
-    with_models = Path("/proc/cpuinfo")
-    if with_models.exists():
-        found = re.search(r"model name\s*: (.*)", with_models.read_text(encoding="utf-8"))
-        cpu = found.group(1) if found else cpu
-    versions = f"Python {platform.python_version()}, numpy {np.__version__}"
-    return f"{cpu}, {os.cpu_count()} processors, {platform.system()}, {versions}"
-
-
 def table(ratios: list[Ratio]) -> str:
     """Return the table as Markdown, under version, machine and date."""
-    head = f"## {vibrolock.__version__}, {machine()}\n\nMeasured {time.strftime('%Y-%m-%d')}.\n\n"
+    versions = f"Python {platform.python_version()}, numpy {np.__version__}"
+    head = f"## {vibrolock.__version__}, {machine()}, {versions}\n\nMeasured {time.strftime('%Y-%m-%d')}.\n\n"
     rows = "".join(f"| {ratio.what} | {ratio.over} | {ratio.value:.3g} |\n" for ratio in ratios)
     return f"{head}| what | over | ratio |\n|---|---|---|\n{rows}"
 
@@ -152,24 +131,19 @@ def put(page: Path, text: str) -> None:
     page.write_text("\n".join(part.strip() + "\n" for part in (head, text, *kept)), encoding="utf-8")
 
 
-def main() -> None:
-    """Measure, print, and put the table into a page."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=0.0, help="minutes of the loop by the clock, at each rate")
-    parser.add_argument("--page", type=Path, help="page that gets the table")
-    given = parser.parse_args()
+def main(minutes: float = 0.0, page: Path | None = None) -> None:
+    """Measure all ratios, with ``minutes`` of the loop by the clock at each rate; print them, and put them into a page."""
     parts: list[Callable[[], Iterator[Ratio]]] = [commands, loop, pnlss]
-    if given.minutes > 0.0 and shutil.which("cyclictest"):
-        parts.append(partial(wall_clock, given.minutes))
+    if minutes > 0.0 and shutil.which("cyclictest"):
+        parts.append(partial(wall_clock, minutes))
     ratios: list[Ratio] = []
     for part in parts:
         for ratio in part():
             ratios.append(ratio)
             print(f"{ratio.value:9.3g}  {ratio.what}, over {ratio.over}", flush=True)
-    text = table(ratios)
-    if given.page is not None:
-        put(given.page, text)
+    if page is not None:
+        put(page, table(ratios))
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -1,6 +1,6 @@
 """Do stated 95 % intervals hold the truth? Backbones of virtual rigs, seed after seed, and what their intervals cover.
 
-    python -m benchmarks.coverage [PLAN ...] [--seeds 18] [--noise 1 10] [--levels] [--json FILE]
+    python -m benchmarks.coverage [PLAN ...] [--seeds 18] [--noise 1 --noise 10] [--levels] [--output FILE]
 
 Every recording is replayed: the recorded output, through the same rig without sensors and with finer steps, gives the true
 force and the true motion of the drive point during every point. The truth of force and amplitude are the
@@ -12,17 +12,16 @@ The whole interval shall cover the truth. ``--noise 10`` is ten times the noise 
 their converter. ``own`` is the rig of docs/tutorials/a-rig-of-your-own.md.
 """
 
-import argparse
 import json
 import re
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import typer
 from scipy.stats import binomtest
 
 import rig
@@ -259,28 +258,26 @@ def lines(name: str, factor: float, found: dict[str, Any], levels: bool) -> list
     return out
 
 
-def main() -> None:
-    """Run, print a table, and write all numbers as JSON."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.coverage", description=__doc__.splitlines()[0])
-    parser.add_argument("plans", nargs="*", default=PLANS, help="shipped plans, plan files, or own")
-    parser.add_argument("--seeds", type=int, default=18)
-    parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--noise", type=float, nargs="+", default=[1.0, 10.0])
-    parser.add_argument("--at", choices=("amplitude", "force"), default="amplitude", help="where the balance is taken")
-    parser.add_argument("--levels", action="store_true", help="show every point of the plan too")
-    parser.add_argument("--json", type=Path, help="file that gets all numbers")
-    given = parser.parse_args()
-    seeds = range(given.first_seed, given.first_seed + given.seeds)
+def main(
+    plans: Annotated[list[str] | None, typer.Argument()] = None,
+    seeds: int = 18,
+    first_seed: int = 0,
+    noise: list[float] | None = None,
+    at: Literal["amplitude", "force"] = "amplitude",
+    levels: bool = False,
+    output: Path | None = None,
+) -> None:
+    """Run plans: those above, files or ``own``. Print a table, with ``levels`` of every point too, and write all numbers."""
     print(HEAD, flush=True)
     everything: dict[str, Any] = {}
-    for name in given.plans:
-        for factor in given.noise:
-            found = study(name, seeds, factor, given.at)
+    for name in plans or PLANS:
+        for factor in noise or (1.0, 10.0):
+            found = study(name, range(first_seed, first_seed + seeds), factor, at)
             everything[f"{name}, noise {factor:g}"] = found
-            print("\n".join(lines(name, factor, found, given.levels)), flush=True)
-            if given.json is not None:
-                given.json.write_text(json.dumps(everything, indent=1), encoding="utf-8")
+            print("\n".join(lines(name, factor, found, levels)), flush=True)
+            if output is not None:
+                output.write_text(json.dumps(everything, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -6,8 +6,6 @@ median over interleaved rounds, so that what else the machine does falls on all 
 round, what the code costs on a machine that is left alone.
 """
 
-import json
-import os
 import statistics
 import subprocess
 import sys
@@ -17,10 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import typer
 
 import rig
-from benchmarks.integrator import kernels as integrator_kernels
-from benchmarks.rk4 import arrays as rk4_arrays, kernels as rk4_kernels
+from benchmarks.frame import in_turn, on_one_core, show
+from benchmarks.plants import integrate, runge_kutta, runge_kutta_arrays
 from rig.bench import Bench, load_bench
 from rig.campaigns.plans import load_plan
 from rig.drivers import make_daq
@@ -31,8 +30,11 @@ from simulators.kernels import run_open_loop
 
 ROUNDS = 9
 SAMPLES = 40_000
+SUBSTEPS = 8
+"""Runge-Kutta steps in a sample."""
 BLOCKS = (1, 8, 64)
-DRIVE = {"magnet-beam": (0.5, 24.4), "friction-beam": (0.5, 149.0)}  # V and Hz of the open-loop measurements
+DRIVE = {"magnet-beam": (0.5, 24.4), "friction-beam": (0.5, 149.0)}
+"""Voltage (V) and frequency (Hz) of the open-loop measurements."""
 NO_FILTER = "magnet-beam, 2 sub-steps, no filter"
 
 
@@ -44,7 +46,7 @@ def benches() -> dict[str, Bench]:
     return shipped | {NO_FILTER: Bench.model_validate(table)}
 
 
-def _started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
+def started(bench: Bench, block: int = 1) -> tuple[VirtualDAQ, Tick]:
     plan = load_plan(f"{bench.name}/backbone")
     daq = make_daq(bench)
     assert isinstance(daq, VirtualDAQ)
@@ -60,7 +62,7 @@ def fused(bench: Bench) -> Callable[[], float]:
     """Tick and plant in one compiled loop, telemetry in memory: us per sample."""
 
     def once() -> float:
-        daq, tick = _started(bench)  # from rest each time: the plan must not come to its end
+        daq, tick = started(bench)  # from rest each time: the plan must not come to its end
         readings, rows = tick.buffers(SAMPLES)
         daq.run_fused(tick.arrays, readings[:10], rows[:10])
         start = time.perf_counter()
@@ -72,29 +74,30 @@ def fused(bench: Bench) -> Callable[[], float]:
 
 def exchanged(bench: Bench, block: int) -> Callable[[], float]:
     """The same through `DAQ.exchange` in blocks: us per sample."""
-    daq, tick = _started(bench, block)
-    calls = SAMPLES // 4 // block
+    daq, tick = started(bench, block)
     readings, rows = tick.buffers(block)
     voltages = np.zeros(block)
-    tick_block(tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages, daq.put_out, daq.continuation)
 
-    def once() -> float:
-        start = time.perf_counter()
+    def run(calls: int) -> None:
         for _ in range(calls):
             tick_block(
                 tick.arrays, daq.exchange(voltages), daq.flags, readings, rows, voltages, daq.put_out, daq.continuation
             )
+
+    def once() -> float:
+        calls = SAMPLES // 4 // block
+        start = time.perf_counter()
+        run(calls)
         return 1e6 * (time.perf_counter() - start) / (calls * block)
 
+    run(1)
     return once
 
 
-def _sine(bench: Bench) -> np.ndarray:
+def open_loop(bench: Bench, run: Callable[[np.ndarray], object]) -> Callable[[], float]:
+    """A plant without the tick, driven by a sine: us per sample."""
     volts, frequency_hz = DRIVE[bench.name]
-    return np.asarray(volts * np.sin(2 * np.pi * frequency_hz * np.arange(SAMPLES) / bench.sample_rate_hz))
-
-
-def _timed(run: Callable[[np.ndarray], object], voltages: np.ndarray) -> Callable[[], float]:
+    voltages = volts * np.sin(2 * np.pi * frequency_hz * np.arange(SAMPLES) / bench.sample_rate_hz)
     run(voltages[:10])
 
     def once() -> float:
@@ -105,28 +108,17 @@ def _timed(run: Callable[[np.ndarray], object], voltages: np.ndarray) -> Callabl
     return once
 
 
-def rk4(bench: Bench) -> Callable[[], float]:
-    """The plant alone by the classic Runge-Kutta method with 8 sub-steps: us per sample."""
-    daq, _ = _started(bench)
-    arrays, state = rk4_arrays.build(daq.rig, substeps=8)
-    truth = np.zeros((SAMPLES, state.outputs.size))
-    return _timed(lambda voltages: rk4_kernels.run(arrays, state, voltages, truth), _sine(bench))
-
-
-def integrator(bench: Bench) -> Callable[[], float]:
-    """The plant alone, without sensors and converters: us per sample."""
-    daq, _ = _started(bench)
-    arrays, state = daq.rig.build()
-    internal = daq.rig.converter.oversampling
-    return _timed(lambda voltages: integrator_kernels.run(arrays, state, voltages, internal), _sine(bench))
-
-
-def virtual_rig(bench: Bench) -> Callable[[], float]:
-    """The virtual rig, sensors and converters included, without the tick: us per sample."""
-    daq, _ = _started(bench)
-    arrays, state = daq.rig.build()
-    out = np.zeros((SAMPLES, len(bench.channels)))
-    return _timed(lambda voltages: run_open_loop(arrays, state, voltages, out), _sine(bench))
+def open_loops(bench: Bench) -> dict[str, Callable[[], float]]:
+    """The plant with sensors and converters, alone by its integrator, and alone by Runge-Kutta steps."""
+    virtual = started(bench)[0].rig
+    whole, plant, reference = virtual.build(), virtual.build(), runge_kutta_arrays(virtual)
+    out, truth = np.zeros((SAMPLES, len(bench.channels))), np.zeros((SAMPLES, reference[1].outputs.size))
+    step_s, internal = 1.0 / (bench.sample_rate_hz * SUBSTEPS), virtual.converter.oversampling
+    return {
+        "rig": open_loop(bench, lambda voltages: run_open_loop(*whole, voltages, out)),
+        "integrator": open_loop(bench, lambda voltages: integrate(*plant, voltages, internal)),
+        "rk4": open_loop(bench, lambda voltages: runge_kutta(*reference, step_s, SUBSTEPS, voltages, truth)),
+    }
 
 
 def recorded(bench: Bench) -> Callable[[], float]:
@@ -141,42 +133,23 @@ def recorded(bench: Bench) -> Callable[[], float]:
     return once
 
 
-def _seconds(*command: str) -> float:
-    start = time.perf_counter()
-    subprocess.run([sys.executable, *command], check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start
-
-
-FIRST_SAMPLE = """
-from benchmarks.loop import _started
-from rig.bench import load_bench
-daq, tick = _started(load_bench("magnet-beam"))
-daq.run_fused(tick.arrays, *tick.buffers(1))
-"""
-
-
 def measure() -> dict[str, dict[str, float]]:
     """All numbers of all benches."""
-    measured = {}
-    for name, bench in benches().items():
-        kinds = {"fused": fused(bench), "rig": virtual_rig(bench), "integrator": integrator(bench), "rk4": rk4(bench)}
-        kinds |= {f"exchange_{block}": exchanged(bench, block) for block in BLOCKS}
-        kinds["recorded"] = recorded(bench)
-        measured[name] = kinds
-    times: dict[str, dict[str, list[float]]] = {name: {kind: [] for kind in measured[name]} for name in measured}
-    for _ in range(ROUNDS):
-        for name, kinds in measured.items():
-            for kind, once in kinds.items():
-                times[name][kind].append(once())
-    return {name: numbers(times[name], 1e6 / bench.sample_rate_hz) for name, bench in benches().items()}
+    work: dict[str, dict[str, Callable[[], float]]] = {
+        name: {"fused": fused(bench), **open_loops(bench)}
+        | {f"exchange_{block}": exchanged(bench, block) for block in BLOCKS}
+        | {"recorded": recorded(bench)}
+        for name, bench in benches().items()
+    }
+    return {name: numbers(in_turn(work[name], ROUNDS), 1e6 / bench.sample_rate_hz) for name, bench in benches().items()}
 
 
 def numbers(times: dict[str, list[float]], period_us: float) -> dict[str, float]:
     """What the times (us per sample) of one bench come to."""
     us = {kind: statistics.median(values) for kind, values in times.items()}
-    out = {f"{kind}_us_per_sample": value for kind, value in us.items()}
-    out |= {f"{kind}_least_us_per_sample": min(values) for kind, values in times.items()}
-    out |= {
+    return {
+        **{f"{kind}_us_per_sample": value for kind, value in us.items()},
+        **{f"{kind}_least_us_per_sample": min(values) for kind, values in times.items()},
         "fused_realtime_factor": period_us / us["fused"],
         "integrator_realtime_factor": period_us / us["integrator"],
         "rk4_over_integrator": us["rk4"] / us["integrator"],
@@ -184,35 +157,40 @@ def numbers(times: dict[str, list[float]], period_us: float) -> dict[str, float]
         "share_of_integrator": us["integrator"] / us["fused"],
         "share_of_sensors": (us["rig"] - us["integrator"]) / us["fused"],
         "share_of_tick": (us["fused"] - us["rig"]) / us["fused"],
-    }
-    out |= {
         "end_to_end_realtime_factor": period_us / us["recorded"],
         "end_to_end_over_fused": us["fused"] / us["recorded"],
         "end_to_end_over_fused_least": min(times["fused"]) / min(times["recorded"]),
         "beside_the_loop_us_per_sample": us["recorded"] - us["fused"],
+        **{f"exchange_{block}_over_fused": us[f"exchange_{block}"] / us["fused"] for block in BLOCKS},
     }
-    return out | {f"exchange_{block}_over_fused": us[f"exchange_{block}"] / us["fused"] for block in BLOCKS}
+
+
+HELP = "import sys; sys.argv = ['rig', '--help']; from rig.cli import main; main()"
+FIRST_SAMPLE = """
+from benchmarks.loop import started
+from rig.bench import load_bench
+daq, tick = started(load_bench("magnet-beam"))
+daq.run_fused(tick.arrays, *tick.buffers(1))
+"""
 
 
 def starting() -> dict[str, float]:
     """Seconds until something happens."""
-    return {
-        "rig_help_s": statistics.median(
-            _seconds("-c", "import sys; sys.argv = ['rig', '--help']; from rig.cli import main; main()")
-            for _ in range(5)
-        ),
-        "warm_first_sample_s": statistics.median(_seconds("-c", FIRST_SAMPLE) for _ in range(5)),
-    }
+
+    def seconds(code: str) -> float:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+        return time.perf_counter() - start
+
+    codes = {"rig_help_s": HELP, "warm_first_sample_s": FIRST_SAMPLE}
+    return {name: statistics.median(seconds(code) for _ in range(5)) for name, code in codes.items()}
+
+
+def main(json: bool = False) -> None:
+    """Measure and print how fast the loop is."""
+    on_one_core()
+    show(measure() | {"starting": starting()}, json)
 
 
 if __name__ == "__main__":
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    results = measure() | {"starting": starting()}
-    if "--json" in sys.argv:
-        print(json.dumps(results, indent=2))
-    else:
-        for name, values in results.items():
-            print(name)
-            for key, value in values.items():
-                print(f"  {key:36} {value:10.3f}")
+    typer.run(main)

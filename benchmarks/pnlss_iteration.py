@@ -10,27 +10,20 @@ NaN for one that is not. Memory is the peak of the process after each case, the 
 threads has a process of its own.
 """
 
-import argparse
-import json
 import os
 import resource
 import statistics
 import subprocess
 import sys
 import time
+from json import loads
 
 import numpy as np
+import typer
 from scipy.linalg.blas import dsyrk
 
-from identification import (
-    Channel,
-    Experiment,
-    Features,
-    FitSettings,
-    PnlssModel,
-    StateSpace,
-    fit_pnlss,
-)
+from benchmarks.frame import show
+from identification import Channel, Experiment, Features, FitSettings, PnlssModel, StateSpace, fit_pnlss
 
 PIECE = 400
 """Samples of the baseline."""
@@ -40,15 +33,6 @@ CASES = {
     "2 states, 1 output, 14 coefficients, 73 728": (2, 1, 73_728, False, 7),
 }
 POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-COLUMNS = (
-    "seconds",
-    "processor_seconds",
-    "best",
-    "over_syrk",
-    "wall_over_syrk",
-    "seconds_until_there",
-    "times_plain_numpy",
-)
 
 
 def system(states: int, outputs: int, nonlinear_outputs: bool) -> tuple[PnlssModel, PnlssModel]:
@@ -124,11 +108,8 @@ def syrk(model: PnlssModel, samples: int) -> float:
 
 def error_of(true: PnlssModel, experiment: Experiment) -> float:
     """Training error of the system itself, as `fit_pnlss` has it."""
-    wrong, whole = (
-        np.mean(y**2, axis=1)
-        for y in (true.simulate(experiment.inputs).outputs - experiment.outputs, experiment.outputs)
-    )
-    return float(np.sqrt(np.mean(wrong / whole)))
+    wrong = np.mean((true.simulate(experiment.inputs).outputs - experiment.outputs) ** 2, axis=1)
+    return float(np.sqrt(np.mean(wrong / np.mean(experiment.outputs**2, axis=1))))
 
 
 def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, iterations: int) -> dict[str, float]:
@@ -163,31 +144,25 @@ def measure(states: int, outputs: int, samples: int, nonlinear_outputs: bool, it
     }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--here", action="store_true", help="in this process, with the threads of its environment")
-    given = parser.parse_args()
-    if given.here:
-        print(json.dumps({name: measure(*case) for name, case in CASES.items()}))
-        return
-    command = [sys.executable, "-m", "benchmarks.pnlss_iteration", "--here"]
+HERE = """
+import json
+from benchmarks.pnlss_iteration import CASES, measure
+print(json.dumps({name: measure(*case) for name, case in CASES.items()}))
+"""
+
+
+def main(json: bool = False) -> None:
+    """Measure all cases with one and with two threads."""
     results = {}
     for threads in (1, 2):
         environment = {**os.environ, **dict.fromkeys(POOLS, str(threads))}
-        out = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-        results[f"threads: {threads}"] = json.loads(out)
-        for case, row in results[f"threads: {threads}"].items():
-            row["over_syrk"] = row["processor_seconds"] / results["threads: 1"][case]["syrk"]
-            row["wall_over_syrk"] = row["seconds"] / results["threads: 1"][case]["syrk"]
-    if given.json:
-        print(json.dumps(results, indent=1))
-        return
-    for name, cases in results.items():
-        print(f"{name:46}" + "".join(f"{column:>20}" for column in COLUMNS))
+        out = subprocess.run([sys.executable, "-c", HERE], env=environment, capture_output=True, text=True, check=True)
+        cases = results[f"threads: {threads}"] = loads(out.stdout)
         for case, row in cases.items():
-            print(f"{case:46}" + "".join(f"{row[column]:20.4g}" for column in COLUMNS))
+            product = results["threads: 1"][case]["syrk"]
+            row |= {"over_syrk": row["processor_seconds"] / product, "wall_over_syrk": row["seconds"] / product}
+    show(results, json)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -7,8 +7,6 @@ with two threads each would fight for two cores. The processes are started, and 
 before the clock is. Without parallel workers, too, one thread is used: say ``OMP_NUM_THREADS=1`` before the command.
 """
 
-import argparse
-import json
 import os
 import time
 from collections.abc import Iterator
@@ -16,9 +14,11 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
+import typer
 from joblib import parallel_config
 
 import rig
+from benchmarks.frame import show
 from identification import FitSettings, identify_many, identify_pnlss, realisation_combinations
 from rig.measurements.experiments import experiments
 
@@ -71,26 +71,13 @@ def measure(count: int) -> dict[str, float]:
     return found
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--models", type=int, default=20)
-    parser.add_argument("--json", action="store_true")
-    given = parser.parse_args()
-    taken = measure(given.models)
-    result = {
-        "models": given.models,
-        "iterations": ITERATIONS,
-        "cores": os.cpu_count(),
-        "seconds": taken,
-        "speed_up": {name: taken["one"] / value for name, value in taken.items()},
-    }
-    if given.json:
-        print(json.dumps(result, indent=1))
-        return
-    print(f"{given.models} models of {ITERATIONS} iterations, {os.cpu_count()} cores")
-    for name, value in taken.items():
-        print(f"  {name:5} {value:8.2f} s  speed-up {taken['one'] / value:.2f}")
+def main(models: int = 20, json: bool = False) -> None:
+    """Identify so many models, one after the other and in parallel."""
+    taken = measure(models)
+    speed_up = {name: taken["one"] / value for name, value in taken.items()}
+    of = {"models": models, "iterations": ITERATIONS, "cores": os.cpu_count()}
+    show({**of, "seconds": taken, "speed_up": speed_up}, json)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

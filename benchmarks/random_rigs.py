@@ -1,7 +1,7 @@
 """Rigs that no preset covers: ``rig tune``, then its plan, nothing by hand, against harmonic balance of the same rig.
 
-- ``python -m benchmarks.random_rigs draw FOLDER --seed 1 -n 12`` writes bench files ``rig-<seed>.toml``, one seed each,
-- ``python -m benchmarks.random_rigs run FOLDER [-j 2] [--timeout-s 900]`` tunes and tests those that have no result yet,
+- ``python -m benchmarks.random_rigs draw FOLDER --seed 1 --n 12`` writes bench files ``rig-<seed>.toml``, one seed each,
+- ``python -m benchmarks.random_rigs run FOLDER [--jobs 2] [--timeout-s 900]`` tunes and tests those that have no result yet,
 - ``python -m benchmarks.random_rigs table FOLDER [--json]`` shows what came of them.
 
 Beams of three boundaries and given modes, 8 to 400 Hz, 0.05 to 3 % damping, shakers of 0.2 to 5 times the modal mass; springs,
@@ -10,7 +10,6 @@ frequencies up to 2 % and mode shapes up to 30 % off. Limits are those that a la
 Damping is as reported, with the mode shape that the tune has measured; the table also has it with the true one.
 """
 
-import argparse
 import json
 import math
 import statistics
@@ -18,10 +17,28 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
+import typer
+from joblib import Parallel, delayed
+from pydantic import ValidationError
+
+import rig
+from rig.analysis.subject import subject_of
+from rig.arming.run_options import RunOptions
+from rig.bench import Bench, load_bench
+from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.recorded import points_of
+from rig.errors import RigError
+from rig.text.console import print_json
+from rig.tuning import tune
+from rig.tuning.report import summary
+from simulators import VirtualRig
+from simulators.analysis import NotConvergedError, phase_resonance_backbone
 
 ACCELEROMETERS = ((0.102, 49.0, 0.0005), (0.0102, 490.0, 0.002), (0.00102, 4900.0, 0.02))
 """Sensitivity, V/(m/s^2); range, m/s^2; noise, m/s^2 RMS. As data sheets of 1000, 100 and 10 mV/g state them."""
@@ -30,7 +47,8 @@ LOAD_CELLS = ((0.494, 9.79, 0.00009), (0.1124, 44.5, 0.00045), (0.01124, 444.8, 
 BOUNDARIES = {"clamped-free": 1.875104, "pinned-pinned": math.pi, "clamped-clamped": 4.730041}
 SPAN = 30.0  # highest over lowest amplitude of the range whose shift of frequency is drawn
 KINDS = ("cubic", "clearance", "magnet-one-sided", "magnet-symmetric", "jenkins", "iwan")
-FREQUENCY_WITHIN, DAMPING_WITHIN = 5e-4, 0.02
+WITHIN = {"frequency_error": 5e-4, "damping_error": 0.02, "damping_error_true_shape": 0.02}
+"""Bounds of the errors of a point, relative."""
 
 
 class Draws:
@@ -54,10 +72,6 @@ class Draws:
 
 def drawn(seed: int) -> dict[str, Any]:
     """Return the bench of a seed as a table; what cannot be built or computed is drawn again."""
-    from pydantic import ValidationError
-
-    from simulators.analysis import NotConvergedError
-
     draws = Draws(seed)
     for _ in range(50):
         try:
@@ -71,9 +85,6 @@ def drawn(seed: int) -> dict[str, Any]:
 
 
 def _drawn(draws: Draws) -> dict[str, Any] | None:
-    from simulators import VirtualRig
-    from simulators.analysis import phase_resonance_backbone
-
     hertz, damping = draws.log(8.0, 400.0), draws.log(0.0005, 0.03)
     omega = 2.0 * math.pi * hertz
     structure = _beam(draws, hertz, damping) if draws.flat(0, 1) < 0.5 else _modes(draws, hertz, damping)
@@ -94,17 +105,17 @@ def _drawn(draws: Draws) -> dict[str, Any] | None:
         part = _nonlinear(draws, kind, at, omega**2 / shapes[at] ** 2, z, shift)
         (joints if kind in ("jenkins", "iwan") else elements).append(part)
     table = _rig(structure, exciter, stinger, elements, joints)
-    rig = VirtualRig.model_validate(table)
-    mode = rig.linear_modes.nearest(hertz) if not elements else 0
+    virtual = VirtualRig.model_validate(table)
+    mode = virtual.linear_modes.nearest(hertz) if not elements else 0
     found = phase_resonance_backbone(
-        rig,
+        virtual,
         amplitudes_m=list(np.geomspace(highest_m / SPAN, highest_m, 8)),
-        near_hz=float(rig.linear_modes.frequency_hz[mode]),
+        near_hz=float(virtual.linear_modes.frequency_hz[mode]),
     )
     shift = found.modal_frequency_hz[-1] / found.modal_frequency_hz[0] - 1.0
     if not 0.01 <= abs(shift) <= 0.15 or np.max(found.damping_ratio) > 0.1 or np.any(found.flags):
         return None
-    return _bench(draws, table, rig, mode, found, float(shift))
+    return _bench(draws, table, virtual, mode, found, float(shift))
 
 
 def _rig(structure: Any, exciter: Any, stinger: Any, elements: list[Any], joints: list[Any]) -> dict[str, Any]:
@@ -219,10 +230,12 @@ def _nonlinear(draws: Draws, kind: str, at: str, modal_n_m: float, z: float, shi
     }
 
 
-def _bench(draws: Draws, table: dict[str, Any], rig: Any, mode: int, found: Any, shift: float) -> dict[str, Any]:
+def _bench(
+    draws: Draws, table: dict[str, Any], virtual: VirtualRig, mode: int, found: Any, shift: float
+) -> dict[str, Any]:
     """Return the bench around a rig: converter, sensors, limits, and what the laboratory believes of the specimen."""
-    hertz = float(rig.linear_modes.frequency_hz[mode])
-    shapes = {at: float(rig.linear_modes.at(rig.shape(at))[mode]) for at in ("drive", "far")}
+    hertz = float(virtual.linear_modes.frequency_hz[mode])
+    shapes = {at: float(virtual.linear_modes.at(virtual.shape(at))[mode]) for at in ("drive", "far")}
     ratio = abs(shapes["far"] / shapes["drive"])
     highest_hz = hertz * max(1.0 + shift, 1.0)
     rate = next(
@@ -291,38 +304,8 @@ def _words(table: dict[str, Any]) -> str:
     return " and ".join([structure.get("boundary", "modes"), *parts])
 
 
-def toml(table: dict[str, Any], path: tuple[str, ...] = ()) -> str:
-    """Return a table of numbers, texts, lists and tables as TOML."""
-    plain = {key: value for key, value in table.items() if not _is_table(value)}
-    lines = [f"[{'.'.join(path)}]"] if path and plain else []
-    lines += [f"{key} = {_value(value)}" for key, value in plain.items()]
-    text = "\n".join(lines) + "\n" if lines else ""
-    for key, value in table.items():
-        if isinstance(value, dict):
-            text += "\n" + toml(value, (*path, key))
-        elif _is_table(value):
-            for entry in value:
-                inside = "\n".join(f"{name} = {_value(one)}" for name, one in entry.items())
-                text += f"\n[[{'.'.join((*path, key))}]]\n{inside}\n"
-    return text
-
-
-def _is_table(value: Any) -> bool:
-    return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
-
-
-def _value(value: Any) -> str:
-    return json.dumps(value)
-
-
 def carried_out(bench_path: Path, folder: Path) -> dict[str, Any]:
     """Tune a bench, carry out the plan, and compare every point with harmonic balance."""
-    import rig
-    from rig.arming.run_options import RunOptions
-    from rig.errors import RigError
-    from rig.tuning import tune
-    from rig.tuning.report import summary
-
     out: dict[str, Any] = {"rig": bench_path.stem}
     seed, name = int(bench_path.stem.split("-")[-1]), bench_path.stem
     began = time.perf_counter()
@@ -345,8 +328,6 @@ def carried_out(bench_path: Path, folder: Path) -> dict[str, Any]:
     except RigError as error:
         return out | {"not_run": str(error)}
     with run:
-        from rig.campaigns.evaluation.recorded import points_of
-
         end = run.recording.parts[-1].end
         points = points_of(run.recording)
         out |= {"run_s": time.perf_counter() - began, "end": end}
@@ -356,56 +337,51 @@ def carried_out(bench_path: Path, folder: Path) -> dict[str, Any]:
     return out
 
 
-def _truth(bench: Any, levels_m: Any) -> dict[str, Any]:
+def _truth(bench: Bench, levels_m: Any) -> dict[str, Any]:
     """The linear mode, and which of the plan's levels harmonic balance finds within the bench's limits."""
-    from rig.analysis.subject import subject_of
-    from simulators.analysis import NotConvergedError, phase_resonance_backbone
-
     subject = subject_of(bench)
     modes, mode = subject.rig.linear_modes, subject.mode
-    try:
-        levels = phase_resonance_backbone(subject.rig, amplitudes_m=list(levels_m), near_hz=subject.frequency_hz)
-        exact = {
-            "within": [bool(x) for x in subject.within(levels)],
-            "level_frequency_hz": [float(x) for x in levels.frequency_hz],
-            "level_damping": [float(x) for x in levels.damping_ratio],
-            "level_v": [float(x) for x in levels.voltage_v],
-            "level_n": [float(x) for x in levels.force_n],
-        }
-    except NotConvergedError as error:
-        exact = {"within": [], "truth_failed": str(error)}
     linear = {
         "true_hz": float(modes.frequency_hz[mode]),
         "true_damping": float(modes.damping_ratio[mode]),
         "true_shape": float(modes.drive_shape[mode]),
     }
-    return linear | exact
+    try:
+        levels = phase_resonance_backbone(subject.rig, amplitudes_m=list(levels_m), near_hz=subject.frequency_hz)
+    except NotConvergedError as error:
+        return linear | {"within": [], "truth_failed": str(error)}
+    exact = {
+        "level_frequency_hz": levels.frequency_hz,
+        "level_damping": levels.damping_ratio,
+        "level_v": levels.voltage_v,
+        "level_n": levels.force_n,
+    }
+    within = [bool(x) for x in subject.within(levels)]
+    return linear | {"within": within} | {name: values.tolist() for name, values in exact.items()}
 
 
-def _compared(bench: Any, point: Any) -> dict[str, Any]:
-    from rig.analysis.subject import subject_of
-    from simulators.analysis import NotConvergedError, phase_resonance_backbone
-
+def _compared(bench: Bench, point: Point[Any]) -> dict[str, Any]:
     out: dict[str, Any] = {
         "number": point.number,
         "level": point.level,
         "quality": str(point.quality),
         "reason": point.reason,
-        "settle_periods": point.settle_periods if hasattr(point, "settle_periods") else None,
     }
     if not point.accepted:
         return out
+    assert point.vibration is not None
+    assert point.modal is not None
     subject = subject_of(bench)
     shape = float(subject.rig.linear_modes.drive_shape[subject.mode])
     amplitude = float(point.vibration.amplitude_m)
-    out |= {"amplitude_m": amplitude}
+    out["amplitude_m"] = amplitude
     try:
         path = list(np.geomspace(0.1 * amplitude, amplitude, 6))
         exact = phase_resonance_backbone(subject.rig, amplitudes_m=path, near_hz=subject.frequency_hz)
     except NotConvergedError as error:
         return out | {"truth_failed": str(error)}
-    reported = float(point.modal.damping_ratio)
-    used = point.modal.drive_mode_shape or float(bench.specimen.drive_mode_shape)
+    reported = float(point.modal.damping_ratio or math.nan)
+    used = point.modal.drive_mode_shape or float(bench.specimen.drive_mode_shape or math.nan)
     true = float(exact.damping_ratio[-1])
     return out | {
         "frequency_error": float(point.modal.modal_frequency_hz) / float(exact.modal_frequency_hz[-1]) - 1.0,
@@ -414,34 +390,55 @@ def _compared(bench: Any, point: Any) -> dict[str, Any]:
     }
 
 
-def draw(folder: Path, first: int, count: int) -> None:
-    """Write benches."""
+app = typer.Typer(help=__doc__)
+
+
+@app.command()
+def draw(folder: Path, seed: int = 1, n: int = 12) -> None:
+    """Write ``n`` bench files, one seed each from ``seed`` on."""
     folder.mkdir(parents=True, exist_ok=True)
-    for seed in range(first, first + count):
-        path = folder / f"rig-{seed}.toml"
+    for one in range(seed, seed + n):
+        path = folder / f"rig-{one}.toml"
         if not path.exists():
-            path.write_text(toml(drawn(seed)), encoding="utf-8")
+            path.write_text(tomli_w.dumps(drawn(one)), encoding="utf-8")
 
 
-def carry_out_all(folder: Path, jobs: int, timeout_s: float, only: list[str]) -> None:
-    """Carry out the benches that have no result yet, each in a process of its own."""
-    from joblib import Parallel, delayed
+ONE = """
+import sys
+from pathlib import Path
+from benchmarks.random_rigs import write_result
+write_result(Path(sys.argv[1]))
+"""
+
+
+def write_result(bench: Path) -> None:
+    """Tune and test one bench, and write what came of it beside it."""
+    found = carried_out(bench, bench.parent)
+    bench.with_suffix(".json").write_text(json.dumps(found, default=float), encoding="utf-8")
+
+
+@app.command()
+def run(folder: Path, jobs: int = 1, timeout_s: float = 900.0) -> None:
+    """Tune and test every bench that has no result yet, each in a process of its own."""
 
     def one(bench: Path) -> None:
-        result = bench.with_suffix(".json")
-        command = [sys.executable, "-m", "benchmarks.random_rigs", "one", str(bench)]
         try:
+            command = [sys.executable, "-c", ONE, str(bench)]
             done = subprocess.run(command, timeout=timeout_s, capture_output=True, text=True, check=False)
             failed = done.stderr.strip().splitlines()[-1] if done.returncode else ""
         except subprocess.TimeoutExpired:
             failed = f"not ended within {timeout_s:g} s"
         if failed:
-            result.write_text(json.dumps({"rig": bench.stem, "failed": failed}), encoding="utf-8")
+            bench.with_suffix(".json").write_text(json.dumps({"rig": bench.stem, "failed": failed}), encoding="utf-8")
 
-    wanted = sorted(folder.glob("rig-*.toml"), key=lambda path: (len(path.stem), path.stem))
-    benches = [path for path in wanted if path.stem.removeprefix("rig-").isdigit()]
-    benches = [path for path in benches if not path.with_suffix(".json").exists() and (not only or path.stem in only)]
-    Parallel(n_jobs=jobs, backend="threading")(delayed(one)(bench) for bench in benches)
+    wanted = [path for path in _of_rigs(folder, "toml") if not path.with_suffix(".json").exists()]
+    Parallel(n_jobs=jobs, backend="threading")(delayed(one)(bench) for bench in wanted)
+
+
+def _of_rigs(folder: Path, ending: str) -> list[Path]:
+    """Files of rigs, by seed."""
+    found = [path for path in folder.glob(f"rig-*.{ending}") if path.stem.removeprefix("rig-").isdigit()]
+    return sorted(found, key=lambda path: int(path.stem.removeprefix("rig-")))
 
 
 def outcome(found: dict[str, Any]) -> str:
@@ -456,108 +453,65 @@ def outcome(found: dict[str, Any]) -> str:
     return "some refused" if end["reason"] == "completed" else f"ended: {end['reason']}"
 
 
-def table(folder: Path) -> dict[str, Any]:
+def results(folder: Path) -> dict[str, Any]:
     """Return results, one entry per rig, and what they come to."""
-    paths = sorted(folder.glob("rig-*.json"), key=lambda path: (len(path.stem), path.stem))
-    rigs = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+    rigs = [json.loads(path.read_text(encoding="utf-8")) for path in _of_rigs(folder, "json")]
     points = [point for found in rigs for point in found.get("points", []) if "frequency_error" in point]
     return {
         "rigs": rigs,
         "outcomes": dict(Counter(outcome(found) for found in rigs)),
         "points": len(points),
-        "errors": {
-            name: _spread([abs(point[name]) for point in points], bound)
-            for name, bound in (
-                ("frequency_error", FREQUENCY_WITHIN),
-                ("damping_error", DAMPING_WITHIN),
-                ("damping_error_true_shape", DAMPING_WITHIN),
-            )
-        },
+        "errors": {name: _spread([abs(point[name]) for point in points], bound) for name, bound in WITHIN.items()},
     }
 
 
 def _spread(values: list[float], bound: float) -> dict[str, float]:
     if not values:
-        return {"median": math.nan, "largest": math.nan, "within": math.nan}
+        return {"median": math.nan, "largest": math.nan, "within": math.nan, "bound": bound}
     inside = sum(value <= bound for value in values) / len(values)
     return {"median": statistics.median(values), "largest": max(values), "within": inside, "bound": bound}
 
 
-def show(folder: Path, verbose: bool) -> None:
-    """Print the table."""
-    found = table(folder)
+@app.command()
+def table(folder: Path, json: bool = False) -> None:
+    """Show what came of the rigs, and of points that were not accepted."""
+    found = results(folder)
+    if json:
+        print_json(found)
+        return
     for one in found["rigs"]:
-        bench = folder / f"{one['rig']}.toml"
-        words = next((line for line in bench.read_text().splitlines() if line.startswith("description")), "")
-        print(f"{one['rig']}: {outcome(one)}; {words.removeprefix('description = ')[8:-1]}")
-        if "refused" in one or "failed" in one or "not_run" in one:
-            print("   ", one.get("refused", one.get("failed", one.get("not_run"))))
-            continue
-        plant = one["plant"]
-        shifts = one.get("level_frequency_hz", [math.nan])
-        print(
-            f"    tune {plant['frequency_hz'] / one['true_hz'] - 1.0:+.2%}, damping {100.0 * plant['damping_ratio']:.3g} of "
-            f"{100.0 * one['true_damping']:.3g} %, phi {plant['drive_mode_shape'] / one['true_shape'] - 1.0:+.1%}, fit "
-            f"{plant['fit_error']:.2%}, distortion {one['test']['distortion']:.2%}; "
-            f"{one['tune_s']:.0f} s + {one['run_s']:.0f} s; levels shift "
-            f"{shifts[-1] / shifts[0] - 1.0:+.2%}, within {sum(one['within'])} of {one['levels']}"
-        )
-        end = one["end"]
-        if end and end["reason"] != "completed":
-            print(f"    end: {end['text']}")
-        for point in one["points"]:
-            if "frequency_error" in point and not verbose:
-                continue
-            errors = (
-                f"f {point['frequency_error']:+.4%}, D {point['damping_error']:+.1%}, with true phi "
-                f"{point['damping_error_true_shape']:+.2%}"
-                if "frequency_error" in point
-                else ""
-            )
-            print(f"    {point['number']} {point['level']:.3g} {point['quality']} {point['reason'][:200]} {errors}")
-        worst = [point for point in one["points"] if "frequency_error" in point]
-        if worst:
-            print(
-                f"    worst f {max(abs(p['frequency_error']) for p in worst):.4%}, D "
-                f"{max(abs(p['damping_error']) for p in worst):.1%}, with true phi "
-                f"{max(abs(p['damping_error_true_shape']) for p in worst):.2%}"
-            )
+        words = load_bench(folder / f"{one['rig']}.toml").description.removeprefix("drawn: ")
+        print(f"{one['rig']}: {outcome(one)}; {words}")
+        for line in _lines(one):
+            print(f"    {line}")
     print(found["outcomes"], f"{len(found['rigs'])} rigs, {found['points']} points accepted")
     for name, values in found["errors"].items():
         print(f"{name}: " + ", ".join(f"{key} {value:.3%}" for key, value in values.items()))
 
 
-def main() -> None:
-    """Entry."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = parser.add_subparsers(dest="command", required=True)
-    drawing = commands.add_parser("draw", help="write bench files")
-    drawing.add_argument("--seed", type=int, default=1)
-    drawing.add_argument("-n", type=int, default=12)
-    running = commands.add_parser("run", help="tune and test every bench without a result")
-    running.add_argument("-j", "--jobs", type=int, default=1, choices=(1, 2))
-    running.add_argument("--timeout-s", type=float, default=900.0)
-    running.add_argument("--only", action="append", default=[])
-    showing = commands.add_parser("table", help="show the results")
-    showing.add_argument("--json", action="store_true")
-    showing.add_argument("-v", "--verbose", action="store_true")
-    for command in (drawing, running, showing):
-        command.add_argument("folder", type=Path)
-    one = commands.add_parser("one", help="tune and test one bench")
-    one.add_argument("bench", type=Path)
-    asked = parser.parse_args()
-    if asked.command == "draw":
-        draw(asked.folder, asked.seed, asked.n)
-    elif asked.command == "run":
-        carry_out_all(asked.folder, asked.jobs, asked.timeout_s, asked.only)
-    elif asked.command == "one":
-        result = carried_out(asked.bench, asked.bench.parent)
-        asked.bench.with_suffix(".json").write_text(json.dumps(result, default=float), encoding="utf-8")
-    elif asked.json:
-        print(json.dumps(table(asked.folder)))
-    else:
-        show(asked.folder, asked.verbose)
+def _lines(one: dict[str, Any]) -> Iterator[str]:
+    for key in ("refused", "failed", "not_run"):
+        if key in one:
+            yield one[key]
+            return
+    plant, shifts = one["plant"], one.get("level_frequency_hz", [math.nan])
+    yield (
+        f"tune {plant['frequency_hz'] / one['true_hz'] - 1.0:+.2%}, damping {100.0 * plant['damping_ratio']:.3g} of "
+        f"{100.0 * one['true_damping']:.3g} %, phi {plant['drive_mode_shape'] / one['true_shape'] - 1.0:+.1%}, fit "
+        f"{plant['fit_error']:.2%}, distortion {one['test']['distortion']:.2%}; {one['tune_s']:.0f} s + "
+        f"{one['run_s']:.0f} s; levels shift {shifts[-1] / shifts[0] - 1.0:+.2%}, within "
+        f"{sum(one['within'])} of {one['levels']}"
+    )
+    if one["end"] and one["end"]["reason"] != "completed":
+        yield f"end: {one['end']['text']}"
+    good = [point for point in one["points"] if "frequency_error" in point]
+    for point in one["points"]:
+        if point not in good:
+            yield f"{point['number']} {point['level']:.3g} {point['quality']} {point['reason'][:200]}"
+    if good:
+        worst = [max(abs(point[name]) for point in good) for name in WITHIN]
+        yield f"worst f {worst[0]:.4%}, D {worst[1]:.1%}, with true phi {worst[2]:.2%}"
 
 
 if __name__ == "__main__":
-    main()
+    app()

@@ -6,10 +6,9 @@ measurement and the hypotheses, then it is run on the true rig once. Over all pa
 the share that happened (reliability, Brier score against that of the mean), and the run's margins, time and points with the
 bands that the rehearsal foresaw.
 
-    python -m benchmarks.rehearsal_calibration --pairs 100 --draws 50 -o calibration.json --figure calibration.png
+    python -m benchmarks.rehearsal_calibration --pairs 100 --draws 50 --output calibration.json
 """
 
-import argparse
 import json
 import math
 import tempfile
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
 from rig.arming.run_options import RunOptions
 from rig.bench import load_bench
@@ -73,7 +73,7 @@ def limited(bench: Any, plan: Plan, how: str, generator: np.random.Generator) ->
     return bench.model_copy(update={"limits": limits})
 
 
-def pairs(count: int, seed: int, folder: Path) -> Iterator[tuple[str, Any, Plan, Knowledge]]:
+def drawn_pairs(count: int, seed: int, folder: Path) -> Iterator[tuple[str, Any, Plan, Knowledge]]:
     """Yield name, true bench, plan and what the tune of the true bench tells."""
     known: dict[str, tuple[Any, Plan, Knowledge]] = {}
     made = number = 0
@@ -172,56 +172,19 @@ def summary(found: list[dict[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def draw(found: dict[str, Any], figure: Path) -> None:
-    """Draw the reliability diagrams."""
-    from matplotlib.figure import Figure
-
-    page = Figure(figsize=(11.0, 3.9), layout="constrained")
-    for axis, outcome in zip(page.subplots(1, 3), ("ends well", "trip", "lost lock"), strict=True):
-        bins = found[outcome]["reliability"]
-        p, y, n = (np.array([one[key] for one in bins]) for key in ("predicted", "happened", "n"))
-        error = np.sqrt(np.maximum(p * (1.0 - p), 0.01) / n)
-        axis.plot([0, 1], [0, 1], color="0.6", lw=0.8)
-        axis.errorbar(p, y, error, fmt="o", ms=5)
-        for x, h, m in zip(p, y, n, strict=True):
-            axis.annotate(str(m), (x, h), textcoords="offset points", xytext=(6, 4), fontsize=8)
-        axis.set(
-            xlabel=f"predicted probability: {outcome}",
-            ylabel="share that happened",
-            xlim=(-0.03, 1.03),
-            ylim=(-0.05, 1.05),
-        )
-        axis.set_title(
-            f"Brier {found[outcome]['brier']:.3f} (mean alone {found[outcome]['brier of the mean']:.3f})", fontsize=9
-        )
-    page.savefig(figure)
-
-
-def main(arguments: list[str] | None = None) -> dict[str, Any]:
-    """Run the pairs and print the summary."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--pairs", type=int, default=100)
-    parser.add_argument("--draws", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("-o", "--output", type=Path)
-    parser.add_argument("--figure", type=Path)
-    options = parser.parse_args(arguments)
+def main(pairs: int = 100, draws: int = 50, seed: int = 1, jobs: int = 2, output: Path | None = None) -> None:
+    """Rehearse and run so many pairs, and print the summary; all pairs are written to a file."""
     found: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, true, plan, knowledge in pairs(options.pairs, options.seed, Path(folder)):
-            one = judged(true, plan, knowledge, options.draws, options.seed, options.jobs)
+        for name, true, plan, knowledge in drawn_pairs(pairs, seed, Path(folder)):
+            one = judged(true, plan, knowledge, draws, seed, jobs)
             found.append({"name": name, **one})
             p, y = one["predicted"], one["happened"]
             print(f"{len(found):3} {name:36} {one['end']:20}", *(f"{k} {p[k]:.2f}/{int(y[k])}" for k in p), flush=True)
-            if options.output is not None:
-                options.output.write_text(json.dumps(found), encoding="utf-8")
-    total = summary(found)
-    print(json.dumps(total, indent=1))
-    if options.figure is not None:
-        draw(total, options.figure)
-    return total
+            if output is not None:
+                output.write_text(json.dumps(found), encoding="utf-8")
+    print(json.dumps(summary(found), indent=1))
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -12,8 +12,6 @@ the next run. A run that the watchdog ends before the accident, on a machine tha
 is counted and begun anew.
 """
 
-import argparse
-import json
 import os
 import select
 import signal
@@ -24,10 +22,12 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
+from benchmarks.frame import show
 from rig.bench import Bench, DriverChoice, load_bench
 from rig.drivers import make_daq
 from rig.emulator.emulated import Emulator
@@ -134,7 +134,8 @@ def wait_until_driven(log: Path, campaign: "subprocess.Popen[str]") -> None:
 
 def plugged(stack: ExitStack, bench: Bench) -> tuple[Bench, "subprocess.Popen[str]"]:
     """A cable in between, and the bench at its other end."""
-    command = [sys.executable, "-m", "benchmarks.safe_output", "--relay", bench.driver.options["port"]]
+    code = "import sys; from benchmarks.safe_output import relay; relay(sys.argv[1])"
+    command = [sys.executable, "-c", code, bench.driver.options["port"]]
     cable = stack.enter_context(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
     stack.callback(cable.kill)
     assert cable.stdout is not None
@@ -230,38 +231,26 @@ CABLE = ("unplugged cable", "flooded cable")
 CASES = ("kill -9 of the campaign", "kill -9 of the loop", *CABLE, "Ctrl-C", "emergency stop")
 
 
-def main() -> None:
-    """Print the times."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("cases", nargs="*", default=CASES)
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--watchdog-ms", type=float, default=20.0)
-    parser.add_argument("--ramp-ms", type=float, default=0.0, help="of the device's watchdog; 0 drops the output")
-    parser.add_argument("--firmware", help="program of the firmware, instead of the emulator")
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--relay", metavar="PORT", help=argparse.SUPPRESS)
-    wanted = parser.parse_args()
-    if wanted.relay:
-        relay(wanted.relay)
-        return
+def main(
+    cases: Annotated[list[str] | None, typer.Argument()] = None,
+    repeats: int = 3,
+    watchdog_ms: float = 20.0,
+    ramp_ms: float = 0.0,
+    firmware: str | None = None,
+    json: bool = False,
+) -> None:
+    """Measure each case so many times.
+
+    ``watchdog_ms`` and ``ramp_ms`` are the device's; a ramp of 0 drops the output. ``firmware`` is run in the emulator's place.
+    """
     bench = load_bench("magnet-beam").model_copy(update={"block": 10})
-    options = {"watchdog_s": 1e-3 * wanted.watchdog_ms, "ramp_s": 1e-3 * wanted.ramp_ms}
-    found = {
-        case: [measure(case, bench, options, wanted.firmware) for _ in range(wanted.repeats)] for case in wanted.cases
-    }
-    if wanted.json:
-        json.dump(found, sys.stdout, indent=2)
-        return
-    print(
-        f"ramp {1e3 * bench.limits.ramp_down_s:.0f} ms; device's watchdog {wanted.watchdog_ms:g} ms, "
-        f"its ramp {wanted.ramp_ms:g} ms"
-    )
-    for case, runs in found.items():
-        for name in ("ms", "by_its_clock_ms"):
-            print(f"{case:26} {name:20} " + ", ".join(f"{run[name]:.1f}" for run in runs))
-        for name, value in list(runs[-1].items())[2:]:
-            print(f"    {name:20} {value}")
+    options = {"watchdog_s": 1e-3 * watchdog_ms, "ramp_s": 1e-3 * ramp_ms}
+    found: dict[str, Any] = {}
+    for case in cases or CASES:
+        for number in range(repeats):
+            found[f"{case}, {number + 1}"] = measure(case, bench, options, firmware)
+    show(found, json)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -6,7 +6,6 @@ attempts refused, samples continued and held, the largest deviation of the outpu
 its amplitude, and of the loopback from the recorded output. Then once for 0.3 s: the watchdog, and the output after it.
 """
 
-import argparse
 import os
 import random
 import signal
@@ -18,16 +17,17 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+import typer
 
 import rig
-from rig.campaigns.plans import bench_of, load_plan
+from benchmarks.frame import show
+from benchmarks.outcomes import PLAN, outcome
+from rig.bench import load_bench
 from rig.conformance import with_loopback
 from rig.emulator.emulated import emulated
 from rig.errors import RigError
 from rig.tick.layout import DEVICE_SHIFT
 
-PLAN = "magnet-beam/backbone"
-RATE_HZ = 5000.0
 RUN_S = 62.0
 BEGIN_S = 6.0
 PAST_THE_WATCHDOG_S = 0.3
@@ -61,16 +61,18 @@ def stop_again(done: threading.Event, stops: int, seconds: float, seed: int) -> 
 
 def run_once(seconds: float, stops: int, seed: int) -> dict[str, Any]:
     """One run; what came of it."""
-    plan, done = load_plan(PLAN), threading.Event()
-    bench = with_loopback(bench_of(plan, PLAN).model_copy(update={"block": 10}))
+    done = threading.Event()
+    bench = with_loopback(load_bench("magnet-beam").model_copy(update={"block": 10}))
     stopper = threading.Thread(target=stop_again, args=(done, stops, seconds, seed))
     with TemporaryDirectory() as folder, ExitStack() as stack:
         log = Path(folder) / "output.log"
         reached = stack.enter_context(emulated(bench, "serial", lockstep=False, log_output=log))
         stopper.start()
         try:
-            with rig.run(plan, bench=reached, seed=seed) as run:
-                return {"stops": stops, **told(run), "output at the end, V": float(log.read_text().split()[-1])}
+            with rig.run(PLAN, bench=reached, seed=seed) as run:
+                last_v = float(log.read_text().split()[-1])
+                rate_hz = bench.sample_rate_hz
+                return {"stops": stops, **outcome(run), **deviations(run, rate_hz), "output at the end, V": last_v}
         except RigError as error:
             return {"stops": stops, "ended": str(error)}
         finally:
@@ -78,42 +80,33 @@ def run_once(seconds: float, stops: int, seed: int) -> dict[str, Any]:
             stopper.join()
 
 
-def told(run: rig.Run) -> dict[str, Any]:
-    """Return what a run has recorded of its outputs."""
+def deviations(run: rig.Run, rate_hz: float) -> dict[str, float]:
+    """Return how far outputs that the device put out by itself, and those that the witness saw, are from what was meant."""
     part = run.recording.parts[0]
     names = ("output_v", "theta_rad", "command_v", "flags", "frequency_hz")
     rows = {name: part.rows(name, 0, part.n_rows) for name in names}
     output, part_of_sample = rows["output_v"].astype(float), part.information["about"]["lead_samples"] % 1.0
-    turn = 2.0 * np.pi * part_of_sample / RATE_HZ * rows["frequency_hz"].astype(float)  # to the whole sample
+    turn = 2.0 * np.pi * part_of_sample / rate_hz * rows["frequency_hz"].astype(float)  # to the whole sample
     meant = np.real(rows["command_v"] * np.exp(1j * (rows["theta_rad"].astype(float) + turn)))
     flags = rows["flags"] >> DEVICE_SHIFT
-    held, continued = ((flags & bit) != 0 for bit in (4, 32))
+    continued = (flags & 32) != 0
     size = np.maximum(np.abs(rows["command_v"]), 1e-3)
     loopback = part.rows("inputs", 0, part.n_rows)[:, -1]
     seen = (1.0 - part_of_sample) * output[1:] + part_of_sample * output[:-1]
-    points = list(run.recording.latest.values())
     off = np.abs(output - meant)[continued] / size[continued]
     return {
-        "accepted": f"{sum(point['accepted'] for point in points)}/{len(load_plan(PLAN).targets())}",
-        "refused": sum(len(point.get("refused_before", ())) for point in points),
-        "continued": int(continued.sum()),
-        "held": int(held.sum()),
         "deviation_percent": 100.0 * float(off.max(initial=0.0)),
         "usual_percent": 100.0 * float(np.median(off)) if off.size else 0.0,
         "witness_v": float(np.nanmax(np.abs(loopback[1:] - seen))),
-        "ended": (part.end or {}).get("text", ""),
     }
 
 
-def main() -> None:
-    """Run and print."""
-    parser = argparse.ArgumentParser(description="A backbone by the clock whose loop is stopped again and again.")
-    parser.add_argument("--stops", type=int, default=67, help="in each run")
-    wanted = parser.parse_args()
+def main(stops: int = 67) -> None:
+    """Stop the loop so often in each run."""
     for number, seconds in enumerate((0.020, 0.050, 0.090)):
-        print(f"{1e3 * seconds:.0f} ms:", run_once(seconds, wanted.stops, number), flush=True)
-    print("past the watchdog:", run_once(PAST_THE_WATCHDOG_S, 1, 3), flush=True)
+        show({f"{1e3 * seconds:.0f} ms": run_once(seconds, stops, number)})
+    show({"past the watchdog": run_once(PAST_THE_WATCHDOG_S, 1, 3)})
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -8,16 +8,16 @@ the bound. Every response is held against the bound of its own level. The last c
 element's displacement at a hundred times the level over the largest response found.
 """
 
-import argparse
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import typer
 from scipy.signal import lfilter
 
 from identification import Bound, StructuredModel, bound_of
-from rig.results.files import load
+from rig.results.files import load_as
 from rig.results.structured.model import IdentifiedStructured
 from vibrolock.arrays import Float
 
@@ -107,23 +107,15 @@ class Trial:
         return found
 
 
-def main() -> None:
-    """Print a row for each model."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("rms", type=float, help="training level, N RMS")
-    parser.add_argument("models", type=Path, nargs="+")
-    parser.add_argument("--forces", type=int, default=10_000, help="forces for each model (default: 10000)")
-    options = parser.parse_args()
+def main(rms: float, models: list[Path], forces: int = 10_000) -> None:
+    """Hold so many ``forces`` for each model against its bounds; ``rms`` is the training level, N."""
     print(
         "model, forces, above the bound, unsolved steps, largest share of a bound (by family), bound over largest response"
     )
-    for path in options.models:
-        identified = load(path)
-        if not isinstance(identified, IdentifiedStructured):
-            parser.error(f"{path}: is a {type(identified).__name__}, allowed are structured models")
-        trial = Trial(identified.model, options.rms)
+    for path in models:
+        trial = Trial(load_as(IdentifiedStructured, path).model, rms)
         with ThreadPoolExecutor(2) as pool:  # compiled runs leave the interpreter free
-            batches = list(pool.map(trial.batch, range(-(-options.forces // 6))))
+            batches = list(pool.map(trial.batch, range(-(-forces // 6))))
         families = {name: [one for batch in batches for one in batch[name]] for name in batches[0]}
         every = [one for family in families.values() for one in family]
         above = sum(one.displacement > 1.0 or one.velocity > 1.0 for one in every)
@@ -137,4 +129,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

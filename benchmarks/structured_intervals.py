@@ -5,9 +5,8 @@ and a cubic spring where no sensor is, integrated by another method with steps o
 are fitted, and 95 % intervals of what has a unit of its own are held against the truth.
 """
 
-import argparse
-
 import numpy as np
+import typer
 from joblib import Parallel, delayed
 
 from identification import StructuredModel, fit_structured
@@ -60,23 +59,19 @@ def of_seed(seed: int) -> tuple[Float, Float]:
     return of_truth(fit.model), std_of(fit, of_truth)
 
 
-def main() -> None:
+def main(seeds: int = 50, jobs: int = 2) -> None:
     """Print bias, scatter, stated standard error and coverage of each quantity, in per cent."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=50)
-    parser.add_argument("--jobs", type=int, default=2)
-    options = parser.parse_args()
-    found = Parallel(options.jobs)(delayed(of_seed)(seed) for seed in range(options.seeds))
+    found = Parallel(jobs)(delayed(of_seed)(seed) for seed in range(seeds))
     values, std = (np.array(part) for part in zip(*found, strict=True))
     print("quantity, bias %, scatter %, stated %, intervals that hold the truth")
     for name, value, stated in zip(QUANTITIES, values.T, std.T, strict=True):
         held = int(np.sum(np.abs(value - 1.0) <= 1.96 * stated))
         bias, scatter = 100.0 * (np.mean(value) - 1.0), 100.0 * np.std(value, ddof=1)
         print(
-            f"{name}, {bias:+.4f}, {scatter:.4f}, {100.0 * np.median(stated):.4f}, {held} of {options.seeds}",
+            f"{name}, {bias:+.4f}, {scatter:.4f}, {100.0 * np.median(stated):.4f}, {held} of {seeds}",
             flush=True,
         )
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -14,8 +14,6 @@ them too. In all others somebody else had the processor, as in every stall of
 cyclictest, a C program. What could have made one, the collector, imports, page faults and switches, is counted with it.
 """
 
-import argparse
-import json
 import shutil
 import subprocess
 import tempfile
@@ -28,7 +26,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import typer
 
+from benchmarks.frame import show
 from controller import AmplitudeLaw, preset
 from rig.bench import Bench, load_bench
 from rig.loop.worker.memory import TIMES
@@ -42,6 +42,7 @@ from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
 from rig.tick.tick import TickSettings
 
 TURN_S = 15.0
+RATES_HZ = (1000.0, 2000.0, 5000.0)
 FREQUENCY_HZ = 24.4
 STALL_US = 1000.0
 DISTURBANCES = ("collections", "imports", "major_faults", "minor_faults", "involuntary_switches")
@@ -200,26 +201,17 @@ def at_rate(rate_hz: float, minutes: float, privileged: bool) -> dict[str, Any]:
     return {**out, "samples": counted["samples"], "scheduling": said["scheduling"], "memory": said["memory"]}
 
 
-def main() -> None:
-    """Measure all rates and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=2.0, help="for loop and cyclictest, at each rate")
-    parser.add_argument("--rates", type=float, nargs="+", default=[1000.0, 2000.0, 5000.0], help="Hz")
-    parser.add_argument("--unprivileged", action="store_true", help="without real-time scheduling and locked memory")
-    parser.add_argument("--json", action="store_true")
-    given = parser.parse_args()
+def main(
+    minutes: float = 2.0,
+    rate: list[float] | None = None,
+    unprivileged: bool = False,
+    json: bool = False,
+) -> None:
+    """Measure loop and cyclictest for ``minutes`` at each ``rate`` (Hz)."""
     if shutil.which("cyclictest") is None:
         raise SystemExit("cyclictest is not installed (Debian: rt-tests)")
-    results = {f"{rate:g} Hz": at_rate(rate, given.minutes, not given.unprivileged) for rate in given.rates}
-    if given.json:
-        print(json.dumps(results, indent=2))
-        return
-    for name, values in results.items():
-        print(name)
-        for key, value in values.items():
-            shown = value if not isinstance(value, dict) else ", ".join(f"{k} {v:.2f}" for k, v in value.items())
-            print(f"  {key:26} {shown if not isinstance(shown, float) else round(shown, 4)}")
+    show({f"{hertz:g} Hz": at_rate(hertz, minutes, not unprivileged) for hertz in rate or RATES_HZ}, json)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -1,1 +1,0 @@
-"""The integrator by itself, without sensors and tick."""
