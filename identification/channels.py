@@ -135,7 +135,6 @@ def chosen_rows(
 
 
 def _rows(channels: Sequence[Channel], what: str, wanted: Sequence[str]) -> tuple[int, ...]:
-    """Return the rows of channels by name, or by role if no channel has that name."""
     found: list[int] = []
     for name in (wanted,) if isinstance(wanted, str) else wanted:
         rows = [row for row, channel in enumerate(channels) if channel.name == name]

@@ -15,7 +15,6 @@ _BACKBONE_POINTS = 300
 
 
 def _options(force_n: float, force: str, how: dict[str, Any]) -> dict[str, Any]:
-    """Return today's options for former ones."""
     band = how.pop("lowest_hz", None), how.pop("highest_hz", None)
     held = {"voltage_v": force_n} if force == "voltage" else {"force_n": force_n, "force": force}
     return {

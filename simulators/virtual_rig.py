@@ -282,7 +282,6 @@ class VirtualRig(Part):
 
     @cached_property
     def _nominal_plant(self) -> LinearPlant:
-        """The plant before any deviation."""
         return assemble(self.structure, self.elements, self.friction, self.exciter, self.stinger)
 
     @cached_property

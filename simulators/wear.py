@@ -77,7 +77,6 @@ class Wear(Part):
 
 
 def _per_mode(name: str, rates: tuple[float, ...], n_mode: int) -> NDArray[np.float64]:
-    """Return one rate per mode [n_mode]."""
     if len(rates) not in (0, 1, n_mode):
         raise InputError(
             f"has {len(rates)} values", field=f"wear.{name}", allowed=f"{n_mode}, one per mode, one for all, or none"

@@ -140,7 +140,6 @@ def _alpha_std(coefficients: Float, covariance: Float, z: float) -> float:
 
 
 def _finite(std: float) -> float | None:
-    """Return a standard error, or None if it is not known."""
     return std if math.isfinite(std) else None
 
 

@@ -61,7 +61,6 @@ class Walk:
         return Point(v, units, tangent)
 
     def _tangent(self, v: Float, units: Float, along: Float) -> Float | None:
-        """Return the unit tangent that has a positive product with ``along``."""
         return tangent_of(self._bordered(v, units, along)[1])
 
     def corrected(self, point: Point, length: float) -> Point | None:

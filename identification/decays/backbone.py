@@ -153,7 +153,6 @@ class _Record:
 
 
 def _mode(record: _Record, candidate: Candidate, number: int, harmonics: int, shape: float | None) -> DecayMode:
-    """Evaluate one mode."""
     theta, periods = candidate.track.theta_rad, candidate.periods
     fastest = float(np.max(np.diff(theta)))
     if 2.0 * np.pi / fastest < _MIN_SAMPLES_PER_PERIOD:
@@ -282,7 +281,6 @@ def _harmonics(
 
 
 def _left_force(modes: Sequence[DecayMode]) -> list[str]:
-    """Return a note for each mode on which a force acts while it decays."""
     notes = []
     for mode in modes:
         largest = float(np.max(np.abs(mode.force_n)))

@@ -102,7 +102,6 @@ def _envelope(series: Series) -> Float:
 
 
 def _at_width(series: Series, centres: Float, levels: Float, falling: Float, width: float, order: int) -> LevelFits:
-    """Fit at all levels over ``width`` in ln(amplitude) to either side."""
     rows = np.full((centres.size, _COLUMNS), np.nan, np.complex128)
     for number, (centre, level) in enumerate(zip(centres, levels, strict=True)):
         turning = float(np.interp(centre, series.seen.at_s, series.seen.turning))

@@ -85,7 +85,6 @@ def separated(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> t
 
 
 def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tuple[list[_Found], list[str]]:
-    """Return the named modes and those that stand out, and notes on harmonics that might be modes."""
     peaks = found_frequencies(data, rate_hz)
     found: list[_Found] = []
     notes: list[str] = []
@@ -125,7 +124,6 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
 
 
 def _harmonic(track: Track, frequency_hz: float) -> int:
-    """Order of the harmonic of a mode at which a frequency lies; 0 if at none."""
     orders = range(2, _HIGHEST_HARMONIC + 1)
     return next((order for order in orders if track.holds(frequency_hz, order)), 0)
 

@@ -138,7 +138,6 @@ def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -
 
 
 def _at_width(decay: SlowFlow, levels: Float, width: float, quiet: float) -> list[_Level | None]:
-    """Fit around all levels; None where there are too few instants. The noise is that of a level and its neighbours."""
     fits = [
         [fit_around(decay, float(np.log(level)), width, degree) for degree in (_DEGREE, _HIGHER_DEGREE)]
         if np.count_nonzero(np.abs(np.log(decay.amplitude_m / level)) < width) >= _FEWEST_INSTANTS

@@ -41,25 +41,18 @@ class LeastSquares(Protocol):
 
 @dataclass(frozen=True)
 class DampingRule:
-    """How the damping of a step is chosen.
-
-    Parameters
-    ----------
-    first
-        Damping of the step before the first.
-    factor
-        Ratio of successive dampings.
-    smallest, largest
-        Range of dampings that are tried.
-    worth
-        A smaller damping is tried if its predicted gain exceeds that of the last by more than this share.
-    """
+    """How the damping of a step is chosen."""
 
     first: float
+    """Damping of the step before the first."""
     factor: float
+    """Ratio of successive dampings."""
     smallest: float
+    """Smallest damping that is tried."""
     largest: float
+    """Largest damping that is tried."""
     worth: float
+    """A smaller damping is tried if its predicted gain exceeds that of the last by more than this share."""
 
 
 class Step(NamedTuple):

@@ -91,28 +91,20 @@ def upgrade_fit(_arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) ->
 @stored(upgrade=upgrade_fit)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FitResult(Result):
-    """What the fits of all models have in common.
-
-    Parameters
-    ----------
-    status, message
-        Why the fit ended, and the same as a sentence.
-    evaluations
-        Number of linearisations: simulations of all experiments with derivatives; 0 if unknown.
-    iterations
-        Number of steps that lowered the cost; 0 if unknown.
-    seconds
-        Wall time of the fit; NaN if unknown.
-    covariance
-        float[P, P], covariance of the free numbers; None if it was not computed.
-    """
+    """What the fits of all models have in common."""
 
     status: FitStatus
+    """Why the fit ended."""
     message: str
+    """The same as a sentence."""
     evaluations: int = 0
+    """Number of linearisations: simulations of all experiments with derivatives; 0 if unknown."""
     iterations: int = 0
+    """Number of steps that lowered the cost; 0 if unknown."""
     seconds: float = float("nan")
+    """Wall time of the fit; NaN if unknown."""
     covariance: Float | None = None
+    """float[P, P], covariance of the free numbers; None if it was not computed."""
 
     @property
     def stopped(self) -> str:

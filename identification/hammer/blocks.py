@@ -24,27 +24,18 @@ _MOVING, _QUIETEST = 0.05, 3.0
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The record of one hit.
-
-    Parameters
-    ----------
-    samples
-        float[n_channels, n], without offset; zeros after the end of a record that is too short.
-    before
-        Number of samples before the hit.
-    pulse
-        The pulse of the force, in samples of the block.
-    noise_rms
-        float[n_channels], RMS before the hit.
-    hit
-        What is said of the hit.
-    """
+    """The record of one hit."""
 
     samples: Float
+    """float[n_channels, n], without offset; zeros after the end of a record that is too short."""
     before: int
+    """Number of samples before the hit."""
     pulse: Pulse
+    """The pulse of the force, in samples of the block."""
     noise_rms: Float
+    """float[n_channels], RMS before the hit."""
     hit: Hit
+    """What is said of the hit."""
 
 
 @dataclass(frozen=True)

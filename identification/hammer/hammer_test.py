@@ -170,7 +170,6 @@ def _evaluated(
     specimen: str,
     rate: float,
 ) -> HammerTest:
-    """Return the result from the spectra complex[n_hits, n_channels, n_lines] of the hits that count."""
     found = estimated_responses(
         channels,
         frequency_hz,

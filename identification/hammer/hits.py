@@ -22,20 +22,16 @@ _FOOT = 0.02
 
 @dataclass(frozen=True)
 class Pulse:
-    """A pulse of the force, in samples of its record.
-
-    Parameters
-    ----------
-    first, peak, end
-        First sample of the pulse, its highest, and the first one after it.
-    height_n
-        Force at the peak.
-    """
+    """A pulse of the force, in samples of its record."""
 
     first: int
+    """First sample of the pulse."""
     peak: int
+    """Its highest sample."""
     end: int
+    """First sample after it."""
     height_n: float
+    """Force at the peak."""
 
     @property
     def width(self) -> int:

@@ -33,34 +33,23 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class WeightedResponses:
-    """Frequency responses ready for a fit.
-
-    Parameters
-    ----------
-    frequency_hz
-        float[n_lines].
-    value
-        complex[n_lines, n_outputs, n_inputs].
-    covariance
-        complex[n_lines, m, m], m = n_outputs n_inputs, as estimated at each line; None if unknown.
-    smooth
-        complex[n_lines, m, m], mean covariance of the neighbouring lines, whose inverse is the weight. If no covariance is
-        known: the squared modulus (errors of equal relative size).
-    deviations
-        complex[n_lines, n_records, m], contributions of single records to the errors; None if unknown.
-    decay_rate_1_s
-        Rate of an exponential window.
-    kind
-        Kind of covariance: ``total``, ``noise``, ``line scatter`` (total, from neighbouring lines) or ``relative``.
-    """
+    """Frequency responses ready for a fit."""
 
     frequency_hz: Float
+    """float[n_lines]."""
     value: Complex
+    """complex[n_lines, n_outputs, n_inputs]."""
     covariance: Complex | None
+    """complex[n_lines, m, m], m = n_outputs n_inputs, as estimated at each line; None if unknown."""
     smooth: Complex
+    """complex[n_lines, m, m], mean covariance of the neighbouring lines, whose inverse is the weight. If no
+    covariance is known: the squared modulus (errors of equal relative size)."""
     kind: str
+    """Kind of covariance: ``total``, ``noise``, ``line scatter`` (total, from neighbouring lines) or ``relative``."""
     deviations: Complex | None = None
+    """complex[n_lines, n_records, m], contributions of single records to the errors; None if unknown."""
     decay_rate_1_s: float = 0.0
+    """Rate of an exponential window."""
 
     @property
     def s(self) -> Complex:
@@ -203,7 +192,6 @@ def _lines_alike(deviations: Complex | None) -> int:
 
 
 def _rank(covariance: Complex) -> int:
-    """Median rank of the covariance of a single line, from a few of the lines."""
     some = covariance[:: max(1, covariance.shape[0] // 16)]
     unit = 1.0 / np.sqrt(np.maximum(np.einsum("kii->ki", some).real, 1e-300))
     values = np.linalg.eigvalsh(some * unit[:, :, None] * unit[:, None, :])

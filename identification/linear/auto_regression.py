@@ -41,24 +41,16 @@ _LINES = 800
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Coefficients of a regression.
-
-    Parameters
-    ----------
-    past
-        float[order + 1, n_outputs, n_outputs], matrices A_l, A_0 = 1.
-    forced
-        float[order + 1, n_outputs, n_inputs], matrices B_l.
-    inverse_root
-        float[n, n], R^-1 of the triangular factor of all regressors.
-    innovation
-        float[n_outputs, n_outputs], covariance of e.
-    """
+    """Coefficients of a regression."""
 
     past: Float
+    """float[order + 1, n_outputs, n_outputs], matrices A_l, A_0 = 1."""
     forced: Float
+    """float[order + 1, n_outputs, n_inputs], matrices B_l."""
     inverse_root: Float
+    """float[n, n], R^-1 of the triangular factor of all regressors."""
     innovation: Float
+    """float[n_outputs, n_outputs], covariance of e."""
 
     @property
     def order(self) -> int:
@@ -149,7 +141,6 @@ def _regressors(u: Float, y: Float, order: int) -> "Sequence[Float]":
 
 
 def _best_order(factor: Float, rows: int, most: int, inputs: int, outputs: int) -> int:
-    """Return the order with the least Bayesian information criterion."""
     step = inputs + outputs
     size = np.linalg.norm(factor[:, -outputs:]) ** 2 / rows
     score = []

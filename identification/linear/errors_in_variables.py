@@ -34,25 +34,18 @@ _SMALLEST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class DrivenResponses:
-    """Force and accelerations over the voltage, with their covariance.
-
-    Parameters
-    ----------
-    frequency_hz
-        float[n_lines].
-    value
-        complex[n_lines, 1 + n_outputs], force and accelerations over voltage.
-    covariance, smooth
-        complex[n_lines, 1 + n_outputs, 1 + n_outputs], covariance as estimated at each line, and the mean of its neighbours.
-    kind
-        ``total`` or ``noise``.
-    """
+    """Force and accelerations over the voltage, with their covariance."""
 
     frequency_hz: Float
+    """float[n_lines]."""
     value: Complex
+    """complex[n_lines, 1 + n_outputs], force and accelerations over voltage."""
     covariance: Complex
+    """complex[n_lines, 1 + n_outputs, 1 + n_outputs], covariance as estimated at each line."""
     smooth: Complex
+    """Mean covariance of the neighbouring lines, of the same shape."""
     kind: str
+    """``total`` or ``noise``."""
 
     @property
     def s(self) -> Complex:

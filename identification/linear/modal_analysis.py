@@ -156,7 +156,6 @@ def _begun(
 def _noise(
     responses: FrequencyResponseMatrix, joint: DrivenResponses | None, fit: ModalFit, *, normal: bool
 ) -> WeightedResponses | None:
-    """Return the responses weighted by noise alone, for comparison; None if the noise is unknown."""
     if responses.noise_covariance is None:
         return None
     if joint is None:

@@ -145,7 +145,6 @@ def _variance(fit: ModalFit) -> Float:
 
 
 def _distorted(data: WeightedResponses, fit: ModalFit) -> bool:
-    """Return whether the errors of the responses around any mode are a considerable share of the responses."""
     share = data.std[:, :, 0] * fit.misfit / np.maximum(np.abs(data.value[:, :, 0]), 1e-300)
     return any(np.any(near) and np.median(share[near]) > _DISTORTED for near in _near_modes(data, fit))
 

@@ -41,31 +41,21 @@ _PRIOR_STD = 5.0
 
 @dataclass(frozen=True, eq=False)
 class ModalFit:
-    """Parameters of a modal model and their errors.
-
-    Parameters
-    ----------
-    poles
-        float[2 n_modes + 1], natural angular frequencies (rad/s), damping ratios, c (s^2).
-    terms
-        float[n_outputs, n_terms], a (1/kg) of every mode, then b (s/kg) of every mode if the fit has them, then the
-        `RESIDUAL_TERMS`: L (1/kg), L' (1/(kg s)), L'' (1/(kg s^2)), U (s^2/kg), U' (s^3/kg).
-    covariance
-        float[m, m], covariance of ``(poles, terms row by row)``.
-    residual
-        RMS of the residual over its expected value from the covariance; NaN if no covariance is known.
-    converged
-        Whether the iteration converged.
-    systematic
-        float[m], variance of the same parameters that is due to an error of the model; None for none.
-    """
+    """Parameters of a modal model and their errors."""
 
     poles: Float
+    """float[2 n_modes + 1], natural angular frequencies (rad/s), damping ratios, c (s^2)."""
     terms: Float
+    """float[n_outputs, n_terms], a (1/kg) of every mode, then b (s/kg) of every mode if the fit has them, then the
+    `RESIDUAL_TERMS`: L (1/kg), L' (1/(kg s)), L'' (1/(kg s^2)), U (s^2/kg), U' (s^3/kg)."""
     covariance: Float
+    """float[m, m], covariance of ``(poles, terms row by row)``."""
     residual: float
+    """RMS of the residual over its expected value from the covariance; NaN if no covariance is known."""
     converged: bool
+    """Whether the iteration converged."""
     systematic: Float | None = None
+    """float[m], variance of the same parameters that is due to an error of the model; None for none."""
 
     @property
     def omega(self) -> Float:

@@ -186,7 +186,6 @@ def _poles(a: Float, c: Float, middle: float, decay_rate_1_s: float) -> tuple[Fl
 def _alike(
     now: tuple[Float, Float, Complex], before: tuple[Float, Float, Complex], tolerances: tuple[float, float, float]
 ) -> tuple[Bool, Bool, Bool]:
-    """Return whether any pole of the order before agrees in frequency; also in damping; also in shape."""
     frequency = np.abs(now[0][:, None] - before[0]) <= tolerances[0] * now[0][:, None]
     damping = frequency & (np.abs(now[1][:, None] - before[1]) <= tolerances[1] * np.abs(now[1][:, None]))
     shape = damping & (np.abs(now[2] @ np.conj(before[2].T)) ** 2 >= tolerances[2])

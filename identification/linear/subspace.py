@@ -42,21 +42,15 @@ class StateSpace(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ObservableSpace:
-    """Estimate of the extended observability matrix, most prominent direction first.
-
-    Parameters
-    ----------
-    basis
-        float[r n_outputs, n], columns in the order of ``singular_values``.
-    singular_values
-        float[n]; with noise weighting the singular values of noise lie at about one level, those of the system above it.
-    n_outputs
-        Number of rows of a block.
-    """
+    """Estimate of the extended observability matrix, most prominent direction first."""
 
     basis: Float
+    """float[r n_outputs, n], columns in the order of ``singular_values``."""
     singular_values: Float
+    """float[n]; with noise weighting the singular values of noise lie at about one level, those of the system above
+    it."""
     n_outputs: int
+    """Number of rows of a block."""
 
     def state_matrices(self, order: int) -> tuple[Float, Float]:
         """Return A and C of a model of the given order, by shifting the observability matrix by one block."""

@@ -126,7 +126,6 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
 
 
 def _levels(data: Any, group: LevelSet, where: str) -> Sequence[dict[str, NDArray[Any]]]:
-    """Return the arrays of every level of a set, by the name of their entry in the mapping."""
     paths = {name: getattr(group, name) for name in ("frequency", "force", "response", "phase")}
     paths = {name: path for name, path in paths.items() if path is not None}
     if group.levels is not None:

@@ -224,7 +224,6 @@ def _cut(raw: Sequence[_Raw], mapping: TimeDataMapping, rate_hz: float) -> tuple
 
 
 def _stretches(stretches: Sequence[Stretch], size: int, rate_hz: float, number: int) -> list[tuple[int, int, int]]:
-    """Return beginning, end and number of each stretch of a record of ``size`` samples."""
     found = []
     for which, one in enumerate(stretches or (Stretch(),)):
         begin = one.start_samples or 0 if one.start_s is None else round(one.start_s * rate_hz)
@@ -266,7 +265,6 @@ def _resampled(part: Float, size: int, rate_hz: float, new_hz: float) -> Float:
 
 
 def _period(cut: Sequence[_Raw], mapping: TimeDataMapping, ratio: float) -> int:
-    """Return the samples in a period at the new rate."""
     return round(cut[0].period_samples * ratio)
 
 
@@ -295,7 +293,6 @@ def _grouped(cut: Sequence[_Raw], force: int, levels: Sequence[float] | None) ->
 
 
 def _named(cut: Sequence[_Raw], mapping: TimeDataMapping, force: Sequence[int], unit: str) -> tuple[TimeRecord, ...]:
-    """Return the records with their levels and names."""
     groups = sorted({one.group for one in cut})
     levels = mapping.levels
     if levels is not None and len(levels) not in (len(groups), len(cut)):

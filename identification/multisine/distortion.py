@@ -135,7 +135,6 @@ def _check_silence(spectra: PeriodicSpectra, instruments: Sequence[str]) -> None
 
 
 def _interpolated(at_hz: Float, frequency_hz: Float, values: Complex) -> Complex:
-    """complex[n_channels, n]: linear interpolation between the lines, constant beyond them."""
     return np.array(
         [np.interp(at_hz, frequency_hz, row.real) + 1j * np.interp(at_hz, frequency_hz, row.imag) for row in values]
     )

@@ -182,7 +182,6 @@ def _products(samples: Complex) -> Complex:
 
 
 def _mixed(outputs: list[Channel]) -> list[str]:
-    """Return a note if the outputs are different kinds of motion."""
     motions = {channel.name: channel.motion for channel in outputs if channel.role in ("drive", "response")}
     if len(set(motions.values())) < 2:
         return []
@@ -191,7 +190,6 @@ def _mixed(outputs: list[Channel]) -> list[str]:
 
 
 def _notes(error: Complex, inputs: int) -> list[str]:
-    """Return notes on covariances that are unknown or singular, with the reason."""
     realisations, periods, paths = error.shape[:3]
     blocks = realisations // inputs
     plural = "s" if blocks > 1 else ""

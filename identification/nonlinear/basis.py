@@ -66,7 +66,6 @@ def shapes_for(
 
 
 def _tested(modes: LinearModes, backbone: Backbone, mode: int | None) -> int:
-    """Index of the tested mode."""
     count = modes.frequency_hz.size
     if mode is not None:
         if not 0 <= mode < count:
@@ -124,7 +123,6 @@ def _shape_covariance(modes: LinearModes, rows: Sequence[int], columns: Sequence
 
 
 def _error_gain(shapes: Float) -> float:
-    """Factor by which the other columns amplify the errors of the first column's amplitude."""
     norms = np.linalg.norm(shapes, axis=0)
     if np.linalg.matrix_rank(shapes / norms) < shapes.shape[1]:
         return float(np.inf)

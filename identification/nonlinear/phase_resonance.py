@@ -137,7 +137,6 @@ def nonlinear_mode(
 
 
 def _refuse(name: str, point: PeriodicVibration) -> None:
-    """Raise `IdentificationError` if nothing can be identified from a point."""
     if not point.settled:
         raise IdentificationError("is not settled", where=name, hint="use backbone.settled() to leave such points out")
     if point.force_n == 0.0 or point.amplitude_m == 0.0:
@@ -157,7 +156,6 @@ def _refuse(name: str, point: PeriodicVibration) -> None:
 
 
 def _refuse_unreal(backbone: Backbone, found: Mapping[str, Float]) -> None:
-    """Raise if a point has no real modal frequency or no modal amplitude, or if a polarity is reversed."""
     for number, point in enumerate(backbone.points):
         name = f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)"
         if found["modal_amplitude"][number] == 0.0:

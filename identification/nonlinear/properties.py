@@ -14,36 +14,27 @@ from vibrolock.arrays import Complex, Float
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """Vibrations at n points; ``...`` is the axis of the draws, or no axis.
-
-    Parameters
-    ----------
-    frequency_hz
-        float[n], frequency of the vibration.
-    force, drive_m
-        complex[..., n, H + 1], harmonics of force (N) and drive-point displacement (m).
-    drift
-        complex[..., n], relative drift rate sigma of the motion, 1/s.
-    deflection_m
-        complex[..., n, C], fundamentals at the channels of the shapes, m.
-    inverse
-        float[..., M, C], pseudo-inverse of the mass-normalised shapes; None without shapes.
-    drive_shape
-        Mass-normalised shape at the drive point, used without ``inverse``; a number, or float[..., 1] for draws that differ.
-        None if unknown.
-    linear_shape, linear_columns
-        float[..., K], linear shape for the MAC, and its K columns in ``deflection_m``; K = 0 for none.
-    """
+    """Vibrations at n points; ``...`` is the axis of the draws, or no axis."""
 
     frequency_hz: Float
+    """float[n], frequency of the vibration."""
     force: Complex
+    """complex[..., n, H + 1], harmonics of the force, N."""
     drive_m: Complex
+    """complex[..., n, H + 1], harmonics of the drive-point displacement."""
     drift: Complex
+    """complex[..., n], relative drift rate sigma of the motion, 1/s."""
     deflection_m: Complex
+    """complex[..., n, C], fundamentals at the channels of the shapes, m."""
     inverse: Float | None
+    """float[..., M, C], pseudo-inverse of the mass-normalised shapes; None without shapes."""
     drive_shape: float | Float | None
+    """Mass-normalised shape at the drive point, used without ``inverse``; a number, or float[..., 1] for draws that
+    differ. None if unknown."""
     linear_shape: Float
+    """float[..., K], linear shape for the MAC; K = 0 for none."""
     linear_columns: tuple[int, ...]
+    """Its K columns in ``deflection_m``."""
 
 
 def properties(states: States) -> dict[str, Float]:

@@ -197,7 +197,6 @@ _COMPARED = ("modal_frequency_hz", "damping_ratio")
 
 
 def _modes(runs: Sequence[NonlinearMode | Backbone]) -> list[NonlinearMode]:
-    """Return one nonlinear mode per run."""
     backbones = [run for run in runs if isinstance(run, Backbone)]
     for number, backbone in enumerate(backbones[1:], 2):
         if backbone.channels != backbones[0].channels:

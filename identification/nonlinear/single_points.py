@@ -94,7 +94,6 @@ def _identified(
     modes: LinearModes | None,
     mode: int | None,
 ) -> NonlinearMode:
-    """Solve the one-mode equation at every point."""
     omega = 2.0 * np.pi * frequency
     own = motion
     if modes is not None:

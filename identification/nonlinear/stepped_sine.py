@@ -199,7 +199,6 @@ def _fit_level(level: FrequencyResponse, window_deg: float, complex_constant: bo
 
 
 def _stacked(values: Complex | Float) -> Float:
-    """Stack real parts above imaginary parts."""
     return np.concatenate([values.real, values.imag])
 
 

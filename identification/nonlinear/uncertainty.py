@@ -31,22 +31,16 @@ _STANDS_OUT = 2.5  # multiple of its standard error per part; noise alone causes
 
 @dataclass(frozen=True, eq=False)
 class ErrorModel:
-    """Errors of a backbone other than the noise in the standard errors of its points.
-
-    Parameters
-    ----------
-    calibration_std
-        Relative standard error of the sensitivity of each channel: one number for all, or by channel name.
-    phase_skew_std_deg
-        Standard error of each channel's phase at the fundamental: one number for all, or by channel name.
-    draws, seed
-        Number of draws and seed of the Monte Carlo; the same seed gives the same numbers. 0 draws: errors are not computed.
-    """
+    """Errors of a backbone other than the noise in the standard errors of its points."""
 
     calibration_std: float | Mapping[str, float] = 0.0
+    """Relative standard error of the sensitivity of each channel: one number for all, or by channel name."""
     phase_skew_std_deg: float | Mapping[str, float] = 0.0
+    """Standard error of each channel's phase at the fundamental: one number for all, or by channel name."""
     draws: int = 1000
+    """Number of draws of the Monte Carlo; 0: errors are not computed."""
     seed: int = 0
+    """Seed of the Monte Carlo; the same seed gives the same numbers."""
 
     def __post_init__(self) -> None:
         if self.draws != 0 and self.draws < 100:
@@ -117,7 +111,6 @@ def propagated(
 
 
 def _unknown(points: int) -> dict[str, Float]:
-    """Return what `propagated` returns, all of it unknown."""
     size = len(QUANTITIES)
     return {
         **{STANDARD_ERRORS[name]: np.full(points, np.nan) for name in QUANTITIES},
@@ -139,8 +132,6 @@ def _deviations(estimate: Mapping[str, Float], drawn: Mapping[str, Float]) -> di
 
 
 def _repeated(states: States, draws: int) -> States:
-    """Return the same states once per draw."""
-
     def often(values: Complex) -> Complex:
         return np.broadcast_to(values, (draws, *values.shape))
 

@@ -167,7 +167,6 @@ def _rising(section_at: Callable[[float], Section], target: float, lags_deg: Flo
 
 
 def _left(lags_deg: Float, on: NDArray[np.int64]) -> tuple[str, ...]:
-    """Return a note on lags at which no measured level has the force."""
     off = np.delete(lags_deg, on)
     if not off.size:
         return ()

@@ -137,7 +137,6 @@ def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
 
 
 def _by_level(responses: Sequence[FrequencyResponse]) -> list[LevelPoints]:
-    """Return the points of every level, with equal levels combined."""
     groups: list[list[FrequencyResponse]] = []
     for response in sorted(responses, key=lambda one: one.level):
         if groups and response.level <= groups[-1][0].level * (1.0 + _SAME_LEVEL):

@@ -130,7 +130,6 @@ def _rms(parts: Sequence[Float]) -> Float:
 
 
 def _loudest(training: Sequence[Experiment], named: Sequence[str], scale: Float) -> list[Experiment]:
-    """Return the training data of the run that has the largest outputs."""
     sizes = [float(np.max(_rms([one.counted_outputs]) / scale)) for one in training]
     run = named[int(np.argmax(sizes))]
     return [one for one, name in zip(training, named, strict=False) if name == run]
@@ -151,7 +150,6 @@ def _speed(step: Float, before: Float, speed: Float) -> Float:
 def _own_shifts(
     model: Scattered, effects: Sequence[Effect], runs: Sequence[Sequence[Experiment]], scale: Float, begins: Float
 ) -> list[OwnShift]:
-    """Return the shifts of all runs."""
     with threads() as count, ThreadPoolExecutor(count) as pool:
         return list(pool.map(lambda run, begin: own_shift(model, effects, run, scale, begin), runs, begins))
 
@@ -159,8 +157,6 @@ def _own_shifts(
 def _without_shifts(
     model: Scattered, effects: Sequence[Effect], experiments: Sequence[Experiment], shifts: Sequence[Float]
 ) -> list[Experiment]:
-    """Return the experiments without what their shifts do to the outputs."""
-
     def without(experiment: Experiment, shift: Float) -> Experiment:
         change = run_of(shifted(model, effects, shift), experiment).outputs - run_of(model, experiment).outputs
         return replace(experiment, outputs=experiment.outputs - change) if np.all(np.isfinite(change)) else experiment

@@ -162,7 +162,6 @@ def vibration_in(
 
 
 def _lost(lost: ArrayLike | None, size: int) -> NDArray[np.bool_]:
-    """bool[n]: samples that are ignored."""
     if lost is None:
         return np.zeros(size, np.bool_)
     gone = finite_array("lost", lost, np.bool_, 1)
@@ -260,7 +259,6 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
 
 
 def _coefficients(solution: Float, harmonics: int) -> Complex:
-    """complex[n_channels, H + 1]: coefficients from the columns of the least-squares solution."""
     result = np.zeros((solution.shape[1], harmonics + 1), dtype=np.complex128)
     result[:, 0] = solution[0]
     result[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : 2 * harmonics + 1]).T

@@ -140,7 +140,6 @@ def _sorted(one: float, other: float) -> Band:
 
 
 def _within(frequency: Float, band: Band, name: str) -> NDArray[np.bool_]:
-    """Return which instants lie in ``band``; raise `IdentificationError` if none does."""
     inside = (frequency >= band[0]) & (frequency <= band[1])
     if not inside.any():
         raise IdentificationError(

@@ -103,7 +103,6 @@ def local_fits(
 
 
 def _real(values: NDArray[Any]) -> Float:
-    """float[m, 2 n, k]: real parts above imaginary parts."""
     return np.concatenate([values.real, values.imag], axis=1)
 
 

@@ -89,7 +89,6 @@ def between_harmonics(theta: Float, signal: Float, at: Float) -> Float:
 
 
 def _blackman(place: Float) -> Float:
-    """Blackman window over -1 ... 1."""
     return np.asarray(0.42 + 0.5 * np.cos(np.pi * place) + 0.08 * np.cos(2.0 * np.pi * place))
 
 

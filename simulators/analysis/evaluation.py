@@ -105,7 +105,6 @@ class Evaluation:
         }
 
     def _flags(self, beyond: NDArray[np.bool_], voltages: Complex | None, sensors: Complex) -> NDArray[np.int64]:
-        """Return the flags that a run of the rig would raise."""
         rig, series = self.rig, Series(self.balance.series.harmonics, 128)
         converter = rig.converter
         flags = np.where(beyond, int(Flag.LAW_RANGE), 0)

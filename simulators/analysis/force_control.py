@@ -67,7 +67,6 @@ class ForceControl:
 
 
 def _ratios(force_harmonics: ForceHarmonics, harmonics: int) -> dict[int, complex]:
-    """Return the values of the controlled harmonics after a check."""
     if isinstance(force_harmonics, Mapping):
         for order, ratio in force_harmonics.items():
             _check_order("force_harmonics: harmonic", order, harmonics)

@@ -58,7 +58,6 @@ def follow(balance: Balance, here: Solution, goal: Conditions, depth: int = 0) -
 
 
 def _far(now: Conditions, goal: Conditions) -> bool:
-    """Return whether a step is too large to be tried at once."""
     ratio = abs(math.log(goal.level / now.level))
     return ratio > math.log(_LARGEST_LEVEL_RATIO) or (
         goal.at == "lag" and abs(goal.value - now.value) > _LARGEST_LAG_STEP

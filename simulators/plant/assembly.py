@@ -127,7 +127,6 @@ def assemble(
 
 
 def _dynamics(stiffness: Float, damping: Float, drive: Float, exciter: Exciter, force: Float) -> Float:
-    """Return the matrix A of structure, exciter and the stinger between them."""
     m = drive.size
     q, v = slice(0, m), slice(m, 2 * m)
     x_a, v_a, i = 2 * m, 2 * m + 1, 2 * m + 2

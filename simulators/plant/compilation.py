@@ -183,7 +183,6 @@ def at_rest(rig: RigArrays) -> RigState:
 
 
 def _channel(sensor: Sensor, delay: int, converter: Converter, noise_scale: float) -> tuple[float, float, int]:
-    """Return the record of a sensor's channel."""
     noise_v = math.hypot(noise_scale * sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
     return noise_v, sensor.range_v, delay
 
@@ -208,7 +207,6 @@ def _conditioning(sensor: Sensor, converter: Converter) -> tuple[float, float, f
 
 
 def _converter(converter: Converter) -> NDArray[Any]:
-    """Return the record of the converter."""
     return np.array(
         [
             (
