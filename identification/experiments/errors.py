@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from identification.errors import IdentificationError
 from identification.experiments.checks import belongs, check_not_zero
 from identification.experiments.experiment import Experiment
-from identification.experiments.simulators import SimulatedMotion, Simulator, simulated
+from identification.experiments.simulation import Simulation
+from identification.experiments.simulators import Simulator, simulated
 from identification.validation import read_only
 from vibrolock.arrays import Float
 
@@ -62,7 +63,7 @@ class PnlssErrors:
 def errors_of(
     model: Simulator,
     experiments: Sequence[Experiment],
-    simulate: Callable[[Experiment], SimulatedMotion] | None = None,
+    simulate: Callable[[Experiment], Simulation] | None = None,
 ) -> PnlssErrors:
     """Simulate each experiment, by default with `simulated`, and compare.
 

@@ -7,16 +7,7 @@ from pydantic import Field
 
 from identification.backbones import Backbone
 from identification.errors import IdentificationError
-from identification.mapping.base import (
-    ChannelMapping,
-    ComplexPaths,
-    MappingTable,
-    Path,
-    complex_at,
-    in_si,
-    numbers,
-    value_at,
-)
+from identification.mapping.base import ChannelMapping, ComplexPaths, Path, SpectrumMapping, complex_at, in_si
 from identification.measurements import PeriodicVibration
 
 
@@ -27,22 +18,12 @@ class FundamentalMapping(ChannelMapping):
     """Path of complex numbers, or paths of their parts; columns of a matrix are the harmonics 1, 2, ..."""
 
 
-class BackboneMapping(MappingTable):
+class BackboneMapping(SpectrumMapping):
     """Where a backbone is in the data and what its values mean."""
 
     kind: Literal["backbone"]
-    specimen: str = ""
-    """Name of what was tested."""
-    source: str = ""
-    """Where the data comes from; for information only."""
-    frequency: Path
-    """Path of the frequencies."""
-    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
-    """Unit of the frequencies."""
     values: Literal["peak", "rms"]
     """Whether amplitudes are stored as peak or as RMS."""
-    sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
-    """Convention of the stored complex numbers and phases: with ``exp(+iwt)`` a lagging signal has the smaller phase."""
     periods: Annotated[int, Field(ge=1)] = 1
     """Number of periods from which every point was computed."""
     drive_mode_shape: float | None = None
@@ -56,9 +37,7 @@ def map_backbone(data: Any, mapping: BackboneMapping) -> Backbone:
 
     Raises `IdentificationError` if a path does not exist, lengths differ, values are NaN, or roles are missing.
     """
-    frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
-    if mapping.frequency_unit == "rad/s":
-        frequency = frequency / (2.0 * np.pi)
+    frequency = mapping.frequency_hz(data)
     channels, factors = in_si(mapping.channels)
     stored = [complex_at(data, c.value, 2, f"channels.{c.name}") for c in mapping.channels]
     for channel, values in zip(channels, stored, strict=True):

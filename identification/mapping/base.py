@@ -11,13 +11,15 @@ from pydantic import ConfigDict, Field, model_validator
 from identification.channels import Channel, Role
 from identification.errors import IdentificationError
 from identification.mapping.units import UNITS, si_of
-from vibrolock.arrays import Complex
+from vibrolock.arrays import Complex, Float
 from vibrolock.described import Described
+from vibrolock.errors import InputError
 
 _STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 _PATH = re.compile(r"([^.\[\]]+|\[\d+\])(\.[^.\[\]]+|\[\d+\])*")
 Path = Annotated[str, Field(min_length=1)]
-PhaseUnit = Literal["deg", "rad"]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
 def value_at(data: Any, path: str, where: str) -> Any:
@@ -35,32 +37,27 @@ def value_at(data: Any, path: str, where: str) -> Any:
     walked = ""
     for match in _STEP.finditer(path):
         name, index = match.groups()
-        if name is not None:
-            value = _member(value, name, walked, path, where)
-            walked += f"{walked and '.'}{name}"
+        here = f"'{walked}'" if walked else "the top"
+        if name is None:
+            step, fits = int(index), _is_list(value)
+            missing, said = fits and step >= len(value), f"[{index}]"
+            there = f"{len(value)} entries" if fits else ""
         else:
-            value = _entry(value, int(index), walked, path, where)
-            walked += f"[{index}]"
+            step, fits = name, isinstance(value, Mapping)
+            missing, said = fits and name not in value, f"'{name}'"
+            there = ", ".join(str(key) for key in value if not str(key).startswith("__")) if fits else ""
+        if not fits:
+            raise IdentificationError(f"{where}: path '{path}': {here} is {_kind(value)}, has no {said}")
+        if missing:
+            raise IdentificationError(f"{where}: path '{path}': no {said} at {here}, which has {there or 'nothing'}")
+        value = value[step]
+        walked += f"[{index}]" if name is None else f"{walked and '.'}{name}"
     return value
 
 
-def _member(value: Any, name: str, walked: str, path: str, where: str) -> Any:
-    here = f"'{walked}'" if walked else "the top"
-    if not isinstance(value, Mapping):
-        raise IdentificationError(f"{where}: path '{path}': {here} is {_kind(value)}, has no '{name}'")
-    if name not in value:
-        there = ", ".join(str(key) for key in value if not str(key).startswith("__")) or "nothing"
-        raise IdentificationError(f"{where}: path '{path}': no '{name}' at {here}, which has {there}")
-    return value[name]
-
-
-def _entry(value: Any, index: int, walked: str, path: str, where: str) -> Any:
-    here = f"'{walked}'" if walked else "the top"
-    if not _is_list(value):
-        raise IdentificationError(f"{where}: path '{path}': {here} is {_kind(value)}, has no [{index}]")
-    if index >= len(value):
-        raise IdentificationError(f"{where}: path '{path}': no [{index}] at {here}, which has {len(value)} entries")
-    return value[index]
+def entries_at(data: Any, path: str | None, key: str) -> Sequence[Any]:
+    """Return the structures in a list at ``path``, the value of ``key`` in the mapping; ``data`` itself without a path."""
+    return [data] if path is None else as_levels(value_at(data, path, key), f"{key} '{path}'")
 
 
 def as_levels(value: Any, where: str) -> Sequence[Any]:
@@ -110,6 +107,16 @@ class MappingTable(Described):
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
+class MeasurementMapping(MappingTable):
+    """Base of the mappings: the kind, and what was tested."""
+
+    kind: str
+    specimen: str = ""
+    """Name of what was tested."""
+    source: str = ""
+    """Where the data comes from; for information only."""
+
+
 class ChannelMapping(MappingTable):
     """A channel of the measurement and the unit of its stored numbers."""
 
@@ -138,7 +145,7 @@ class ComplexPaths(MappingTable):
     """Path of the amplitudes."""
     phase: Path | None = None
     """Path of the phases, positive if leading; zero if left out."""
-    phase_unit: PhaseUnit = "deg"
+    phase_unit: Literal["deg", "rad"] = "deg"
     """Unit of the phases."""
 
     @model_validator(mode="after")
@@ -147,6 +154,29 @@ class ComplexPaths(MappingTable):
         if parts == (self.amplitude is not None) or (parts and self.phase is not None):
             raise ValueError("give real and imaginary, or amplitude with or without phase")
         return self
+
+
+class SpectrumMapping(MeasurementMapping):
+    """Base of the mappings of complex numbers over the frequency."""
+
+    frequency: Path
+    """Path of the frequencies."""
+    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
+    """Unit of the frequencies."""
+    sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
+    """Convention of the stored complex numbers: with ``exp(+iwt)`` a lagging signal has the smaller phase."""
+
+    def frequency_hz(self, data: Any) -> Float:
+        """float[n]: the frequencies in ``data``."""
+        stored = np.asarray(numbers(value_at(data, self.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
+        return stored / (1.0 if self.frequency_unit == "Hz" else 2.0 * np.pi)
+
+
+def check_names(channels: Sequence[ChannelMapping]) -> None:
+    """Raise `InputError` if two channels have the same name."""
+    names = [channel.name for channel in channels]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f"'{twice}' is the name of two", field="channels", hint="names must differ")
 
 
 def in_si(channels: Sequence[ChannelMapping]) -> tuple[tuple[Channel, ...], NDArray[np.float64]]:

@@ -5,19 +5,17 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.mapping.base import MappingTable, Path, numbers, value_at
+from identification.mapping.base import MeasurementMapping, Path, numbers, value_at
 from identification.mapping.units import si_of
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 
 _ORDER = {"m": 0, "m/s": 1, "m/s2": 2}
 
 
-class NonlinearModeMapping(MappingTable):
+class NonlinearModeMapping(MeasurementMapping):
     """Where the properties of a nonlinear mode are in the data and what they mean."""
 
     kind: Literal["nonlinear-mode"]
-    specimen: str = ""
-    """Name of what was tested."""
     source: str = "imported"
     """Where the data comes from."""
     values: Literal["peak", "rms"]

@@ -7,20 +7,16 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from identification.errors import IdentificationError
-from identification.mapping.base import ChannelMapping, MappingTable, Path, in_si, value_at
+from identification.mapping.base import ChannelMapping, MeasurementMapping, Path, in_si, value_at
 from identification.models.pnlss.features import Features
 from identification.models.pnlss.model import PnlssModel
 from vibrolock.arrays import Float
 
 
-class PnlssMapping(MappingTable):
+class PnlssMapping(MeasurementMapping):
     """Where the matrices of a model are in the data and what they mean; the states are in the model's own units."""
 
     kind: Literal["pnlss"]
-    specimen: str = ""
-    """Name of what was tested."""
-    source: str = ""
-    """Where the model comes from; for information only."""
     model: Path = "model"
     """Path of the structure with ``A``, ``B``, ``C``, ``D``, ``E``, ``F``, ``xpowers`` and ``ypowers``."""
     sample_rate_hz: Annotated[float, Field(gt=0)] | None = None
@@ -58,9 +54,12 @@ def map_pnlss(data: Any, mapping: PnlssMapping) -> PnlssModel:
         "e": (n, len(xpowers)),
         "f": (p, len(ypowers)),
     }
-    matrices: dict[str, Any] = {
-        name: _shaped(_array(data, mapping, name.upper()), name.upper(), shape) for name, shape in shapes.items()
-    }
+    matrices: dict[str, Any] = {}
+    for name, shape in shapes.items():
+        array = _array(data, mapping, name.upper())
+        if array.size != shape[0] * shape[1] or (array.ndim == 2 and 1 not in shape and array.shape != shape):
+            raise IdentificationError(f"shape {array.shape}", field=name.upper(), allowed=f"{shape}")
+        matrices[name] = array.reshape(shape)  # file readers drop dimensions of size one
     rate_hz = mapping.sample_rate_hz
     if mapping.sample_rate is not None:
         rate_hz = float(np.asarray(value_at(data, mapping.sample_rate, "sample_rate"), dtype=float).ravel()[0])
@@ -85,13 +84,6 @@ def _array(data: Any, mapping: PnlssMapping, name: str) -> Float:
         return np.asarray(value_at(data, where, name), dtype=np.float64)
     except (TypeError, ValueError):
         raise IdentificationError(f"{where}: holds no real numbers") from None
-
-
-def _shaped(array: Float, name: str, shape: tuple[int, int]) -> Float:
-    """Return the array in ``shape``, with the dimensions of size one that file readers drop."""
-    if array.size != shape[0] * shape[1] or (array.ndim == 2 and 1 not in shape and array.shape != shape):
-        raise IdentificationError(f"shape {array.shape}", field=name, allowed=f"{shape}")
-    return array.reshape(shape)
 
 
 def _powers(data: Any, mapping: PnlssMapping, name: str, variables: int) -> NDArray[np.int64]:

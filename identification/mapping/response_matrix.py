@@ -12,9 +12,9 @@ from identification.mapping.base import (
     ComplexPaths,
     MappingTable,
     Path,
+    SpectrumMapping,
     complex_at,
     in_si,
-    numbers,
     value_at,
 )
 
@@ -30,22 +30,12 @@ class PathMapping(MappingTable):
     """Path of complex numbers, or paths of their parts; in the output's unit over the input's unit."""
 
 
-class ResponseMatrixMapping(MappingTable):
+class ResponseMatrixMapping(SpectrumMapping):
     """Where frequency responses are in the data and what they mean."""
 
     kind: Literal["frequency-response-matrix"]
-    specimen: str = ""
-    """Name of what was tested."""
-    source: str = ""
-    """Where the data comes from; for information only."""
     estimator: str = "imported"
     """How the responses were estimated: ``H1``, ``H2`` ..."""
-    frequency: Path
-    """Path of the frequencies."""
-    frequency_unit: Literal["Hz", "rad/s"] = "Hz"
-    """Unit of the frequencies."""
-    sense: Literal["exp(+iwt)", "exp(-iwt)"] = "exp(+iwt)"
-    """Convention of the stored responses; with ``exp(+iwt)`` a displacement that lags the force has a negative argument."""
     outputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
     """The responding channels."""
     inputs: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
@@ -61,7 +51,7 @@ def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyR
 
     Raises `IdentificationError` if a path does not exist, shapes or numbers do not fit, or a response is missing.
     """
-    frequency = np.asarray(numbers(value_at(data, mapping.frequency, "frequency"), 1, "frequency"), dtype=np.float64)
+    frequency = mapping.frequency_hz(data)
     outputs, out_factors = in_si(mapping.outputs)
     inputs, in_factors = in_si(mapping.inputs)
     value = (
@@ -71,7 +61,7 @@ def map_response_matrix(data: Any, mapping: ResponseMatrixMapping) -> FrequencyR
     return FrequencyResponseMatrix(
         outputs=outputs,
         inputs=inputs,
-        frequency_hz=frequency / (1.0 if mapping.frequency_unit == "Hz" else 2.0 * np.pi),
+        frequency_hz=frequency,
         value=value if mapping.sense == "exp(+iwt)" else np.conj(value),
         estimator=mapping.estimator,
         specimen=mapping.specimen,

@@ -1,18 +1,42 @@
 """Sample rate of data that a mapping describes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.mapping.base import numbers, value_at
+from identification.mapping.base import ChannelMapping, Path, numbers, value_at
 
 _SAME = 1e-6
 """Largest relative difference of sample rates that count as one."""
 _UNEVEN = 1e-3
 """Largest difference of a step from the mean step."""
+
+
+class SignalMapping(ChannelMapping):
+    """A channel and its samples."""
+
+    value: Path
+    """Path of the samples; columns of a matrix are records."""
+
+
+def stored_records(entry: Any, channels: Sequence[SignalMapping], where: str) -> list[NDArray[np.float64]]:
+    """Return one array float[n_channels, n] per column of the stored signals."""
+    signals = [
+        numbers(value_at(entry, c.value, f"{where}channels.{c.name}"), 2, f"{where}channels.{c.name}") for c in channels
+    ]
+    if len({signal.shape for signal in signals}) > 1:
+        shapes = ", ".join(f"{c.name} {signal.shape}" for c, signal in zip(channels, signals, strict=True))
+        raise IdentificationError(f"unequal lengths ({shapes})", where=where, field="channels")
+    return [np.array([s[:, column] for s in signals], dtype=np.float64) for column in range(signals[0].shape[1])]
+
+
+def rate_of_file_hz(data: Any) -> float | None:
+    """Return the sample rate that the file itself states; None if it does not."""
+    rate = data.get("sample_rate_hz") if isinstance(data, Mapping) else None
+    return rate if isinstance(rate, float) else None
 
 
 def instants_at(data: Any, path: str) -> tuple[float, float]:

@@ -18,10 +18,6 @@ class Series:
     values: Float
     period_samples: int
 
-    def at(self, values: Float) -> "Series":
-        """Return it with other values."""
-        return Series(values, self.period_samples)
-
 
 def series(value: Any, axes: Sequence[str], index: int, where: str) -> Series:
     """Return the samples of a channel in a stored array whose dimensions are ``axes``.

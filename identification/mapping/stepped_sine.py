@@ -15,11 +15,17 @@ from pydantic import Field
 from identification.channels import MOTION_ORDER, MOTION_UNIT, Motion
 from identification.errors import IdentificationError
 from identification.frequency_responses import Controlled, FrequencyResponse
-from identification.mapping.base import MappingTable, Path, as_levels, numbers, value_at
+from identification.mapping.base import (
+    MappingTable,
+    MeasurementMapping,
+    Path,
+    Positive,
+    as_levels,
+    numbers,
+    value_at,
+)
 from identification.mapping.units import si_of
 from vibrolock.arrays import Complex
-
-PositiveFloat = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 _FREQUENCY: dict[str, float] = {"Hz": 1.0, "rad/s": 1.0 / (2.0 * np.pi)}
 _MOTION: dict[str, Motion] = {unit: motion for motion, unit in MOTION_UNIT.items()}
@@ -69,20 +75,16 @@ class LevelSet(MappingTable):
     """Path of the phases between force and response."""
     controlled: Controlled
     """Quantity that the controller held constant."""
-    level_values: tuple[PositiveFloat, ...] = ()
+    level_values: tuple[Positive, ...] = ()
     """Nominal value of each level, in the unit of the controlled quantity; if left out, the median of the measured values."""
     label: str = "{value:g} {unit}"
     """Name of each level; ``{value}``, ``{unit}`` (SI, peak) and ``{number}`` (from 1) are filled in."""
 
 
-class FrequencyResponseMapping(MappingTable):
+class FrequencyResponseMapping(MeasurementMapping):
     """The whole mapping: where values are in the file and what they mean."""
 
     kind: Literal["frequency-responses"] = "frequency-responses"
-    specimen: str = ""
-    """Name of what was tested."""
-    source: str = ""
-    """Where the data comes from; for information only."""
     units: Units
     """Units of the stored numbers."""
     phase: PhaseConvention | None = None
@@ -128,24 +130,24 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
 def _levels(data: Any, group: LevelSet, where: str) -> Sequence[dict[str, NDArray[Any]]]:
     paths = {name: getattr(group, name) for name in ("frequency", "force", "response", "phase")}
     paths = {name: path for name, path in paths.items() if path is not None}
+
+    def arrays(entry: Any, ndim: int, level: str) -> dict[str, NDArray[Any]]:
+        told = {name: f"{where}.{name}{level}" for name in paths}
+        return {
+            name: numbers(value_at(entry, path, told[name]), ndim, f"{told[name]} '{path}'")
+            for name, path in paths.items()
+        }
+
     if group.levels is not None:
         entries = as_levels(value_at(data, group.levels, f"{where}.levels"), f"{where}.levels '{group.levels}'")
-        return [
-            {name: _stored(entry, path, 1, f"{where}.{name}, level {k + 1}") for name, path in paths.items()}
-            for k, entry in enumerate(entries)
-        ]
-    stored = {name: _stored(data, path, 2, f"{where}.{name}") for name, path in paths.items()}
+        return [arrays(entry, 1, f", level {k}") for k, entry in enumerate(entries, 1)]
+    stored = arrays(data, 2, "")
     columns = {array.shape[1] for array in stored.values()} - {1}
     if len(columns) > 1:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in stored.items())
         raise IdentificationError(f"{where}: arrays have different numbers of columns ({shapes})")
     count = columns.pop() if columns else 1
     return [{name: array[:, min(k, array.shape[1] - 1)] for name, array in stored.items()} for k in range(count)]
-
-
-def _stored(data: Any, path: str, ndim: int, where: str) -> NDArray[Any]:
-    """Return the numbers at ``path`` as a vector (``ndim`` 1) or a matrix with one column per level (2)."""
-    return numbers(value_at(data, path, where), ndim, f"{where} '{path}'")
 
 
 def _response(

@@ -5,18 +5,29 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from identification.mapping.base import ChannelMapping, MappingTable, Path
-from identification.mapping.csv_layout import CsvLayout
+from identification.mapping.base import MappingTable, MeasurementMapping, NotNegative, Path, Positive, check_names
+from identification.mapping.sampling import SignalMapping
 from vibrolock.errors import InputError
 
 Axis = Literal["sample", "channel", "period", "realisation", "level"]
 Count = Annotated[int, Field(ge=0)]
-Seconds = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Hertz = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class SampledChannel(ChannelMapping):
+class CsvLayout(MappingTable):
+    """How a table of numbers is written in a CSV file that does not begin with one line of names."""
+
+    skip_lines: Count = 0
+    """Lines at the beginning that are no part of the table."""
+    names: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """Names of the columns; if left out, they are in the first line that is not skipped."""
+    separator: Literal[",", ";", "\t", " "] | None = None
+    """What separates columns (a space: any number of them); if left out, comma, semicolon or tab, whichever is commonest."""
+    decimal: Literal[".", ","] = "."
+    """Decimal point or comma."""
+
+
+class SampledChannel(SignalMapping):
     """A channel, where its samples are, and what their numbers mean."""
 
     value: Path
@@ -52,11 +63,11 @@ class Stretch(MappingTable):
 
     start_samples: Count | None = None
     """Number of samples before it."""
-    start_s: Seconds | None = None
+    start_s: NotNegative | None = None
     """Time before it; in place of ``start_samples``."""
     samples: Annotated[int, Field(ge=2)] | None = None
     """Number of samples; to the end if left out."""
-    duration_s: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] | None = None
+    duration_s: Positive | None = None
     """Duration; in place of ``samples``."""
     repeat: Annotated[int, Field(ge=1, le=100_000)] = 1
     """Number of stretches of this length."""
@@ -75,16 +86,12 @@ class Stretch(MappingTable):
         return self
 
 
-class TimeDataMapping(MappingTable):
+class TimeDataMapping(MeasurementMapping):
     """Where the samples are in the data, and which records they are."""
 
     kind: Literal["time-data"]
     """Kind of the mapping."""
-    specimen: str = ""
-    """Name of what was tested."""
-    source: str = ""
-    """Where the data comes from; for information only."""
-    sample_rate_hz: Hertz | None = None
+    sample_rate_hz: Positive | None = None
     """Samples per second; if left out, taken from ``time`` or from the file."""
     time: Path | None = None
     """Path of the instants in seconds."""
@@ -104,16 +111,16 @@ class TimeDataMapping(MappingTable):
     length of the axis ``sample``."""
     transient_periods: Count = 0
     """Number of periods to discard at the beginning of each record."""
-    ahead_periods: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+    ahead_periods: NotNegative | None = None
     """Periods put ahead of each record when a model is simulated from rest, in which its transient decays; if left out,
     ``transient_periods``, at least 1."""
     at_rest: bool = False
     """Whether records that are not periodic begin at rest."""
-    lowest_hz: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+    lowest_hz: NotNegative | None = None
     """Lowest excited frequency; left out if unknown."""
-    highest_hz: Hertz | None = None
+    highest_hz: Positive | None = None
     """Highest excited frequency; left out if unknown."""
-    new_rate_hz: Hertz | None = None
+    new_rate_hz: Positive | None = None
     """Lower sample rate to which the records are filtered and decimated; left out, they keep theirs."""
     instrument: str = ""
     """Name of a noise-free channel, such as the voltage of the generator, for frequency responses; the force if left out."""
@@ -125,9 +132,8 @@ class TimeDataMapping(MappingTable):
     @model_validator(mode="after")
     def _fits(self) -> "TimeDataMapping":
         check_axes(self.axes)
+        check_names(self.channels)
         names = [channel.name for channel in self.channels]
-        if twice := next((name for name in names if names.count(name) > 1), None):
-            raise InputError(f"'{twice}' is the name of two", field="channels", hint="names must differ")
         if self.instrument and self.instrument not in names:
             raise InputError(field="instrument", value=self.instrument, allowed=names)
         if (self.lowest_hz is None) != (self.highest_hz is None):

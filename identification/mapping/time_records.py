@@ -10,8 +10,8 @@ from identification.errors import IdentificationError
 from identification.experiments.periodicity import check_periods, period_remark
 from identification.experiments.time_experiments import resampled_periods
 from identification.experiments.time_records import TimeRecord, TimeRecords
-from identification.mapping.base import as_levels, in_si, value_at
-from identification.mapping.sampling import common_rate_hz, instants_at
+from identification.mapping.base import entries_at, in_si, value_at
+from identification.mapping.sampling import common_rate_hz, instants_at, rate_of_file_hz
 from identification.mapping.series import common_length, series
 from identification.mapping.time_data import SampledChannel, Stretch, TimeDataMapping
 from identification.signals.decimation import EDGE_SAMPLES, decimated
@@ -46,7 +46,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         are NaN, no whole period or sample is left, or periods of the input differ.
     """
     every = {"": data, **(files or {})}
-    entries = {name: _entries(one, mapping) for name, one in every.items()}
+    entries = {name: entries_at(one, mapping.records, "records") for name, one in every.items()}
     counts = {name: len(some) for name, some in entries.items()}
     if len(set(counts.values())) > 1:
         told = ", ".join(f"{name or 'the file'} {count}" for name, count in counts.items())
@@ -68,7 +68,7 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
         cut = _grouped(cut, force[0], mapping.levels)
     ahead = max(mapping.transient_periods, 1) if mapping.ahead_periods is None else mapping.ahead_periods
     new_rate = rate if mapping.new_rate_hz is None else mapping.new_rate_hz
-    size = _period(cut, mapping, new_rate / rate) if mapping.is_periodic else 0
+    size = round(cut[0].period_samples * (new_rate / rate)) if mapping.is_periodic else 0
     bottom, top = mapping.lowest_hz, mapping.highest_hz
     records = _named(cut, mapping, force, unit)
     levels = {one.level for one in records}
@@ -104,12 +104,6 @@ class _Raw:
     level: float | None = None
 
 
-def _entries(data: Any, mapping: TimeDataMapping) -> Sequence[Any]:
-    if mapping.records is None:
-        return [data]
-    return as_levels(value_at(data, mapping.records, "records"), f"records '{mapping.records}'")
-
-
 def _raw_records(
     entries: Mapping[str, Any], files: Mapping[str, Any], mapping: TimeDataMapping, where: str
 ) -> list[_Raw]:
@@ -122,7 +116,7 @@ def _raw_records(
             value_at(entries[channel.file], channel.value, label), mapping.axes_of(channel), channel.index, label
         )
         offset = 0.0 if channel.offset == "mean" else channel.offset
-        found.append(stored.at((stored.values - offset) * (channel.scale * factor)))
+        found.append(replace(stored, values=(stored.values - offset) * (channel.scale * factor)))
         rates, start = _sampling(entries[channel.file], files[channel.file], mapping, channel)
         told |= rates
         starts.append(start)
@@ -153,8 +147,7 @@ def _sampling(
     start = 0.0
     of_file = channel.file or "file"
     if isinstance(file, Mapping):
-        if isinstance(rate := file.get("sample_rate_hz"), float):
-            told[of_file] = rate
+        told[of_file] = rate_of_file_hz(file)
         rates, starts = file.get("__rates_hz__"), file.get("__starts_s__")
         if isinstance(rates, Mapping) and isinstance(rate := rates.get(channel.value), float):
             told[f"{of_file} ({channel.value})"] = rate
@@ -207,7 +200,7 @@ def _cut(raw: Sequence[_Raw], mapping: TimeDataMapping, rate_hz: float) -> tuple
                     samples[:, begin:end], one.period_samples, mapping.transient_periods, number
                 )
                 left = max(left, rest)
-                part = _resampled(part, one.period_samples, rate_hz, rate_hz * ratio)
+                part = resampled_periods(part, one.period_samples, rate_hz, rate_hz * ratio).reshape(len(part), -1)
             else:
                 low, high = (max(int(np.ceil(at * ratio - first - 1e-9)), 0) for at in (begin, end))
                 part = samples[:, low:high]
@@ -258,14 +251,6 @@ def _whole_periods(samples: Float, size: int, transient: int, number: int) -> tu
             "after the transient"
         )
     return samples[:, transient * size : periods * size].copy(), rest
-
-
-def _resampled(part: Float, size: int, rate_hz: float, new_hz: float) -> Float:
-    return resampled_periods(part, size, rate_hz, new_hz).reshape(len(part), -1)
-
-
-def _period(cut: Sequence[_Raw], mapping: TimeDataMapping, ratio: float) -> int:
-    return round(cut[0].period_samples * ratio)
 
 
 def _grouped(cut: Sequence[_Raw], force: int, levels: Sequence[float] | None) -> list[_Raw]:

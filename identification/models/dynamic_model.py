@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
 from identification.experiments.experiment import Experiment
-from identification.experiments.simulators import CoupledSimulation, SimulatedMotion
+from identification.experiments.simulation import Simulation
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import HarmonicResponse, SteadyStates
 from identification.linear.modes import LinearModes
@@ -102,15 +102,15 @@ class DynamicModel(ABC):
         """Return the response with all harmonics."""
         raise self.cannot("predict harmonics", "frequency_response gives the fundamentals")
 
-    def simulate(self, inputs: ArrayLike) -> SimulatedMotion:
+    def simulate(self, inputs: ArrayLike) -> Simulation:
         """Return the run from rest under ``inputs``, float[n_inputs, n]."""
         raise self.cannot("be simulated over time", "predict_sweep predicts its response to a sweep")
 
-    def simulate_experiment(self, experiment: Experiment, initial_state: Float | None = None) -> SimulatedMotion:
+    def simulate_experiment(self, experiment: Experiment, initial_state: Float | None = None) -> Simulation:
         """Return the run under the inputs of an experiment, begun as the experiment and the model require."""
         raise self.cannot("be simulated over time", "predict_sweep predicts its response to a sweep")
 
-    def coupled_run(self, exciter: Exciter, voltage_v: ArrayLike, lowest_hz: float | None) -> CoupledSimulation:
+    def coupled_run(self, exciter: Exciter, voltage_v: ArrayLike, lowest_hz: float | None) -> Simulation:
         """Return the run with the exciter at the force, from a recorded voltage."""
         raise self.cannot("be simulated over time", "predict_sweep predicts its response to a sweep")
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
-from identification.experiments.simulators import CoupledSimulation
+from identification.experiments.simulation import Simulation
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import HarmonicResponse, SteadyStates
 from identification.linear.modes import LinearModes
@@ -291,9 +291,7 @@ def backbone(
     return found.backbone(request, near_hz)
 
 
-def coupled_run(
-    model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None
-) -> CoupledSimulation:
+def coupled_run(model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None) -> Simulation:
     """Simulate a model with the exciter at its force input, both from rest, under a recorded voltage.
 
     Parameters

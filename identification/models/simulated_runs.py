@@ -7,7 +7,8 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.experiments.checks import check_not_zero
 from identification.experiments.experiment import Experiment
-from identification.experiments.simulators import SimulatedMotion, Simulator, simulated
+from identification.experiments.simulation import Simulation
+from identification.experiments.simulators import Simulator, simulated
 from identification.models.kinds import dynamic_model, has_kind
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 from vibrolock.arrays import Float
@@ -101,7 +102,7 @@ def output_stretch(
     )
 
 
-def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None = None) -> SimulatedMotion:
+def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None = None) -> Simulation:
     """Return the run under the inputs of an experiment, which begins as the experiment and the model require.
 
     Raises `IdentificationError` if channels or sample rates differ, or the model cannot begin as the experiment does.

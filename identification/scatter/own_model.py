@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.channels import Channel
 from identification.experiments.experiment import Experiment
-from identification.experiments.simulators import SimulatedMotion
+from identification.experiments.simulation import Simulation
 from identification.models.simulated_runs import run_of
 from identification.scatter.own_shifts import own_shift
 from identification.scatter.run_scatter import RunScatter
@@ -41,11 +41,11 @@ class OwnModel:
         """Sample rate of inputs and outputs."""
         return self.model.sample_rate_hz
 
-    def simulate(self, inputs: Any, /) -> SimulatedMotion:
+    def simulate(self, inputs: Any, /) -> Simulation:
         """Return the run from rest under ``inputs``, float[n_inputs, n]."""
         return self.model.simulate(inputs)
 
-    def simulate_experiment(self, experiment: Experiment) -> SimulatedMotion:
+    def simulate_experiment(self, experiment: Experiment) -> Simulation:
         """Return the run under the inputs of an experiment, with its own shifts."""
         return run_of(self.of([experiment]), experiment)
 

@@ -66,7 +66,7 @@ def _others(item: Contents) -> dict[str, object]:
 def columns_in(path: Path, layout: Mapping[str, object] | None = None) -> FileData:
     """Return the columns of any CSV file by name, and their units where a line after the names has them.
 
-    ``layout`` holds the keys of a `identification.mapping.csv_layout.CsvLayout`. Raises `ImportFailed`.
+    ``layout`` holds the keys of a `identification.mapping.CsvLayout`. Raises `ImportFailed`.
     """
     from identification.mapping import CsvLayout
 

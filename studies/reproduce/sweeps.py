@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification import Exciter, Experiment, coupled_run
+from identification import Exciter, Experiment, Simulation, coupled_run
 from identification.common import find_role
-from identification.experiments import SimulatedMotion
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.results.simulated.driven_models import DrivenModel
@@ -102,7 +101,7 @@ def _simulated(
     experiment: Experiment,
     exciter: Exciter | None = None,
 ) -> SweepResult:
-    run: SimulatedMotion
+    run: Simulation
     if exciter is None:
         run = model.simulate(experiment.inputs)
     else:

@@ -9,7 +9,8 @@ from identification.errors import IdentificationError
 from identification.experiments.checks import belongs
 from identification.experiments.errors import PnlssErrors, errors_of
 from identification.experiments.experiment import Experiment
-from identification.experiments.simulators import SimulatedMotion, Simulator, simulated
+from identification.experiments.simulation import Simulation
+from identification.experiments.simulators import Simulator, simulated
 from identification.models.pnlss.fitting.initial_states import SAMPLES, fitted_initial_state
 from identification.models.pnlss.fitting.parameters import Parameters
 from identification.models.pnlss.fitting.records import records_of
@@ -31,7 +32,7 @@ def pnlss_errors(
     output is zero where it counts.
     """
 
-    def simulate(experiment: Experiment) -> SimulatedMotion:
+    def simulate(experiment: Experiment) -> Simulation:
         if isinstance(model, PnlssModel) and experiment.initial_state == "estimated":
             begin = estimated_initial_state(model, experiment, samples=samples)
             return model.simulate(experiment.inputs, initial_state=begin)

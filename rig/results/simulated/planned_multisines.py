@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from identification import Exciter, PnlssModel, SimulatedRun, coupled_run
-from identification.experiments import SimulatedMotion
+from identification import Exciter, PnlssModel, SimulatedRun, Simulation, coupled_run
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.plans import bench_of, load_plan
@@ -82,7 +81,7 @@ def _period(plan: MultisinePlan, bench: Bench, index: int, samples: int) -> Floa
 
 def _run(
     model: DrivenModel, exciter: Exciter | None, constants: Mapping[str, float], voltage_v: Float, lowest_hz: float
-) -> SimulatedMotion:
+) -> Simulation:
     if exciter is None:
         return model.simulate(all_inputs(model, voltage_v[None], constants))
     lowest = _LOWEST * lowest_hz

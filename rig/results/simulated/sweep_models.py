@@ -10,13 +10,13 @@ from identification import (
     Exciter,
     IdentificationError,
     PnlssModel,
+    Simulation,
     SweepPrediction,
     Transient,
     coupled_run,
     demodulate,
 )
 from identification.common import MOTION_ORDER, find_role
-from identification.experiments import SimulatedMotion
 from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.results.simulated.constants import all_inputs, driving
 from rig.results.simulated.driven_models import DrivenModel
@@ -98,7 +98,7 @@ class SimulatedSweepModels:
             unbounded_at_s=unbounded_at_s,
         )
 
-    def _simulated(self, given: SweepGiven) -> tuple[Float, Channel, SimulatedMotion, list[str]]:
+    def _simulated(self, given: SweepGiven) -> tuple[Float, Channel, Simulation, list[str]]:
         """Return the force at the drive point (imposed or predicted), its channel, the run, and notes."""
         model = self.model
         channels = {channel.role: (row, channel) for row, channel in enumerate(model.outputs)}
@@ -110,7 +110,7 @@ class SimulatedSweepModels:
             coupled = coupled_run(model, self.exciter, given.inputs[0], lowest_hz=lowest)
             source = self.exciter.source
             return coupled.force_n, channel, coupled, [f"holds for the exciter of {source} alone", *coupled.notes]
-        run: SimulatedMotion
+        run: Simulation
         inputs = all_inputs(model, given.inputs, self.constants)
         if isinstance(model, PnlssModel):
             run = model.simulate(inputs, initial_state=given.initial_state)
