@@ -16,6 +16,9 @@ from vibrolock.results import Result
 class Backbone(Result):
     """Settled periodic states near phase resonance, in the order they were measured.
 
+    Raises `IdentificationError` if there are no points, if their channels or numbers of harmonics differ, if the
+    labels do not match the points, or if the mode shape or its standard error is not a number that is allowed.
+
     Parameters
     ----------
     points
@@ -32,12 +35,6 @@ class Backbone(Result):
         Standard error of ``drive_mode_shape``, kg^-1/2, the same error at all points; None if unknown.
     drive_mode_shape_source
         Where ``drive_mode_shape`` comes from, in words; empty if it was not noted.
-
-    Raises
-    ------
-    IdentificationError
-        If there are no points, if their channels or numbers of harmonics differ, if the labels do not match the points, or if
-        the mode shape or its standard error is not a number that is allowed.
     """
 
     points: tuple[PeriodicVibration, ...]

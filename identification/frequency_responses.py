@@ -20,6 +20,9 @@ Controlled = Literal["force", "response", "voltage", "none"]
 class FrequencyResponse(Result):
     """Stepped-sine response at one level; fundamental harmonics only.
 
+    Raises `IdentificationError` if values are NaN or infinite, shapes differ, there are no points, a kind is unknown,
+    or a force or response is zero.
+
     Parameters
     ----------
     frequency_hz
@@ -38,11 +41,6 @@ class FrequencyResponse(Result):
         Name of the level.
     specimen
         Name of what was tested.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, shapes differ, there are no points, a kind is unknown, or a force or response is zero.
     """
 
     frequency_hz: Float

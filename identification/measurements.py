@@ -24,6 +24,9 @@ def wrapped_deg(angle_deg: float) -> float:
 class PeriodicVibration:
     """One settled periodic state.
 
+    Raises `IdentificationError` if values are NaN or infinite, shapes do not agree, roles are missing, or there is no
+    whole period.
+
     Parameters
     ----------
     channels
@@ -51,11 +54,6 @@ class PeriodicVibration:
         Whether the controller had settled before the record began.
     warnings
         Warnings about the record, one line each.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, shapes do not agree, roles are missing, or there is no whole period.
     """
 
     channels: tuple[Channel, ...]

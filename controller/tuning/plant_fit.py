@@ -49,11 +49,8 @@ def fitted(
     of the mode, increased where the model fits worse than the noise explains (`controller.tuning.plant_errors`). Without it
     the noise is taken from the residuals.
 
-    Raises
-    ------
-    ValueError
-        If the FRFs or their covariance are not finite, differ in length, have too few lines, or show no resonance of the
-        structure.
+    Raises `ValueError` if the FRFs or their covariance are not finite, differ in length, have too few lines, or show
+    no resonance of the structure.
     """
     from scipy.optimize import least_squares
 

@@ -30,6 +30,9 @@ def continued(
 ) -> Path:
     """Follow the curve of solutions through a point.
 
+    Raises `IdentificationError` if there is no solution near the first point, or if the parameter begins outside its
+    range.
+
     Parameters
     ----------
     system
@@ -51,11 +54,6 @@ def continued(
     stop
         Called with the unknowns and the parameter at every point, including the first and the last. A text that is not empty
         ends the path there and becomes its ``reason``.
-
-    Raises
-    ------
-    IdentificationError
-        If there is no solution near the first point, or if the parameter begins outside its range.
     """
     allowed, z = steps or Steps(), np.array(finite_array("unknowns", unknowns, np.float64, 1))
     if not lowest <= parameter <= highest:

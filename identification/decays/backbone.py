@@ -47,6 +47,9 @@ def decay_backbone(
 ) -> DecayBackbone:
     """Identify modal frequency and damping over the amplitude from a free decay.
 
+    Raises `IdentificationError` if values are NaN or infinite, shapes differ, there is no motion, a named mode is not
+    found or cannot be told from a neighbour or from a harmonic of another mode, or the decay is too short.
+
     Parameters
     ----------
     samples
@@ -78,12 +81,6 @@ def decay_backbone(
     DecayBackbone
         One mode for each frequency. All channels of the kind of motion of the reference (the drive point, or the channel
         with the least noise) contribute to the rates, weighted by their noise.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, shapes differ, there is no motion, a named mode is not found or cannot be told from a
-        neighbour or from a harmonic of another mode, or the decay is too short.
     """
     channels = tuple(channels)
     data = finite_array("samples", samples, np.float64, 2)

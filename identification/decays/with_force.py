@@ -62,6 +62,9 @@ def decay_with_force(
 ) -> DecayMode:
     """Return the properties of the mode without the exciter, from the slow flow of its decay.
 
+    Raises `IdentificationError` if too few instants are above the noise, or the noise leaves the damping unknown at
+    every level.
+
     Parameters
     ----------
     flow
@@ -76,11 +79,6 @@ def decay_with_force(
         Standard error of the slow flow's mode shape, kg^-1/2; it counts among the systematic errors.
     residual_std_m_n
         Standard error of the slow flow's receptance of the other modes, m/N; likewise.
-
-    Raises
-    ------
-    IdentificationError
-        If too few instants are above the noise, or the noise leaves the damping unknown at every level.
     """
     quiet = _quiet(flow)
     decay = _decay(flow, start_s, stop_s, quiet)

@@ -19,6 +19,9 @@ InitialState = Literal["zero", "estimated"]
 class Experiment:
     """One record of inputs and outputs.
 
+    Raises `IdentificationError` if values are NaN or infinite, shapes do not agree, no sample counts, or the counted
+    part is not whole periods.
+
     Parameters
     ----------
     inputs, outputs
@@ -47,11 +50,6 @@ class Experiment:
     output_noise
         float[n_outputs, n_lines], standard errors of the amplitudes (peak) of the outputs' lines 1, 2, ... below half the
         sample rate, from the scatter of periods that were averaged; None if unknown.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, shapes do not agree, no sample counts, or the counted part is not whole periods.
     """
 
     inputs: Float

@@ -59,6 +59,9 @@ def time_experiments(
 ) -> tuple[Experiment, ...]:
     """Return one experiment for each record, in their order. The band of periodic records, if unknown, is that of their inputs.
 
+    Raises `IdentificationError` if a channel does not exist, the rate does not fit, a record is too short for it, or
+    has no such periods.
+
     Parameters
     ----------
     records
@@ -67,11 +70,6 @@ def time_experiments(
         Names or roles of channels. Without ``outputs``: all motions, and the force if it is not an input.
     rate_hz
         Sample rate of the experiments, at most that of the records; by default `suitable_rate_hz`.
-
-    Raises
-    ------
-    IdentificationError
-        If a channel does not exist, the rate does not fit, a record is too short for it, or has no such periods.
     """
     into, out = chosen_rows(records.channels, inputs, outputs)
     check_periods(records)

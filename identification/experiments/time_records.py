@@ -55,6 +55,9 @@ def _upgrade(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> Non
 class TimeRecords(Result):
     """Evenly sampled records of the same channels at one sample rate.
 
+    Raises `IdentificationError` if shapes do not agree, a record is no whole number of periods, names are used twice
+    or an instrument does not exist.
+
     Parameters
     ----------
     channels
@@ -79,11 +82,6 @@ class TimeRecords(Result):
         Where the data comes from.
     notes
         Remarks for the user, one line each.
-
-    Raises
-    ------
-    IdentificationError
-        If shapes do not agree, a record is no whole number of periods, names are used twice or an instrument does not exist.
     """
 
     channels: tuple[Channel, ...]

@@ -22,6 +22,9 @@ _EXCITED = 1e-2
 def time_responses(records: TimeRecords, *, estimator: Estimator = "instrument") -> FrequencyResponseMatrix:
     """Return the frequency responses from the force to every motion, with their covariance.
 
+    Raises `IdentificationError` without exactly one force, without a motion, or if the records are too short or no
+    line is excited.
+
     Parameters
     ----------
     records
@@ -29,11 +32,6 @@ def time_responses(records: TimeRecords, *, estimator: Estimator = "instrument")
     estimator
         Of periodic records: ``instrument``, which is H1 if there is no instrument, ``H1`` or ``H2``. Others are evaluated by a
         regression (`identification.linear.auto_regression`), whatever the estimator.
-
-    Raises
-    ------
-    IdentificationError
-        Without exactly one force, without a motion, or if the records are too short or no line is excited.
     """
     find_role(records.channels, "force")
     if records.period_samples:

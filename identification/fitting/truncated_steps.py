@@ -14,6 +14,8 @@ class TruncatedSteps:
     D^2 is the diagonal of H, so that the step does not depend on units or on the degrees of monomials; w_max is the largest
     eigenvalue of ``D^-1 H D^-1``. Eigenvalues below ``truncation w_max`` are left out, which a factorisation could not do.
 
+    Raises `numpy.linalg.LinAlgError` if the decomposition does not converge.
+
     Parameters
     ----------
     hessian, gradient
@@ -24,11 +26,6 @@ class TruncatedSteps:
         Cost there.
     truncation
         Smallest eigenvalue that is kept, relative to the largest.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the decomposition does not converge.
     """
 
     def __init__(self, hessian: Float, gradient: Float, vector: Float, cost: float, truncation: float) -> None:

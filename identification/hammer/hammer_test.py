@@ -46,6 +46,9 @@ def hammer_test(
 ) -> HammerTest:
     """Evaluate a hammer test: find the hits, leave out the faulty ones, apply windows, estimate frequency responses.
 
+    Raises `IdentificationError` if there is no hit or fewer than two hits count, lines are missing, or a value is out
+    of its range.
+
     Parameters
     ----------
     records
@@ -74,11 +77,6 @@ def hammer_test(
         Band of the lines; None: from the second line to where the spectrum of the force has fallen by 20 dB.
     specimen
         Name for the result.
-
-    Raises
-    ------
-    IdentificationError
-        If there is no hit or fewer than two hits count, lines are missing, or a value is out of its range.
     """
     channels, rate = tuple(channels), positive("sample_rate_hz", sample_rate_hz, "Hz")
     force = find_role(channels, "force")

@@ -45,6 +45,8 @@ class Hit:
 class HammerTest(Result):
     """Result of a hammer test.
 
+    Raises `IdentificationError` if shapes do not agree or values are not finite.
+
     Parameters
     ----------
     channels
@@ -61,11 +63,6 @@ class HammerTest(Result):
         float[n_lines, n_outputs], in [0, 1], over the hits that count.
     force_n_s
         float[n_lines], RMS over the hits of the modulus of the force's transform.
-
-    Raises
-    ------
-    IdentificationError
-        If shapes do not agree or values are not finite.
     """
 
     channels: tuple[Channel, ...]

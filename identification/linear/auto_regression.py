@@ -164,6 +164,8 @@ def regressed_responses(
 ) -> FrequencyResponseMatrix:
     """Return the frequency responses of records that need not be periodic, with their covariance.
 
+    Raises `IdentificationError` if the records are too short, a channel is dead, or the band has no width.
+
     Parameters
     ----------
     records
@@ -178,11 +180,6 @@ def regressed_responses(
         Weight of each record; 1 if empty.
     specimen
         Name of what was tested.
-
-    Raises
-    ------
-    IdentificationError
-        If the records are too short, a channel is dead, or the band has no width.
     """
     found = auto_regression(records, weights)
     low, high = _excited_band(records, sample_rate_hz) if band_hz is None else band_hz

@@ -34,6 +34,9 @@ def extrapolated_to_zero(
     Frequencies, damping ratios and shapes are fitted by straight lines over ``force_rms_n ** exponent``, each weighted by its
     standard errors. The residual terms of the lowest level are kept.
 
+    Raises `IdentificationError` if levels are unknown or too close, channels differ, no mode is common to all levels,
+    or exponents are not above zero.
+
     Parameters
     ----------
     low, high, further
@@ -42,11 +45,6 @@ def extrapolated_to_zero(
         Power of the force in which properties are linear; 2 for smooth elements. If the lowest and the highest possible power
         are given, the result is the mean of both extrapolations, and their difference d adds d^2 / 12 to the variance (a
         range of equally likely values).
-
-    Raises
-    ------
-    IdentificationError
-        If levels are unknown or too close, channels differ, no mode is common to all levels, or exponents are not above zero.
     """
     models = sorted((low, high, *further), key=lambda model: model.force_rms_n)
     force = np.array([model.force_rms_n for model in models])

@@ -68,6 +68,9 @@ def linear_modes(
     A frequency-domain subspace method of rising order gives the initial poles (`stabilisation`). A weighted least-squares fit
     of a modal model with residual terms gives the result. Shapes are mass-normalised by the residue at the drive point.
 
+    Raises `IdentificationError` without exactly one drive channel and one force, with too few lines, or where no mode
+    is found.
+
     Parameters
     ----------
     responses
@@ -92,11 +95,6 @@ def linear_modes(
         Orders of the stabilisation diagram.
     diagram
         The stabilisation diagram of these responses, if it is known already.
-
-    Raises
-    ------
-    IdentificationError
-        Without exactly one drive channel and one force, with too few lines, or where no mode is found.
     """
     find_role(responses.outputs, "drive")
     free, scatter = weighting == "auto", weighting == "total" and responses.total_covariance is None

@@ -37,6 +37,9 @@ _OPTIONAL = ("covariance", "residues", "small_terms")
 class LinearModes(Result):
     """Linear modes of a structure, lowest frequency first.
 
+    Raises `IdentificationError` if array shapes do not agree, there is not exactly one drive channel, or frequencies
+    are not positive and rising.
+
     Parameters
     ----------
     channels
@@ -74,11 +77,6 @@ class LinearModes(Result):
     force_unit
         Unit of the force: N, or V or 1 where there is no better one. ``force_rms_n``, shapes and residual terms are then in
         units with it in place of N.
-
-    Raises
-    ------
-    IdentificationError
-        If array shapes do not agree, there is not exactly one drive channel, or frequencies are not positive and rising.
     """
 
     channels: tuple[Channel, ...]

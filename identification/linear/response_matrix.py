@@ -17,6 +17,8 @@ from vibrolock.results import Result
 class FrequencyResponseMatrix(Result):
     """Frequency responses ``Y = H U`` line by line.
 
+    Raises `IdentificationError` if values are NaN or infinite, shapes do not agree, or frequencies do not rise.
+
     Parameters
     ----------
     outputs, inputs
@@ -42,11 +44,6 @@ class FrequencyResponseMatrix(Result):
         Name of what was tested.
     notes
         Remarks on the quality of the responses, one line each.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, shapes do not agree, or frequencies do not rise.
     """
 
     outputs: tuple[Channel, ...]

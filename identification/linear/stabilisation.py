@@ -109,6 +109,8 @@ def stabilisation(
     The bilinear map ``z = (1 + s/a) / (1 - s/a)`` spreads the band over the unit circle. Unlike sampling, it maps rational
     responses exactly to rational responses.
 
+    Raises `IdentificationError` if orders are not above zero or too high for the number of lines.
+
     Parameters
     ----------
     responses
@@ -121,11 +123,6 @@ def stabilisation(
         Largest relative difference of a stable pole from a pole of the order before.
     lowest_mac
         Least modal assurance criterion between the shapes of these two poles.
-
-    Raises
-    ------
-    IdentificationError
-        If orders are not above zero or too high for the number of lines.
     """
     weighting = first_weighting(responses, weighting)
     joint = driven_responses(responses, weighting) if is_driven(responses) else None

@@ -68,6 +68,9 @@ def fit_state_space(
 ) -> StateSpaceFit:
     """Fit a state-space model to frequency responses, starting from ``start`` and keeping its order.
 
+    Raises `IdentificationError` if the matrices of ``start`` do not match the responses, ``start`` is unstable, lines
+    are at or above half the sample rate, or there are fewer values than free parameters.
+
     Parameters
     ----------
     responses
@@ -81,12 +84,6 @@ def fit_state_space(
         (``auto``).
     iterations
         Largest number of iterations.
-
-    Raises
-    ------
-    IdentificationError
-        If the matrices of ``start`` do not match the responses, ``start`` is unstable, lines are at or above half the sample
-        rate, or there are fewer values than free parameters.
     """
     data = weighted_responses(responses, weighting)
     z = _points(responses, sample_rate_hz)

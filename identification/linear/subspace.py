@@ -125,6 +125,9 @@ def subspace(
 ) -> StateSpace:
     """Identify a discrete-time state-space model of given order from frequency responses, weighted by their covariance.
 
+    Raises `IdentificationError` if the order is below one, there are too few block rows or lines, or lines are at or
+    above half the sample rate.
+
     Parameters
     ----------
     responses
@@ -138,11 +141,6 @@ def subspace(
     weighting
         Covariance that weights the lines: ``total``, ``noise``, ``relative`` (none), or the first of these that is known
         (``auto``).
-
-    Raises
-    ------
-    IdentificationError
-        If the order is below one, there are too few block rows or lines, or lines are at or above half the sample rate.
     """
     IdentificationError.unless_at_least("order", order, 1)
     if responses.decay_rate_1_s:

@@ -39,18 +39,18 @@ def value_at(data: Any, path: str, where: str) -> Any:
         name, index = match.groups()
         here = f"'{walked}'" if walked else "the top"
         if name is None:
-            step, fits = int(index), _is_list(value)
-            missing, said = fits and step >= len(value), f"[{index}]"
+            fits, said = _is_list(value), f"[{index}]"
+            missing = fits and int(index) >= len(value)
             there = f"{len(value)} entries" if fits else ""
         else:
-            step, fits = name, isinstance(value, Mapping)
-            missing, said = fits and name not in value, f"'{name}'"
+            fits, said = isinstance(value, Mapping), f"'{name}'"
+            missing = fits and name not in value
             there = ", ".join(str(key) for key in value if not str(key).startswith("__")) if fits else ""
         if not fits:
             raise IdentificationError(f"{where}: path '{path}': {here} is {_kind(value)}, has no {said}")
         if missing:
             raise IdentificationError(f"{where}: path '{path}': no {said} at {here}, which has {there or 'nothing'}")
-        value = value[step]
+        value = value[int(index) if name is None else name]
         walked += f"[{index}]" if name is None else f"{walked and '.'}{name}"
     return value
 

@@ -96,6 +96,9 @@ class FrequencyResponseMapping(MeasurementMapping):
 def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tuple[FrequencyResponse, ...]:
     """Return the frequency responses in ``data``, in the order of the mapping.
 
+    Raises `IdentificationError` if a path does not exist, or a shape or number does not fit; the message names set,
+    level and path.
+
     Parameters
     ----------
     data
@@ -107,11 +110,6 @@ def map_frequency_responses(data: Any, mapping: FrequencyResponseMapping) -> tup
     -------
     tuple of FrequencyResponse
         In SI units and peak values; the phase of the force is zero unless complex forces are stored.
-
-    Raises
-    ------
-    IdentificationError
-        If a path does not exist, or a shape or number does not fit; the message names set, level and path.
     """
     found: list[FrequencyResponse] = []
     for number, group in enumerate(mapping.sets):

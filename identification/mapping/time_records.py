@@ -26,6 +26,9 @@ _ONE_LEVEL = 1.15
 def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] | None = None) -> TimeRecords:
     """Return the records in ``data`` in SI units.
 
+    Raises `IdentificationError` if a path does not exist, dimensions or lengths do not fit the axes, sample rates
+    disagree, sampling is uneven, values are NaN, no whole period or sample is left, or periods of the input differ.
+
     Parameters
     ----------
     data
@@ -38,12 +41,6 @@ def map_time_data(data: Any, mapping: TimeDataMapping, files: Mapping[str, Any] 
 
     A channel that began later than others by whole samples is lined up with them, and all are cut to the common length.
     Periodic records are cut to whole periods and resampled without error, others filtered and decimated.
-
-    Raises
-    ------
-    IdentificationError
-        If a path does not exist, dimensions or lengths do not fit the axes, sample rates disagree, sampling is uneven, values
-        are NaN, no whole period or sample is left, or periods of the input differ.
     """
     every = {"": data, **(files or {})}
     entries = {name: entries_at(one, mapping.records, "records") for name, one in every.items()}

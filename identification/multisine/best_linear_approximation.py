@@ -28,6 +28,9 @@ def best_linear_approximation(
 ) -> FrequencyResponseMatrix:
     """Estimate the frequency responses at the excited lines, with the noise and total covariance over all paths.
 
+    Raises `IdentificationError` if channels are missing or named twice, realisations do not fill whole blocks, an
+    input or its instrument has no power at a line, or inputs are linearly dependent.
+
     Parameters
     ----------
     spectra
@@ -42,12 +45,6 @@ def best_linear_approximation(
         Channels that serve as the instruments Z for the estimator ``instrument``, as many as inputs.
     specimen
         Name for the result.
-
-    Raises
-    ------
-    IdentificationError
-        If channels are missing or named twice, realisations do not fill whole blocks, an input or its instrument has no power
-        at a line, or inputs are linearly dependent.
     """
     found = estimated_responses(
         spectra.channels,
@@ -73,6 +70,9 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     with several. Both noise and distortion reduce it below 1. Few records bias it upwards: n records of pure noise give
     ``n_inputs / n`` on average.
 
+    Raises `IdentificationError` if channels are missing, there are not more records than inputs, lines have no power,
+    or inputs are linearly dependent.
+
     Parameters
     ----------
     spectra
@@ -86,12 +86,6 @@ def coherence(spectra: PeriodicSpectra, output: str, inputs: str | Sequence[str]
     -------
     float[n_excited]
         Coherence at the excited lines, in [0, 1].
-
-    Raises
-    ------
-    IdentificationError
-        If channels are missing, there are not more records than inputs, lines have no power, or inputs are linearly
-        dependent.
     """
     rows = chosen("inputs", spectra.channels, inputs, ("force",))
     lines = spectra.spectra[..., spectra.excited].reshape(-1, len(spectra.channels), int(spectra.excited.sum()))

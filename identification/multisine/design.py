@@ -26,6 +26,9 @@ _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
 class MultisineDesign:
     """A multisine without its phases, which a realisation draws.
 
+    Raises `IdentificationError` if the band has no line or reaches half the sample rate, or if a number is out of its
+    range.
+
     Parameters
     ----------
     sample_rate_hz
@@ -45,11 +48,6 @@ class MultisineDesign:
         Number of odd lines in a group, of which ``odd-random`` leaves one out.
     grid_seed
         Seed that chooses the line left out. All realisations excite the same lines, so that their spectra can be averaged.
-
-    Raises
-    ------
-    IdentificationError
-        If the band has no line or reaches half the sample rate, or if a number is out of its range.
     """
 
     sample_rate_hz: float

@@ -90,11 +90,9 @@ def distortion_levels(
 ) -> DistortionLevels:
     """Estimate the distortion of every channel other than ``input``; the module describes the choice of input.
 
-    Raises
-    ------
-    IdentificationError
-        If there is only one period (noise is unknown), if the instrument has more than a tenth of its largest amplitude at a
-        line that the design does not excite, and in the cases of `best_linear_approximation`.
+    Raises `IdentificationError` if there is only one period (noise is unknown), if the instrument has more than a
+    tenth of its largest amplitude at a line that the design does not excite, and in the cases of
+    `best_linear_approximation`.
     """
     realisations, periods = spectra.spectra.shape[:2]
     if periods < 2:

@@ -53,6 +53,8 @@ class InstrumentResponse:
 class PeriodicSpectra(Result):
     """Spectra of every channel in every settled period of every realisation.
 
+    Raises `IdentificationError` if values are NaN or infinite, or shapes do not agree.
+
     Parameters
     ----------
     channels
@@ -66,11 +68,6 @@ class PeriodicSpectra(Result):
         exp(2 pi i f_k t)`` with t from the start of the period.
     notes
         Notes for the user, one line each.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, or shapes do not agree.
     """
 
     channels: tuple[Channel, ...]
@@ -171,6 +168,8 @@ def periodic_spectra(
 ) -> PeriodicSpectra:
     """Compute the spectra of a multisine recording.
 
+    Raises `IdentificationError` if values are NaN or infinite, records are not whole periods, or no period is left.
+
     Parameters
     ----------
     records
@@ -181,11 +180,6 @@ def periodic_spectra(
         Design of the played multisine.
     transient_periods
         Periods at the beginning of every record that had not settled and are left out.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, records are not whole periods, or no period is left.
     """
     IdentificationError.raise_if(not len(records), "is empty", field="records", allowed="at least one realisation")
     if transient_periods < 0:

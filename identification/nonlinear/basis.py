@@ -33,11 +33,8 @@ def shapes_for(
 
     ``mode`` is the index of the tested mode; if None, the mode nearest to the frequency of the lowest level.
 
-    Raises
-    ------
-    IdentificationError
-        If no mode or more than one fits, the drive point is missing or a different channel, or the channels cannot
-        distinguish the modes.
+    Raises `IdentificationError` if no mode or more than one fits, the drive point is missing or a different channel,
+    or the channels cannot distinguish the modes.
     """
     tested = _tested(modes, backbone, mode)
     channels, notes = _common(modes, backbone)

@@ -63,6 +63,10 @@ def nonlinear_mode(
 ) -> NonlinearMode:
     """Identify a nonlinear mode from a measured backbone, every quantity with its standard error.
 
+    Raises `IdentificationError` if points are unsettled, a force or motion is zero or not above its noise, a modal
+    frequency is not real, the damping is negative at most points (reversed polarity), or modes or channels do not
+    match.
+
     Parameters
     ----------
     backbone
@@ -93,12 +97,6 @@ def nonlinear_mode(
         specimen and of the reached level, which `identification.combined` estimates. At one voltage the amplitudes of the
         friction beam differ by up to 5e-5 from run to run, several times their standard error; frequency, damping and
         apparent mass at the reached amplitude do not.
-
-    Raises
-    ------
-    IdentificationError
-        If points are unsettled, a force or motion is zero or not above its noise, a modal frequency is not real, the damping
-        is negative at most points (reversed polarity), or modes or channels do not match.
     """
     notes: tuple[str, ...] = ()
     if modes is not None:

@@ -95,16 +95,14 @@ class Repeatability:
 def repeatability(runs: Sequence[NonlinearMode | Backbone]) -> Repeatability:
     """Compare several backbones of the same specimen at common amplitudes.
 
+    Raises `IdentificationError` if there are fewer than two runs, specimens or channels differ, or runs have no common
+    range of amplitudes.
+
     Parameters
     ----------
     runs
         Nonlinear modes, or backbones (identified with their ``drive_mode_shape``). A backbone with several passes, up and
         down or repeated, counts as one run per pass. At least two runs are needed.
-
-    Raises
-    ------
-    IdentificationError
-        If there are fewer than two runs, specimens or channels differ, or runs have no common range of amplitudes.
     """
     modes = _modes(runs)
     levels = _common_levels(modes)
@@ -127,10 +125,7 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
     ``s_observed^2``, it is used instead. Intervals use Student's quantile for R runs. Before averaging, harmonics are rotated
     so that the fundamental of the drive point is real.
 
-    Raises
-    ------
-    IdentificationError
-        As for `repeatability`.
+    Raises `IdentificationError` as for `repeatability`.
     """
     from scipy.stats import t
 

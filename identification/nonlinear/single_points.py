@@ -37,6 +37,9 @@ def single_point_mode(
 ) -> NonlinearMode:
     """Identify a nonlinear mode from points near resonance, each point independently.
 
+    Raises `IdentificationError` if no point is in the window, the mode shape is zero, or the window is out of its
+    range.
+
     Parameters
     ----------
     responses
@@ -55,11 +58,6 @@ def single_point_mode(
         One entry per point, smallest amplitude first; ``frequency_hz`` and ``phase_lag_deg`` show its distance from
         resonance. Standard errors are NaN, because fundamentals alone do not provide them. Harmonics, total power, purity and
         MAC are NaN.
-
-    Raises
-    ------
-    IdentificationError
-        If no point is in the window, the mode shape is zero, or the window is out of its range.
     """
     if not 0.0 < phase_window_deg <= 80.0:
         raise IdentificationError(field="phase_window_deg", value=phase_window_deg, allowed="above 0 to 80")

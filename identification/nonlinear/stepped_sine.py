@@ -54,6 +54,9 @@ def stepped_sine_mode(
 ) -> NonlinearMode:
     """Identify a nonlinear mode from the response-controlled levels of a stepped-sine test.
 
+    Raises `IdentificationError` if there are no response-controlled levels, or if every level has fewer than three
+    usable points or no resonance.
+
     Parameters
     ----------
     responses
@@ -75,11 +78,6 @@ def stepped_sine_mode(
         not determine them. Standard errors treat the residual of the fit as noise and are enlarged for few points: 1.96
         standard errors are half of Student's 95 % interval. They are not valid if the residual is a model error. Levels to
         which no mode can be fitted are left out and named in the notes.
-
-    Raises
-    ------
-    IdentificationError
-        If there are no response-controlled levels, or if every level has fewer than three usable points or no resonance.
     """
     if not 0.0 < phase_window_deg <= 90.0:
         raise IdentificationError(field="phase_window_deg", value=phase_window_deg, allowed="above 0 to 90")

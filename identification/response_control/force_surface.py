@@ -89,17 +89,15 @@ class ForceSurface(Result):
     def constant_force(self, force_n: float, phase_lags_deg: ArrayLike | None = None) -> ConstantForceCurve:
         """Compute the frequency response at a constant fundamental force, from below to above resonance.
 
+        Raises `IdentificationError` if a value is out of its range, or no measured level has this force at any of the
+        lags.
+
         Parameters
         ----------
         force_n
             Peak of the fundamental of the force.
         phase_lags_deg
             Lags of the displacement behind the force [n], rising, between 0 and 180. Default: 30 to 150 by 1.
-
-        Raises
-        ------
-        IdentificationError
-            If a value is out of its range, or no measured level has this force at any of the lags.
         """
         lags = np.atleast_1d(np.asarray(_LAGS_DEG if phase_lags_deg is None else phase_lags_deg, dtype=np.float64))
         if lags.ndim != 1 or not np.all((lags > 0.0) & (lags < 180.0)) or np.any(np.diff(lags) <= 0.0):
@@ -110,17 +108,15 @@ class ForceSurface(Result):
 def force_surface(responses: Sequence[FrequencyResponse]) -> ForceSurface:
     """Fit the force surface of the response-controlled levels of a test.
 
+    Raises `IdentificationError` if there are fewer than three levels, or if a level has fewer than four points or lies
+    on one side of resonance only.
+
     Parameters
     ----------
     responses
         Measured levels at the drive point, by frequency or by lag, in any order; levels of the same nominal value (up and
         down) are combined. Levels that are not response-controlled raise an error. Points whose amplitude deviates from their
         level are corrected along the slope of the surface at the same lag.
-
-    Raises
-    ------
-    IdentificationError
-        If there are fewer than three levels, or if a level has fewer than four points or lies on one side of resonance only.
     """
     for response in responses:
         if response.controlled != "response":

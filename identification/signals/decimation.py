@@ -21,6 +21,9 @@ _CORNER = 0.91  # of the new Nyquist frequency: middle of the transition band, w
 def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray[np.float64]:
     """Resample signals at a lower rate, for instance 5000 Hz -> 800 Hz (by 4/25).
 
+    Raises `IdentificationError` if values are NaN or infinite, there are more than two dimensions, the new rate is
+    higher, or the ratio is not a quotient of small integers.
+
     Parameters
     ----------
     signals
@@ -36,12 +39,6 @@ def decimated(signals: ArrayLike, rate_hz: float, new_rate_hz: float) -> NDArray
 
     The record is taken as zero beyond its ends. Where the signal is not zero there, ``EDGE_SAMPLES`` samples of the result at
     either end are in error. Discard them, or begin and end the recording at rest.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, there are more than two dimensions, the new rate is higher, or the ratio is not a
-        quotient of small integers.
     """
     array = finite_array("signals", signals, np.float64, 1 if np.ndim(signals) < 2 else 2)
     old, new = positive("rate_hz", rate_hz, "Hz"), positive("new_rate_hz", new_rate_hz, "Hz")

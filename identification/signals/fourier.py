@@ -57,6 +57,9 @@ def periodic_vibration(
 ) -> PeriodicVibration:
     """Compute the periodic vibration in a settled record.
 
+    Raises `IdentificationError` if values are NaN or infinite, lengths differ, there is less than one period, the
+    phase falls, there are too few samples per period for H, or more than 5 % of the samples are lost.
+
     Parameters
     ----------
     theta_rad
@@ -88,12 +91,6 @@ def periodic_vibration(
         four periods it takes the residual as white noise. With ``resolution`` it includes ``rounding_std``, the rounding error
         that repeats in every period (`identification.signals.rounding`). It does not include calibration errors or run-to-run
         scatter.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, lengths differ, there is less than one period, the phase falls, there are too few
-        samples per period for H, or more than 5 % of the samples are lost.
     """
     theta = finite_array("theta_rad", theta_rad, np.float64, 1)
     gone = _lost(lost, theta.size)

@@ -83,6 +83,9 @@ def force_drop_out(
 ) -> ForceDropOut:
     """Evaluate the drop-out of the force in a sweep.
 
+    Raises `IdentificationError` if a band has no values, the channel does not exist, or the force off resonance is
+    zero.
+
     Parameters
     ----------
     sweep
@@ -94,11 +97,6 @@ def force_drop_out(
         is before the resonance.
     resonance_hz
         Band in which minimum and peak are sought; if None, the range without its first and last 15 %.
-
-    Raises
-    ------
-    IdentificationError
-        If a band has no values, the channel does not exist, or the force off resonance is zero.
     """
     frequency, force = sweep.frequency_hz, np.abs(sweep.force)
     start, end = float(frequency[0]), float(frequency[-1])

@@ -33,6 +33,9 @@ _MARGIN = 64  # samples beyond a stretch that its splines include
 class Transient(Result):
     """Fundamentals of every channel over time.
 
+    Raises `IdentificationError` if values are NaN or infinite, shapes do not agree, there is not exactly one force
+    channel, or times do not rise.
+
     Parameters
     ----------
     channels
@@ -45,11 +48,6 @@ class Transient(Result):
         complex[n_channels, n], peak, in the unit of each channel, against the phase of the oscillator.
     window_periods
         Length in periods of the triangular window over which each value is averaged.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, shapes do not agree, there is not exactly one force channel, or times do not rise.
     """
 
     channels: tuple[Channel, ...]
@@ -105,6 +103,9 @@ def demodulate(
 ) -> Transient:
     """Compute the fundamentals over time of a record with known phase of the oscillator.
 
+    Raises `IdentificationError` if values are NaN or infinite, lengths differ, the phase falls, there are fewer than 8
+    samples per period, or the record is too short.
+
     Parameters
     ----------
     theta_rad
@@ -125,12 +126,6 @@ def demodulate(
     -------
     Transient
         Fundamentals without the first P and the last P periods, where the window would be incomplete.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, lengths differ, the phase falls, there are fewer than 8 samples per period, or the
-        record is too short.
     """
     theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     single = np.asarray(samples).dtype == np.float32  # as recorded; stretches are computed in double precision

@@ -103,6 +103,9 @@ def continuous_backbone(
 ) -> ContinuousBackbone:
     """Compute a backbone from a ramp of the level up and one down, in any order.
 
+    Raises `IdentificationError` if channels or mode shapes differ, the ramps have no common amplitudes, or levels lie
+    beyond these.
+
     Parameters
     ----------
     up, down
@@ -121,11 +124,6 @@ def continuous_backbone(
         Name of what was tested.
     drive_mode_shape_std
         Standard error of the ramps' mode shape at the drive point, kg^-1/2; None if unknown.
-
-    Raises
-    ------
-    IdentificationError
-        If channels or mode shapes differ, the ramps have no common amplitudes, or levels lie beyond these.
     """
     if up.channels != down.channels or up.drive_mode_shape != down.drive_mode_shape:
         raise IdentificationError("channels or drive_mode_shape differ", field="up, down")

@@ -182,6 +182,9 @@ def slow_flow(
 ) -> SlowFlow:
     """Identify modal properties at every instant of a record.
 
+    Raises `IdentificationError` if values are NaN or infinite, lengths differ, the phase falls, there are too few
+    samples per period, the record is too short, or roles are missing.
+
     Parameters
     ----------
     theta_rad
@@ -212,12 +215,6 @@ def slow_flow(
     -------
     SlowFlow
         The slow flow without the first and last one and a half periods, where the window would be incomplete.
-
-    Raises
-    ------
-    IdentificationError
-        If values are NaN or infinite, lengths differ, the phase falls, there are too few samples per period, the record is
-        too short, or roles are missing.
     """
     theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     data = finite_array("samples", samples, np.float64, 2)

@@ -47,10 +47,7 @@ def frequency_response(rig: VirtualRig, frequencies_hz: ArrayLike, *, held: bool
     rate, which sampling folds back, are then included. Near a lightly damped resonance the force is so small that these images
     matter.
 
-    Raises
-    ------
-    ValueError
-        If a frequency is not above 0 or, with ``held``, not below half the sample rate.
+    Raises `ValueError` if a frequency is not above 0 or, with ``held``, not below half the sample rate.
     """
     frequencies = positive("frequencies_hz", frequencies_hz)
     plant, points, rate_hz = rig.plant, rig.structure.points, rig.converter.sample_rate_hz

@@ -43,6 +43,9 @@ def phase_resonance_backbone(
 ) -> PeriodicResponses:
     """Compute the vibration at phase resonance, or at another lag, for each level; each level continues from the previous one.
 
+    Raises `ValueError` on values that are not allowed, by name. Raises `NotConvergedError` if a level cannot be
+    reached; the message names the level, and ``found`` holds the points before it.
+
     Parameters
     ----------
     rig
@@ -69,13 +72,6 @@ def phase_resonance_backbone(
     harmonics, samples
         Highest harmonic, and samples per period (at least four per harmonic). ``neglected_share`` of the result tells how much
         the higher harmonics contribute; increase ``harmonics`` if that is too much.
-
-    Raises
-    ------
-    ValueError
-        On values that are not allowed, by name.
-    NotConvergedError
-        If a level cannot be reached; the message names the level, and ``found`` holds the points before it.
     """
     held, values = levels(forces_n, voltages_v, amplitudes_m)
     if excitation not in ("exciter", "pure-sine"):
@@ -109,6 +105,9 @@ def constant_force_response(
     between the folds, where the frequency falls, is unstable. This is the static stability of the fundamental. Bifurcations to
     other periods and the stability of a control loop are not examined.
 
+    Raises `ValueError` on values that are not allowed, by name. Raises `NotConvergedError` if the force cannot be
+    reached or the path ends; the message says where. ``found`` holds the points found.
+
     Parameters
     ----------
     rig
@@ -122,13 +121,6 @@ def constant_force_response(
         mean, which piezoelectric sensors do not measure.
     force_harmonics, near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
-
-    Raises
-    ------
-    ValueError
-        On values that are not allowed, by name.
-    NotConvergedError
-        If the force cannot be reached or the path ends; the message says where. ``found`` holds the points found.
     """
     force, held = float(positive("force_n", [force_n])[0]), held_force(quantity)
     lags = _lags(phase_lags_deg)
@@ -149,6 +141,9 @@ def constant_displacement_response(
 ) -> PeriodicResponses:
     """Compute vibrations at constant displacement amplitude of the drive point, as in a response-controlled stepped test.
 
+    Raises `ValueError` on values that are not allowed, by name. Raises `NotConvergedError` if the amplitude cannot be
+    reached; the message says where. ``found`` holds the points found before.
+
     Parameters
     ----------
     rig
@@ -161,13 +156,6 @@ def constant_displacement_response(
         Frequencies [n] instead of lags, in any order; the first point is approached from rest at its frequency.
     force_harmonics, near_hz, harmonics, samples
         As for `phase_resonance_backbone`.
-
-    Raises
-    ------
-    ValueError
-        On values that are not allowed, by name.
-    NotConvergedError
-        If the amplitude cannot be reached; the message says where. ``found`` holds the points found before.
     """
     amplitude = float(positive("amplitude_m", [amplitude_m])[0])
     if phase_lags_deg is not None and frequencies_hz is not None:
@@ -195,6 +183,9 @@ def forced_response(
     Each point continues from the previous one. Where the branch ends and a sweep would jump, the point is reached from rest at
     its frequency.
 
+    Raises `ValueError` on values that are not allowed, by name. Raises `NotConvergedError` if no vibration is found at
+    a frequency; the message names it, and ``found`` holds the points before it.
+
     Parameters
     ----------
     rig
@@ -207,13 +198,6 @@ def forced_response(
         The linear mode that modal amplitude and damping refer to, as for `phase_resonance_backbone`.
     force_harmonics, harmonics, samples
         As for `phase_resonance_backbone`.
-
-    Raises
-    ------
-    ValueError
-        On values that are not allowed, by name.
-    NotConvergedError
-        If no vibration is found at a frequency; the message names it, and ``found`` holds the points before it.
     """
     voltage = float(positive("voltage_v", [voltage_v])[0])
     omega = 2.0 * np.pi * positive("frequencies_hz", frequencies_hz)
