@@ -26,6 +26,13 @@ def finite_array(name: str, values: ArrayLike, dtype: DTypeLike, ndim: int) -> N
     return finite(name, array)
 
 
+def shaped_array(name: str, values: ArrayLike, dtype: DTypeLike, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Return a read-only copy of ``values``; raise `IdentificationError` unless it has this shape and is finite."""
+    array = finite_array(name, values, dtype, len(shape))
+    IdentificationError.raise_if(array.shape != shape, f"shape {array.shape}", field=name, allowed=f"{shape}")
+    return array
+
+
 def finite(name: str, array: NDArray[Any]) -> NDArray[Any]:
     """Return the array itself; raise `IdentificationError` unless all of it is finite."""
     if not np.all(np.isfinite(array)):

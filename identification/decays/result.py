@@ -78,19 +78,16 @@ class DecayMode:
     @property
     def modal_frequency_bound_95_hz(self) -> Float:
         """float[n]: half width of the 95 % interval of the modal frequency, at the estimated amplitude."""
-        slope = _slope(self.amplitude_m, self.modal_frequency_hz)
-        return np.asarray(
-            1.96 * np.hypot(self.modal_frequency_std_hz, slope * self.amplitude_std_m)
-            + self.modal_frequency_systematic_hz
-        )
+        return self._bound_95(self.modal_frequency_hz, self.modal_frequency_std_hz, self.modal_frequency_systematic_hz)
 
     @property
     def damping_ratio_bound_95(self) -> Float:
         """float[n]: half width of the 95 % interval of the damping ratio, at the estimated amplitude."""
-        slope = _slope(self.amplitude_m, self.damping_ratio)
-        return np.asarray(
-            1.96 * np.hypot(self.damping_ratio_std, slope * self.amplitude_std_m) + self.damping_ratio_systematic
-        )
+        return self._bound_95(self.damping_ratio, self.damping_ratio_std, self.damping_ratio_systematic)
+
+    def _bound_95(self, values: Float, std: Float, systematic: Float) -> Float:
+        slope = np.gradient(values, self.amplitude_m) if values.size > 1 else np.zeros(values.size)
+        return np.asarray(1.96 * np.hypot(std, slope * self.amplitude_std_m) + systematic)
 
     def table(self) -> list[dict[str, float]]:
         """Return one JSON-able dictionary per level."""
@@ -146,63 +143,49 @@ class DecayBackbone(Result):
         shape = np.nan if mode.drive_mode_shape is None else abs(mode.drive_mode_shape)
         omega = 2.0 * np.pi * mode.modal_frequency_hz
         force = 2.0 * mode.damping_ratio * omega**2 * mode.amplitude_m / shape**2
-        unknown = np.full(mode.time_s.size, np.nan)
         size = np.abs(mode.harmonics_m[:, 1:])
         resonant = np.full((mode.time_s.size, 2), np.nan, np.complex128)
         resonant[:, 1] = 1j * force
         relative = mode.damping_ratio_std / mode.damping_ratio
-        errors = {
-            "force_n": (np.abs(force * relative), np.abs(force) * mode.damping_ratio_systematic / mode.damping_ratio),
-            "amplitude_m": (mode.amplitude_std_m, 0.0 * unknown),
-            "phase_lag_deg": (0.0 * force, 0.0 * force),
-            "modal_frequency_hz": (mode.modal_frequency_std_hz, mode.modal_frequency_systematic_hz),
-            "damping_ratio": (mode.damping_ratio_std, mode.damping_ratio_systematic),
-            "modal_amplitude": (mode.amplitude_std_m / shape, 0.0 * force),
-        }
-        values: dict[str, Any] = {
-            "force_n": force,
-            "amplitude_m": mode.amplitude_m,
-            "phase_lag_deg": np.full(force.size, 90.0),
-            "modal_frequency_hz": mode.modal_frequency_hz,
-            "damping_ratio": mode.damping_ratio,
-            "modal_amplitude": mode.amplitude_m / shape,
-        }
+        relative_bound = mode.damping_ratio_systematic / mode.damping_ratio
         return NonlinearMode(
-            **values,
+            **_with_errors(
+                force_n=(force, np.abs(force * relative), np.abs(force) * relative_bound),
+                amplitude_m=(mode.amplitude_m, mode.amplitude_std_m, np.full(force.size, np.nan)),
+                phase_lag_deg=(np.full(force.size, 90.0), 0.0 * force, 0.0 * force),
+                modal_frequency_hz=(
+                    mode.modal_frequency_hz,
+                    mode.modal_frequency_std_hz,
+                    mode.modal_frequency_systematic_hz,
+                ),
+                damping_ratio=(mode.damping_ratio, mode.damping_ratio_std, mode.damping_ratio_systematic),
+                modal_amplitude=(mode.amplitude_m / shape, mode.amplitude_std_m / shape, 0.0 * force),
+            ),
             frequency_hz=mode.frequency_hz,
-            damping_ratio_total_power=unknown,
-            damping_ratio_uncorrected=unknown,
             apparent_mass_kg=np.full(force.size, 1.0 / shape**2),
-            mac=unknown,
-            force_purity=unknown,
             response_purity=size[:, 0] / np.linalg.norm(size, axis=1),
-            fit_residual=unknown,
             force_harmonics=resonant,
             response_harmonics_m=mode.harmonics_m,
             source="free decay",
             specimen=self.specimen,
             notes=self.notes,
             drive_mode_shape=mode.drive_mode_shape,
-            **_error_fields(values, errors),
         )
 
 
-def _error_fields(values: dict[str, Any], errors: dict[str, tuple[Float, Float]]) -> dict[str, Any]:
-    """Standard errors and intervals of a nonlinear mode: bounds of systematic errors count as two standard errors."""
-    count = len(values["force_n"])
+def _with_errors(**known: tuple[Float, Float, Float]) -> dict[str, Any]:
+    """Return quantities of a nonlinear mode with their errors, from values, random standard errors and systematic bounds.
+
+    Bounds of systematic errors count as two standard errors.
+    """
+    count = len(known["force_n"][0])
     table = {name: np.full((count, len(QUANTITIES)), np.nan) for name in ("random_std", "systematic_std")}
     intervals = np.full((count, len(QUANTITIES), 2), np.nan)
     found: dict[str, Any] = {}
-    for name, (random, bound) in errors.items():
+    for name, (values, random, bound) in known.items():
         column = QUANTITIES.index(name)
         table["random_std"][:, column], table["systematic_std"][:, column] = random, 0.5 * bound
         half = 1.96 * random + bound
-        intervals[:, column] = np.stack([values[name] - half, values[name] + half], axis=-1)
-        found[STANDARD_ERRORS[name]] = np.hypot(random, 0.5 * bound)
+        intervals[:, column] = np.stack([values - half, values + half], axis=-1)
+        found |= {name: values, STANDARD_ERRORS[name]: np.hypot(random, 0.5 * bound)}
     return {**found, **table, "interval_95": intervals}
-
-
-def _slope(along: Float, values: Float) -> Float:
-    if along.size < 2:
-        return np.zeros(along.size)
-    return np.asarray(np.gradient(values, along))

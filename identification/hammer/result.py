@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from identification.channels import Channel
-from identification.errors import IdentificationError
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.validation import finite_array
+from identification.validation import shaped_array
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
@@ -76,9 +75,7 @@ class HammerTest(Result):
     def __post_init__(self) -> None:
         lines, outputs = self.responses.frequency_hz.size, len(self.responses.outputs)
         for name, shape in (("coherence", (lines, outputs)), ("force_n_s", (lines,))):
-            array = finite_array(name, getattr(self, name), np.float64, len(shape))
-            IdentificationError.raise_if(array.shape != shape, f"shape {array.shape}", field=name, allowed=f"{shape}")
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, shaped_array(name, getattr(self, name), np.float64, shape))
 
     @property
     def used(self) -> tuple[Hit, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
-from identification.validation import finite_array
+from identification.validation import finite_array, shaped_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -69,26 +69,22 @@ class FrequencyResponseMatrix(Result):
             raise IdentificationError(
                 field="frequency_hz", allowed="at least one, none below zero, each above the one before"
             )
-        self._check("value", (len(self.outputs), len(self.inputs)))
         paths = len(self.outputs) * len(self.inputs)
-        for name in ("noise_covariance", "total_covariance"):
-            if getattr(self, name) is not None:
-                self._check(name, (paths, paths))
-        if self.deviations is not None:
-            records = np.shape(self.deviations)[1] if np.ndim(self.deviations) > 1 else 0
-            self._check("deviations", (records, paths))
+        shape = () if self.deviations is None else np.shape(self.deviations)
+        records = shape[1] if len(shape) > 1 else 0
+        for name, trailing in (
+            ("value", (len(self.outputs), len(self.inputs))),
+            ("noise_covariance", (paths, paths)),
+            ("total_covariance", (paths, paths)),
+            ("deviations", (records, paths)),
+        ):
+            if (given := getattr(self, name)) is not None:
+                array = shaped_array(name, given, np.complex128, (self.frequency_hz.size, *trailing))
+                object.__setattr__(self, name, array)
         if not (np.isfinite(self.decay_rate_1_s) and self.decay_rate_1_s >= 0.0):
             raise IdentificationError(field="decay_rate_1_s", value=self.decay_rate_1_s, allowed="finite, 0 or above")
         if self.input_rms and len(self.input_rms) != len(self.inputs):
             raise IdentificationError(f"{len(self.input_rms)} values for {len(self.inputs)} inputs", field="input_rms")
-
-    def _check(self, name: str, trailing: tuple[int, int]) -> None:
-        array = finite_array(name, getattr(self, name), np.complex128, 3)
-        if array.shape != (self.frequency_hz.size, *trailing):
-            raise IdentificationError(
-                f"shape {array.shape}", field=name, allowed=f"{(self.frequency_hz.size, *trailing)}"
-            )
-        object.__setattr__(self, name, array)
 
     @property
     def s(self) -> Complex:

@@ -74,27 +74,20 @@ def map_nonlinear_mode(data: Any, mapping: NonlinearModeMapping) -> NonlinearMod
 
 
 def _mode(mapping: NonlinearModeMapping, frequency: Any, damping: Any, amplitude: Any, force: Any) -> NonlinearMode:
-    unknown = np.full(frequency.size, np.nan)
-    shape = mapping.drive_mode_shape
+    shape = np.nan if mapping.drive_mode_shape is None else abs(mapping.drive_mode_shape)
     nothing = np.zeros(frequency.size, dtype=np.complex128)
-    columns = {
-        "force_n": force,
-        "frequency_hz": frequency,
-        "phase_lag_deg": np.full(frequency.size, 90.0),
-        "amplitude_m": amplitude,
-        "modal_frequency_hz": frequency,
-        "damping_ratio": damping,
-        "modal_amplitude": unknown if shape is None else amplitude / abs(shape),
-        "apparent_mass_kg": unknown if shape is None else np.full(frequency.size, 1.0 / shape**2),
-        "force_harmonics": np.stack([nothing, force + 0j], axis=1),
-        "response_harmonics_m": np.stack([nothing, -1j * amplitude], axis=1),
-    }
-    columns |= dict.fromkeys(_UNKNOWN, unknown)
-    notes = ("imported: only what the table says is known",)
-    return NonlinearMode(**columns, source=mapping.source, specimen=mapping.specimen, notes=notes)
-
-
-_UNKNOWN = (
-    *("modal_frequency_std_hz", "damping_ratio_std", "damping_ratio_total_power", "damping_ratio_uncorrected"),
-    *("mac", "force_purity", "response_purity", "fit_residual"),
-)
+    return NonlinearMode(
+        force_n=force,
+        frequency_hz=frequency,
+        phase_lag_deg=np.full(frequency.size, 90.0),
+        amplitude_m=amplitude,
+        modal_frequency_hz=frequency,
+        damping_ratio=damping,
+        modal_amplitude=amplitude / shape,
+        apparent_mass_kg=np.full(frequency.size, 1.0 / shape**2),
+        force_harmonics=np.stack([nothing, force + 0j], axis=1),
+        response_harmonics_m=np.stack([nothing, -1j * amplitude], axis=1),
+        source=mapping.source,
+        specimen=mapping.specimen,
+        notes=("imported: only what the table says is known",),
+    )

@@ -28,11 +28,13 @@ STANDARD_ERRORS = {
 """Quantities of a nonlinear mode, and the fields that hold their standard errors."""
 QUANTITIES = tuple(STANDARD_ERRORS)
 
+_LATER = tuple(name for name in STANDARD_ERRORS.values() if name not in ("modal_frequency_std_hz", "damping_ratio_std"))
+"""Standard errors that files of the first versions lack."""
 _TABLE = (
     *("force_n", "frequency_hz", "amplitude_m", "phase_lag_deg", "modal_frequency_hz", "modal_frequency_std_hz"),
     *("damping_ratio", "damping_ratio_std", "damping_ratio_total_power", "damping_ratio_uncorrected"),
     *("modal_amplitude", "mac", "force_purity", "response_purity", "fit_residual"),
-    *(name for name in STANDARD_ERRORS.values() if name not in ("modal_frequency_std_hz", "damping_ratio_std")),
+    *_LATER,
 )
 
 
@@ -44,7 +46,8 @@ def _unknown() -> Float:
 def _note_missing_errors(arrays: dict[str, NDArray[Any]], attributes: dict[str, Any]) -> None:
     """Add a note to files of earlier versions, which hold fewer standard errors."""
     notes = attributes.get("notes", [])
-    if any(name not in arrays for name in _ADDED) and _EARLIER not in notes:
+    later = (*_LATER, "systematic_std", "random_std", "interval_95")
+    if any(name not in arrays for name in later) and _EARLIER not in notes:
         attributes["notes"] = [*notes, _EARLIER]
 
 
@@ -114,17 +117,17 @@ class NonlinearMode(Result):
     phase_lag_deg: Float
     amplitude_m: Float
     modal_frequency_hz: Float
-    modal_frequency_std_hz: Float
+    modal_frequency_std_hz: Float = field(default_factory=_unknown)
     damping_ratio: Float
-    damping_ratio_std: Float
-    damping_ratio_total_power: Float
-    damping_ratio_uncorrected: Float
-    modal_amplitude: Float
+    damping_ratio_std: Float = field(default_factory=_unknown)
+    damping_ratio_total_power: Float = field(default_factory=_unknown)
+    damping_ratio_uncorrected: Float = field(default_factory=_unknown)
+    modal_amplitude: Float = field(default_factory=_unknown)
     apparent_mass_kg: Float
-    mac: Float
-    force_purity: Float
-    response_purity: Float
-    fit_residual: Float
+    mac: Float = field(default_factory=_unknown)
+    force_purity: Float = field(default_factory=_unknown)
+    response_purity: Float = field(default_factory=_unknown)
+    fit_residual: Float = field(default_factory=_unknown)
     force_harmonics: Complex
     response_harmonics_m: Complex
     source: str
@@ -219,7 +222,6 @@ class NonlinearMode(Result):
 
 
 _ARRAYS = tuple(entry.name for entry in fields(NonlinearMode) if get_origin(entry.type) is np.ndarray)
-_ADDED = tuple(entry.name for entry in fields(NonlinearMode) if entry.default_factory is _unknown)
 _EARLIER = "written by an earlier version: identify the recording again for the standard errors that are missing"
 _HARMONICS = ("force_harmonics", "response_harmonics_m")
 _AXES = ("force_n", "amplitude_m")

@@ -108,7 +108,9 @@ def nonlinear_mode(
         raise IdentificationError("there are no modes to choose from", field="mode", value=mode, hint="give modes")
     for number, point in enumerate(backbone.points):
         _refuse(f"points[{number}] ({point.force_n:g} N, {point.frequency_hz:g} Hz)", point)
-    states, rows = _states(backbone, mode_shapes, _shape_for_mac(mode_shapes, linear_shape))
+    if linear_shape is None and mode_shapes is not None:
+        linear_shape = dict(zip(mode_shapes.channels, mode_shapes.tested.tolist(), strict=True))
+    states, rows = _states(backbone, mode_shapes, linear_shape)
     found = properties(states)
     _refuse_unreal(backbone, found)
     alone = mode_shapes is None
@@ -122,7 +124,6 @@ def nonlinear_mode(
             ErrorModel(calibration_std, phase_skew_std_deg, draws, seed),
         ),
         frequency_hz=backbone.frequency_hz,
-        fit_residual=np.full(len(backbone.points), np.nan),
         force_harmonics=states.force,
         response_harmonics_m=states.drive_m,
         source="backbone",
@@ -207,12 +208,6 @@ def _drift_rate(point: PeriodicVibration) -> complex:
     if point.drift is None:
         return 0j
     return complex(point.drift[find_role(point.channels, "drive")]) * point.frequency_hz / point.periods
-
-
-def _shape_for_mac(shapes: ModeShapes | None, linear_shape: Mapping[str, float] | None) -> dict[str, float] | None:
-    if linear_shape is not None:
-        return dict(linear_shape)
-    return None if shapes is None else dict(zip(shapes.channels, shapes.tested.tolist(), strict=True))
 
 
 def _notes(backbone: Backbone, shapes: ModeShapes | None) -> tuple[str, ...]:

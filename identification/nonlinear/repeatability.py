@@ -151,7 +151,8 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
             intervals[:, column] = np.clip(intervals[:, column], 0.0, 1.0)
     for name in ("frequency_hz", "damping_ratio_uncorrected", "fit_residual"):
         out[name] = np.mean([_at(levels, mode, getattr(mode, name)) for mode in modes], axis=0)
-    shape, shape_std, shape_source = _common_drive_shape(modes)
+    shapes = {(mode.drive_mode_shape, mode.drive_mode_shape_std, mode.drive_mode_shape_source) for mode in modes}
+    shape, shape_std, shape_source = shapes.pop() if len(shapes) == 1 else (None, None, "")
     harmonics = min(mode.force_harmonics.shape[1] for mode in modes)
     return NonlinearMode(
         **out,
@@ -167,12 +168,6 @@ def combined(runs: Sequence[NonlinearMode | Backbone]) -> NonlinearMode:
         drive_mode_shape_source=shape_source,
         notes=(*_scatter_notes(modes), *dict.fromkeys([note for mode in modes for note in mode.notes])),
     )
-
-
-def _common_drive_shape(modes: Sequence[NonlinearMode]) -> tuple[float | None, float | None, str]:
-    """Return mode shape at the drive point, its standard error and its source if all runs have the same; else none."""
-    found = {(mode.drive_mode_shape, mode.drive_mode_shape_std, mode.drive_mode_shape_source) for mode in modes}
-    return next(iter(found)) if len(found) == 1 else (None, None, "")
 
 
 def _scatter_notes(modes: Sequence[NonlinearMode]) -> tuple[str, ...]:
@@ -245,11 +240,9 @@ def _mean_harmonics(levels: Float, modes: Sequence[NonlinearMode], name: str, ha
         for mode in modes
     ]
     for h in orders:
-        parts = [
-            [_at(levels, mode, part(rows[:, h])) for mode, rows in zip(modes, turned, strict=True)] for part in _PARTS
-        ]
-        out[:, h] = np.mean(parts[0], axis=0) + 1j * np.mean(parts[1], axis=0)
+        real, imaginary = (
+            [_at(levels, mode, part(rows[:, h])) for mode, rows in zip(modes, turned, strict=True)]
+            for part in (np.real, np.imag)
+        )
+        out[:, h] = np.mean(real, axis=0) + 1j * np.mean(imaginary, axis=0)
     return out
-
-
-_PARTS = (np.real, np.imag)

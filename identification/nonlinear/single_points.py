@@ -106,10 +106,9 @@ def _identified(
             field="drive_mode_shape",
         )
     modal = np.sqrt(squared)
-    unknown = np.full(frequency.size, np.nan)
     lag = np.degrees(np.angle(force * np.conj(motion)))
     q = np.abs(own) / abs(shape)
-    nothing = unknown.astype(np.complex128)
+    nothing = np.full(frequency.size, np.nan, np.complex128)
     far = int(np.count_nonzero(np.abs(lag - 90.0) > _FAR_DEG))
     notes = ["from single points of stepped sines: no standard errors, harmonics, total power, purity or MAC"]
     if given > frequency.size:
@@ -124,17 +123,10 @@ def _identified(
         phase_lag_deg=lag,
         amplitude_m=np.abs(motion),
         modal_frequency_hz=modal / (2.0 * np.pi),
-        modal_frequency_std_hz=unknown,
         damping_ratio=stiffness.imag / (2.0 * omega * modal),
-        damping_ratio_std=unknown,
-        damping_ratio_total_power=unknown,
         damping_ratio_uncorrected=0.5 * np.imag(force / motion) * np.abs(motion) ** 2 / (omega**2 * q**2),
         modal_amplitude=q,
         apparent_mass_kg=np.full(frequency.size, shape**-2),
-        mac=unknown,
-        force_purity=unknown,
-        response_purity=unknown,
-        fit_residual=unknown,
         force_harmonics=np.column_stack([nothing, force]),
         response_harmonics_m=np.column_stack([nothing, motion]),
         source="stepped sine",

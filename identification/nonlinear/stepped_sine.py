@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.channels import MOTION_ORDER
 from identification.errors import IdentificationError
 from identification.frequency_responses import FrequencyResponse
 from identification.nonlinear.nonlinear_modes import NonlinearMode
@@ -92,10 +93,11 @@ def stepped_sine_mode(
     fitted, refusals = _fitted(levels, phase_window_deg, complex_constant)
     left_out = len(responses) - len(levels)
     levels, fits = [level for level, _ in fitted], [fit for _, fit in fitted]
-    unknown = np.full(len(fits), np.nan)
+    unknown = np.full(len(fits), np.nan, np.complex128)
     omega, damping = np.array([fit.omega for fit in fits]), np.array([fit.damping for fit in fits])
     mass, beta = np.array([fit.mass_kg for fit in fits]), np.array([fit.beta for fit in fits])
-    motion = np.array([_held_amplitude_m(level, fit.omega) for level, fit in zip(levels, fits, strict=True)])
+    held = [np.median(np.abs(level.response)) for level in levels]
+    motion = np.array(held) / omega ** np.array([MOTION_ORDER[level.kind] for level in levels])
     force = 2j * mass * np.exp(1j * beta) * damping * omega**2 * motion
     return NonlinearMode(
         force_n=np.abs(force),
@@ -106,16 +108,10 @@ def stepped_sine_mode(
         modal_frequency_std_hz=np.array([fit.omega_std for fit in fits]) / (2.0 * np.pi),
         damping_ratio=damping,
         damping_ratio_std=np.array([fit.damping_std for fit in fits]),
-        damping_ratio_total_power=unknown,
-        damping_ratio_uncorrected=unknown,
-        modal_amplitude=unknown,
         apparent_mass_kg=mass,
-        mac=unknown,
-        force_purity=unknown,
-        response_purity=unknown,
         fit_residual=np.array([fit.residual for fit in fits]),
-        force_harmonics=np.column_stack([unknown.astype(complex), force]),
-        response_harmonics_m=np.column_stack([unknown.astype(complex), motion.astype(complex)]),
+        force_harmonics=np.column_stack([unknown, force]),
+        response_harmonics_m=np.column_stack([unknown, motion]),
         source="stepped sine",
         specimen=levels[0].specimen,
         notes=_notes(len(responses), left_out, refusals, fitted, phase_window_deg),
@@ -212,12 +208,6 @@ def _covariance(x: Float, w: float, z: float, mass: float, weight: Float, misfit
     freedom = misfit.size - len(columns)
     variance = float(np.sum(misfit**2)) / freedom * (float(t.ppf(0.975, freedom)) / 1.96) ** 2
     return np.asarray(variance * np.linalg.inv(jacobian.T @ jacobian))
-
-
-def _held_amplitude_m(level: FrequencyResponse, omega: float) -> float:
-    """Displacement amplitude at ``omega`` (rad/s) that corresponds to the amplitude held by the controller."""
-    held = float(np.median(np.abs(level.response)))
-    return held / omega ** {"displacement": 0, "velocity": 1, "acceleration": 2}[level.kind]
 
 
 def _notes(

@@ -75,10 +75,10 @@ def propagated(
     """Return standard errors, their systematic and random parts, and intervals, by field name of `NonlinearMode`.
 
     ``rows`` are the channels of ``states.deflection_m``; ``states.inverse`` is the pseudo-inverse of ``shapes``. Without draws
-    all of them are NaN.
+    there are none.
     """
     if model.draws == 0:
-        return _unknown(len(backbone.points))
+        return {}
     estimate = properties(states)
     rng = np.random.default_rng(model.seed)
     wrong = _systematic(states, backbone, rows, shapes, model, rng)
@@ -107,16 +107,6 @@ def propagated(
         "systematic_std": np.column_stack([_std(systematic[n]) for n in QUANTITIES]),
         "random_std": np.column_stack([np.where(known, _std(random[n]), np.nan) for n in QUANTITIES]),
         "interval_95": intervals,
-    }
-
-
-def _unknown(points: int) -> dict[str, Float]:
-    size = len(QUANTITIES)
-    return {
-        **{STANDARD_ERRORS[name]: np.full(points, np.nan) for name in QUANTITIES},
-        "systematic_std": np.full((points, size), np.nan),
-        "random_std": np.full((points, size), np.nan),
-        "interval_95": np.full((points, size, 2), np.nan),
     }
 
 
@@ -203,13 +193,7 @@ def _rounded(
     harmonics = np.array([point.harmonics for point in points])
     unit = np.divide(harmonics, np.abs(harmonics), out=np.ones_like(harmonics), where=harmonics != 0.0)
     size = (wrong.force.shape[0], *rounding.shape)
-    drawn = rounding.real * rng.standard_normal(size) + 1j * rounding.imag * rng.standard_normal(size)
-    return _with_errors(wrong, backbone, rows, unit * drawn)
-
-
-def _with_errors(wrong: States, backbone: Backbone, rows: tuple[int, ...], errors: Complex) -> States:
-    """Add errors of the coefficients, complex[draws, n, n_channels, H + 1] in the units of the channels, to ``wrong``."""
-    points = backbone.points
+    errors = unit * (rounding.real * rng.standard_normal(size) + 1j * rounding.imag * rng.standard_normal(size))
     force, drive = find_role(backbone.channels, "force"), find_role(backbone.channels, "drive")
     deflection = wrong.deflection_m.copy()
     for column, row in enumerate(rows):

@@ -1,11 +1,12 @@
 """Records that are read in chunks, so that an hour of many channels takes no more memory than a minute of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
+from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.validation import finite_array
 from vibrolock.arrays import Bool, Float
@@ -53,6 +54,27 @@ class ArrayRecord:
         return self.signals[:, start:stop], self.lost[start:stop]
 
 
+def check_samples(samples: Float, channels: Sequence[Channel], size: int) -> None:
+    """Raise `IdentificationError` unless ``samples`` has a row per channel and ``size`` columns."""
+    if samples.shape != (len(channels), size):
+        raise IdentificationError(
+            f"shape {samples.shape}",
+            field="samples",
+            allowed=f"({len(channels)}, {size}): channels by samples of theta_rad",
+        )
+
+
+def rising_steps(theta: Float, first: int = 0) -> Float:
+    """float[n - 1]: steps of a phase from sample ``first`` on; raises `IdentificationError` unless it rises."""
+    steps = np.diff(theta)
+    if np.any(steps <= 0.0):
+        where = first + int(np.argmax(steps <= 0.0))
+        raise IdentificationError(
+            f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
+        )
+    return steps
+
+
 def unwrapped(theta_rad: Float) -> Float:
     """float[n]: ``np.unwrap(theta_rad)`` of a phase in float[n], in a third of its time."""
     theta = np.array(theta_rad)
@@ -69,8 +91,7 @@ def spans(size: int) -> Iterator[tuple[int, int]]:
 class Phase:
     """Unwrapped phase of a record, read chunk by chunk.
 
-    Raises:
-        IdentificationError: on construction: fewer than two samples, or a phase that is not finite or does not rise.
+    Raises `IdentificationError` on construction for fewer than two samples, or a phase that is not finite or does not rise.
     """
 
     def __init__(self, record: Record) -> None:
@@ -86,12 +107,7 @@ class Phase:
             theta = self._unwrapped(before, stop)
             if start:
                 theta += _whole_turns(last - theta[0])
-            still = np.diff(theta) <= 0.0
-            if np.any(still):
-                where = before + int(np.argmax(still))
-                raise IdentificationError(
-                    f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
-                )
+            rising_steps(theta, before)
             if stop - start == record.size:
                 self._only = theta
             known.append(theta[start - before])

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.channels import Channel
 from identification.errors import IdentificationError
 from identification.measurements import PeriodicVibration
-from identification.signals.chunks import ArrayRecord, Phase, Record
+from identification.signals.chunks import ArrayRecord, Phase, Record, check_samples
 from identification.signals.columns import Columns, least_squares
 from identification.signals.rounding import JUDGED, part_of_each, rounding_errors, turns_of
 from identification.validation import finite_array, positive
@@ -96,12 +96,7 @@ def periodic_vibration(
     gone = _lost(lost, theta.size)
     values = np.where(gone, 0.0, samples) if gone.any() else samples
     data = finite_array("samples", values, np.float64, 2)
-    if data.shape != (len(channels), theta.size):
-        raise IdentificationError(
-            f"shape {data.shape}",
-            field="samples",
-            allowed=f"({len(channels)}, {theta.size}): channels by samples of theta_rad",
-        )
+    check_samples(data, channels, theta.size)
     return vibration_in(
         ArrayRecord(theta, data, gone),
         channels,
@@ -136,12 +131,16 @@ def vibration_in(
     chunks = Columns(record, phase, count, harmonics, many=periods >= _MIN_BATCHES)
     solution, kept = _solved(chunks)
     squares, rough, means = _residual(chunks, solution, periods)
-    coefficients, residual_rms = _coefficients(solution, harmonics), np.sqrt(squares / kept)
+    coefficients = np.empty((len(channels), harmonics + 1), dtype=np.complex128)
+    coefficients[:, 0] = solution[0]
+    coefficients[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : -2]).T
+    drift = solution[-2] + 1j * solution[-1]
+    residual_rms = np.sqrt(squares / kept)
     scatter = _standard_errors(squares, means, kept, periods, 2 * harmonics + 1)
     steps = _per_channel("resolution", resolution, len(channels))
     seen_rms = np.sqrt(np.maximum(np.minimum(rough, squares) / kept - steps**2 / 12.0, 0.0))
     known_rms = _per_channel("noise_rms", noise_rms, len(channels))
-    dither_rms = np.where(known_rms > 0.0, np.minimum(known_rms, np.sqrt(squares / kept)), seen_rms)
+    dither_rms = np.where(known_rms > 0.0, np.minimum(known_rms, residual_rms), seen_rms)
     rounding = rounding_errors(*_shape_of(chunks, solution, coefficients), steps, dither_rms, harmonics)
     return PeriodicVibration(
         channels=tuple(channels),
@@ -150,7 +149,7 @@ def vibration_in(
         periods=periods,
         residual_rms=residual_rms,
         harmonics_std=np.hypot(scatter, part_of_each(rounding)),
-        drift=_relative_drift(solution, harmonics),
+        drift=np.divide(drift, coefficients[:, 1], out=np.zeros_like(drift), where=coefficients[:, 1] != 0.0),
         rounding_std=rounding if resolution is not None else None,
         phase_lag_target_deg=phase_lag_target_deg,
         settled=settled,
@@ -255,13 +254,6 @@ def _residual(chunks: Columns, solution: Float, periods: int) -> tuple[Float, Fl
     return squares, rough, sums / np.maximum(known, 1)[:, None, None] if batches else None
 
 
-def _coefficients(solution: Float, harmonics: int) -> Complex:
-    result = np.zeros((solution.shape[1], harmonics + 1), dtype=np.complex128)
-    result[:, 0] = solution[0]
-    result[:, 1:] = (solution[1 : harmonics + 1] + 1j * solution[harmonics + 1 : 2 * harmonics + 1]).T
-    return result
-
-
 def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[Float, Complex]:
     """Return the phase of some samples, and the harmonics of the vibration there: more than are asked for.
 
@@ -274,14 +266,6 @@ def _shape_of(chunks: Columns, solution: Float, coefficients: Complex) -> tuple[
     first, last = coefficients.shape[1], min(_SHAPE_HARMONICS, int(_BELOW_HALF * per_period))
     turns = turns_of(theta, max(last, first - 1))[first:]
     return theta, np.hstack([coefficients, (turns @ residual).conj().T * (2.0 / theta.size)])
-
-
-def _relative_drift(solution: Float, harmonics: int) -> Complex:
-    """complex[n_channels]: drift over the record relative to the fundamental; zero where there is no fundamental."""
-    fundamental = solution[1] + 1j * solution[harmonics + 1]
-    drift = solution[-2] + 1j * solution[-1]
-    result: Complex = np.divide(drift, fundamental, out=np.zeros_like(drift), where=fundamental != 0.0)
-    return result
 
 
 def batches_of(periods: int) -> int:

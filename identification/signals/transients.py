@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import Channel, find_name, find_role, in_newtons
 from identification.errors import IdentificationError
-from identification.signals.chunks import unwrapped
-from identification.validation import finite_array, positive
+from identification.signals.chunks import check_samples, rising_steps, unwrapped
+from identification.validation import finite_array, positive, shaped_array
 from vibrolock.arrays import Complex, Float
 from vibrolock.results import Result
 
@@ -62,16 +62,11 @@ class Transient(Result):
         in_newtons(self.channels, "a transient")
         for name in ("time_s", "frequency_hz"):
             object.__setattr__(self, name, finite_array(name, getattr(self, name), np.float64, 1))
-        object.__setattr__(self, "fundamentals", finite_array("fundamentals", self.fundamentals, np.complex128, 2))
+        shape = (len(self.channels), self.time_s.size)
+        object.__setattr__(self, "fundamentals", shaped_array("fundamentals", self.fundamentals, np.complex128, shape))
         if self.frequency_hz.shape != self.time_s.shape:
             raise IdentificationError(
                 f"{self.frequency_hz.size} values for {self.time_s.size} instants", field="frequency_hz"
-            )
-        if self.fundamentals.shape != (len(self.channels), self.time_s.size):
-            raise IdentificationError(
-                f"shape {self.fundamentals.shape}",
-                field="fundamentals",
-                allowed=f"({len(self.channels)}, {self.time_s.size})",
             )
         if not self.time_s.size or np.any(np.diff(self.time_s) <= 0.0):
             raise IdentificationError(
@@ -131,12 +126,7 @@ def demodulate(
     single = np.asarray(samples).dtype == np.float32  # as recorded; stretches are computed in double precision
     data = finite_array("samples", samples, np.float32 if single else np.float64, 2)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
-    if data.shape != (len(channels), theta.size):
-        raise IdentificationError(
-            f"shape {data.shape}",
-            field="samples",
-            allowed=f"({len(channels)}, {theta.size}): channels by samples of theta_rad",
-        )
+    check_samples(data, channels, theta.size)
     IdentificationError.unless_at_least("periods", periods, 1)
     shortest = 2.0 * np.pi / _largest_step(theta, periods)
     stride = max(1, int(shortest / _POINTS_PER_PERIOD)) if every is None else every
@@ -145,10 +135,13 @@ def demodulate(
     once = _whole_windows(theta, slice(0, theta.size), reach)
     twice = _whole_windows(theta, once, reach)
     at = np.arange(twice.start, twice.stop, stride)
+    # The mean frequency over the period around each sample is exact if the frequency changes linearly.
+    half, here = np.pi / np.gradient(theta)[at], np.arange(theta.size)
+    advance = np.interp(at + half, here, theta) - np.interp(at - half, here, theta)
     return Transient(
         channels=tuple(channels),
         time_s=at / rate_hz,
-        frequency_hz=_momentary_frequency_hz(theta, at, rate_hz),
+        frequency_hz=advance / half * rate_hz / (4.0 * np.pi),
         fundamentals=np.array([_fundamental(theta, row, at, reach) for row in data]),
         window_periods=2 * periods,
     )
@@ -156,12 +149,7 @@ def demodulate(
 
 def _largest_step(theta: Float, periods: int) -> float:
     """Return the largest advance of the phase per sample, rad; raise `IdentificationError` if the phase cannot be used."""
-    steps = np.diff(theta)
-    if np.any(steps <= 0.0):
-        where = int(np.argmax(steps <= 0.0))
-        raise IdentificationError(
-            f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
-        )
+    steps = rising_steps(theta)
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
     needed = 2 * periods + 1
     if covered < needed:
@@ -214,11 +202,3 @@ def _of_stretch(theta: Float, signal: Float, at: NDArray[np.intp], reach: float)
     mean = (integral(theta[once] + reach) - integral(theta[once] - reach)) / (2.0 * reach)
     again = CubicSpline(theta[once], mean).antiderivative()
     return np.asarray((again(theta[at] + reach) - again(theta[at] - reach)) / (2.0 * reach))
-
-
-def _momentary_frequency_hz(theta: Float, at: NDArray[np.intp], rate_hz: float) -> Float:
-    """float[len(at)]: mean frequency over the period around each sample; exact if the frequency changes linearly."""
-    half = np.pi / np.gradient(theta)[at]  # half a period, in samples
-    here = np.arange(theta.size)
-    advance = np.interp(at + half, here, theta) - np.interp(at - half, here, theta)
-    return np.asarray(advance / half * rate_hz / (4.0 * np.pi))

@@ -128,18 +128,25 @@ def continuous_backbone(
     if up.channels != down.channels or up.drive_mode_shape != down.drive_mode_shape:
         raise IdentificationError("channels or drive_mode_shape differ", field="up, down")
     levels = _levels(up, down, levels_m, number)
-    first = [_first_fits(flow, levels, bandwidth) for flow in (up, down)]
-    noise = _noise([fits for _, fits in first])
-    sensors = _sensor_noise(up, down)
-    ways = [
-        _along(flow, levels, widths, fits, noise, sensors, accuracy)
-        for flow, (widths, fits) in zip((up, down), first, strict=True)
+    widths = [[_wide_enough(np.log(flow.amplitude_m), at, bandwidth) for at in np.log(levels)] for flow in (up, down)]
+    first = [
+        [fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), own, strict=True)]
+        for flow, own in zip((up, down), widths, strict=True)
     ]
-    stiffness, damping = (np.array([[getattr(fit, name) for fit in way.fits] for way in ways]) for name in _PROPERTIES)
-    errors = np.array([way.errors for way in ways])
+    near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(levels.size)]
+    noise = [noise_variances([fit for fits in first for fit in fits[some]]) for some in near]
+    sensors = _sensor_noise(up, down)
+    ramps = [
+        _along(flow, levels, own, fits, noise, sensors, accuracy)
+        for flow, own, fits in zip((up, down), widths, first, strict=True)
+    ]
+    stiffness, damping = (
+        np.array([[getattr(fit, name) for fit in ramp.fits] for ramp in ramps]) for name in ("stiffness", "damping")
+    )
+    errors = np.array([ramp.errors for ramp in ramps])
     points = []
     for n, level in enumerate(levels):
-        both = [way.amplitudes[n] for way in ways]
+        both = [ramp.amplitudes[n] for ramp in ramps]
         mean = Amplitudes(0.5 * (both[0].values + both[1].values), 0.5 * np.hypot(both[0].std, both[1].std))
         random = 0.5 * np.hypot(errors[0, n], errors[1, n])
         points.append(
@@ -150,7 +157,7 @@ def continuous_backbone(
                 float(np.mean(damping[:, n])),
                 (float(random[0]), float(random[1])),
                 mean,
-                sum(way.periods[n] for way in ways),
+                sum(ramp.periods[n] for ramp in ramps),
             )
         )
     return ContinuousBackbone(
@@ -164,11 +171,8 @@ def continuous_backbone(
     )
 
 
-_PROPERTIES = ("stiffness", "damping")
-
-
 @dataclass(frozen=True, eq=False)
-class _Way:
+class _Ramp:
     """One ramp: the fit, its standard errors, the amplitudes and the number of periods of each level."""
 
     fits: list[LocalFit]
@@ -192,13 +196,6 @@ def _levels(up: SlowFlow, down: SlowFlow, levels_m: ArrayLike | None, number: in
     return levels
 
 
-def _first_fits(flow: SlowFlow, levels: Float, bandwidth: float) -> tuple[Float, list[LocalFit]]:
-    """Return widths and fits at every level of one ramp, over the bandwidth or a width with enough instants."""
-    size = np.log(flow.amplitude_m)
-    widths = np.array([_wide_enough(size, level, bandwidth) for level in np.log(levels)])
-    return widths, [fit_around(flow, at, width, _DEGREE) for at, width in zip(np.log(levels), widths, strict=True)]
-
-
 def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
     """Variances of the sensor noise, equal at all levels; estimated at the lowest levels, where it dominates.
 
@@ -206,7 +203,11 @@ def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
     the record (with four degrees of freedom the median is 0.839 of the mean). The rest of the residual is the noise of the
     motion.
     """
-    lowest = [_lowest(flow) for flow in (up, down)]
+    lowest = []
+    for flow in (up, down):
+        size = flow.amplitude_m
+        enough = np.sort(size)[min(_FEWEST_INSTANTS, size.size) - 1]
+        lowest.append(flow.select(size <= max(size.min() * np.exp(_NOISE_SPAN), enough)))
     force = float(np.median(np.concatenate([flow.force_noise for flow in lowest]))) / _MEDIAN
     fits = [
         fit_at(flow, flow.amplitude_m / flow.amplitude_m.min() - 1.0, np.ones(flow.amplitude_m.size), _DEGREE)
@@ -219,29 +220,15 @@ def _sensor_noise(up: SlowFlow, down: SlowFlow) -> Float:
     return np.array([force, max(0.0, float(left - force * by_force) / float(by_motion))])
 
 
-def _lowest(flow: SlowFlow) -> SlowFlow:
-    size = flow.amplitude_m
-    return flow.select(
-        size <= max(size.min() * np.exp(_NOISE_SPAN), np.sort(size)[min(_FEWEST_INSTANTS, size.size) - 1])
-    )
-
-
-def _noise(fits: list[list[LocalFit]]) -> list[Float]:
-    """Variances of the noise at every level, from the fits of both ramps at neighbouring levels."""
-    count = len(fits[0])
-    near = [slice(max(0, n - _NEIGHBOURS), n + _NEIGHBOURS + 1) for n in range(count)]
-    return [noise_variances([fit for way in fits for fit in way[some]]) for some in near]
-
-
 def _along(
     flow: SlowFlow,
     levels: Float,
-    widths: Float,
+    widths: list[float],
     fits: list[LocalFit],
     noise: list[Float],
     sensors: Float,
     accuracy: float,
-) -> _Way:
+) -> _Ramp:
     """Evaluate one ramp; where sensor noise makes the damping too inaccurate, fit fewer unknowns over a larger width."""
     found, periods, errors = [], [], []
     step = float(np.median(np.diff(flow.phase_periods)))
@@ -258,7 +245,7 @@ def _along(
         found.append(amplitudes_at(part, place, weight, degree))
         periods.append(place.size * step)
         errors.append(_errors(fits[n], degree, noise[n], sensors))
-    return _Way(fits, np.array(errors), found, periods)
+    return _Ramp(fits, np.array(errors), found, periods)
 
 
 def _errors(fit: LocalFit, degree: int, noise: Float, sensors: Float) -> Float:

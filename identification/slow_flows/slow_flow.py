@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.channels import MOTION_ORDER, Channel, find_name, find_role
 from identification.errors import IdentificationError
-from identification.signals.chunks import unwrapped
+from identification.signals.chunks import check_samples, rising_steps, unwrapped
 from identification.slow_flows.fits import LocalFit, as_settled, local_fits, noise_variances
 from identification.slow_flows.signals import WINDOW_PERIODS, amplitudes, between_harmonics, derivatives
 from identification.validation import finite_array, positive
@@ -219,12 +219,7 @@ def slow_flow(
     theta = unwrapped(finite_array("theta_rad", theta_rad, np.float64, 1))
     data = finite_array("samples", samples, np.float64, 2)
     rate_hz = positive("sample_rate_hz", sample_rate_hz, "Hz")
-    if data.shape != (len(channels), theta.size):
-        raise IdentificationError(
-            f"shape {data.shape}",
-            field="samples",
-            allowed=f"({len(channels)}, {theta.size}): channels by samples of theta_rad",
-        )
+    check_samples(data, channels, theta.size)
     delay_s = _skew(skew_samples, len(channels)) / rate_hz
     force, drive = find_role(channels, "force"), find_role(channels, "drive")
     at = _instants(theta, harmonics, fit_periods, points_per_period)
@@ -245,7 +240,9 @@ def slow_flow(
     fits = _sliding(stiffness, rate, np.abs(x), periods, fit_periods)
     # The two parts of the noise differ in how slowly they vary; separating them takes longer fits.
     longer = min(_NOISE_FITS * fit_periods, float(np.ptp(periods)))
-    noise = _pooled(_sliding(stiffness, rate, np.abs(x), periods, longer, degree=2), periods)
+    longer_fits = _sliding(stiffness, rate, np.abs(x), periods, longer, degree=2)
+    near = [np.flatnonzero(np.abs(periods - centre) <= 0.5 * _POOLED_PERIODS) for centre in periods]
+    noise = np.array([noise_variances([longer_fits[number] for number in some]) for some in near])
     errors = np.array([fit.standard_errors(variances) for fit, variances in zip(fits, noise, strict=True)])
     return SlowFlow(
         channels=tuple(channels),
@@ -282,12 +279,7 @@ def _instants(theta: Float, harmonics: int, fit_periods: float, points_per_perio
     if not fit_periods >= _MIN_FIT_PERIODS:
         raise IdentificationError(field="fit_periods", value=fit_periods, allowed=f"at least {_MIN_FIT_PERIODS:g}")
     IdentificationError.unless_at_least("points_per_period", points_per_period, 1)
-    steps = np.diff(theta)
-    if np.any(steps <= 0.0):
-        where = int(np.argmax(steps <= 0.0))
-        raise IdentificationError(
-            f"does not rise from [{where}] to [{where + 1}], must rise with time", field="theta_rad"
-        )
+    steps = rising_steps(theta)
     covered = float(theta[-1] - theta[0]) / (2.0 * np.pi) if theta.size else 0.0
     if covered < WINDOW_PERIODS + fit_periods:
         raise IdentificationError(
@@ -322,9 +314,3 @@ def _sliding(
         same = local_fits(stiffness[rows], rate[rows], size[rows], periods[rows], place, np.ones(place.shape), degree)
         fits |= zip(centres.tolist(), same, strict=True)
     return [fits[centre] for centre in range(periods.size)]
-
-
-def _pooled(fits: list[LocalFit], periods: Float) -> Float:
-    """float[n, 2]: variances of the noise around each instant, from the residuals of the fits near it."""
-    near = [np.flatnonzero(np.abs(periods - centre) <= 0.5 * _POOLED_PERIODS) for centre in periods]
-    return np.array([noise_variances([fits[number] for number in some]) for some in near])
