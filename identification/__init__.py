@@ -148,7 +148,7 @@ if TYPE_CHECKING:
     )
     from identification.models.modal.sweeps import predict_sweep as predict_sweep
     from identification.models.pnlss.best_linear import best_linear_responses as best_linear_responses
-    from identification.models.pnlss.coupled.run import CoupledRun as CoupledRun
+    from identification.models.pnlss.coupled import CoupledRun as CoupledRun
     from identification.models.pnlss.error_table import ErrorTable as ErrorTable
     from identification.models.pnlss.errors import (
         estimated_initial_state as estimated_initial_state,
@@ -183,13 +183,12 @@ if TYPE_CHECKING:
         simulated_run as simulated_run,
     )
     from identification.models.structured.bound import Bound as Bound, bound_of as bound_of
-    from identification.models.structured.coupled.run import CoupledMotion as CoupledMotion
-    from identification.models.structured.element_trials import ElementTrial as ElementTrial
+    from identification.models.structured.coupled import CoupledMotion as CoupledMotion
+    from identification.models.structured.element_trials import ElementPlan as ElementPlan, ElementTrial as ElementTrial
     from identification.models.structured.elements import NonlinearElement as NonlinearElement
     from identification.models.structured.fit import StructuredFit as StructuredFit, fit_structured as fit_structured
-    from identification.models.structured.further import ElementPlan as ElementPlan
+    from identification.models.structured.mode import structured_mode as structured_mode
     from identification.models.structured.model import StructuredModel as StructuredModel
-    from identification.models.structured.steady.mode import structured_mode as structured_mode
     from identification.multisine.best_linear_approximation import (
         best_linear_approximation as best_linear_approximation,
         coherence as coherence,

@@ -14,16 +14,13 @@ def formerly(function: Callable[P, T]) -> Callable[P, T]:
 
     @functools.wraps(function)
     def call(*args: P.args, **how: P.kwargs) -> T:
-        for old, new in (("modes", "linear_modes"), ("allow_extrapolation", "largest_range_use")):
-            if old not in how:
-                continue
-            hint = ", `inf` allows any" if old == "allow_extrapolation" else ""
-            warnings.warn(f"`{old}` of {function.__name__} is now `{new}`{hint}", DeprecationWarning, stacklevel=2)
-            value = how.pop(old)
-            if old == "modes":
-                how[new] = value
-            elif value:
-                how[new] = float("inf")
+        for old, new in (("modes", "`linear_modes`"), ("allow_extrapolation", "`largest_range_use`, `inf` allows any")):
+            if old in how:
+                warnings.warn(f"`{old}` of {function.__name__} is now {new}", DeprecationWarning, stacklevel=2)
+        if "modes" in how:
+            how["linear_modes"] = how.pop("modes")
+        if how.pop("allow_extrapolation", False):
+            how["largest_range_use"] = float("inf")
         return function(*args, **how)
 
     return call

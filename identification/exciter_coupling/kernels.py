@@ -1,14 +1,27 @@
 """Compiled parts of a run whose force reacts to its own motion: the reaction's filter, and the secant method for the force."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from identification.exciter_coupling.loop import Loop
 from vibrolock.compiled import inner_kernel
 
 ITERATIONS = 20
 """Secant steps for the force of a sample, at most. Chosen: where the method converges it takes less than ten."""
 EXACT = 1e-12
 """Error of the force that counts as none, relative to the largest force. Chosen: some thousand times the rounding."""
+
+
+class Loop(NamedTuple):
+    """Filter of a force that reacts on an output: ``xi(k+1) = A xi + b y_d``, ``F = F_0 + c xi + d y_d``."""
+
+    a: np.ndarray
+    """float[n_xi, n_xi]."""
+    b: np.ndarray
+    """float[n_xi]."""
+    c: np.ndarray
+    """float[n_xi]."""
+    d: float
 
 
 @inner_kernel

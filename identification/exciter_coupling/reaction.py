@@ -19,7 +19,7 @@ import scipy
 
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
-from identification.exciter_coupling.loop import Loop
+from identification.exciter_coupling.kernels import Loop
 from identification.linear.subspace import StateSpace
 from vibrolock.arrays import Complex, Float
 

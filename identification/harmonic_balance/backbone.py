@@ -23,7 +23,7 @@ _UNIT = 0.02
 """Unit of length of the frequency, relative to the first one."""
 
 
-def resonances(balance: DrivenBalance, begin_hz: float, largest_range_use: float, points: int = 300) -> "Resonances":
+def resonances(balance: DrivenBalance, begin_hz: float, largest_range_use: float, points: int) -> "Resonances":
     """Follow phase resonance from 2 % of the force that a balance holds up to this force, or as far as it goes."""
     equations = PhaseResonance(balance)
     path = continued(

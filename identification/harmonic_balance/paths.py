@@ -10,12 +10,17 @@ from identification.continuation.newton import solved
 from identification.continuation.path import Path, Steps
 from identification.errors import IdentificationError
 from identification.harmonic_balance.driven import DrivenBalance
+from identification.harmonic_balance.states import SteadyStates, steady_states
 from vibrolock.arrays import Float
 
 _FIRST_LEVEL = 0.02
 """Share of the level at which Newton's method starts from the linear solution."""
 _LEVELS = Steps(first=0.1, largest=0.5)
+"""Steps along the level, in units of half of it. Chosen."""
 _MOST_LEVELS = 300
+"""Points on the way from rest, at most. Chosen."""
+_STEPS = Steps(first=0.2 * 0.05, largest=0.05, smallest=1e-5 * 0.05)
+"""Steps along a band. Chosen."""
 _BAND_UNITS = 4.0
 """Length of a band in units of the path: with the longest step of 0.05 a band takes 80 points, with a resonance many more."""
 
@@ -25,6 +30,17 @@ class Followed(NamedTuple):
 
     path: Path
     note: str
+
+    def states(self, balance: DrivenBalance) -> SteadyStates:
+        """Return the vibrations along the path."""
+        path = self.path
+        return steady_states(balance, path.unknowns, path.parameter, path.direction * path.direction[0] > 0.0)
+
+    def folds(self, balance: DrivenBalance) -> SteadyStates:
+        """Return the vibrations at which the frequency turns back."""
+        path = self.path
+        none = np.zeros(path.turning_parameter.size, dtype=bool)
+        return steady_states(balance, path.turning_unknowns, path.turning_parameter, none)
 
 
 def sizes(balance: DrivenBalance, frequency_hz: float) -> Float:
@@ -70,7 +86,7 @@ def statically_stable(balance: DrivenBalance, z: Float, frequency_hz: float, lev
 
 
 def followed(
-    balance: DrivenBalance, begin_hz: float, end_hz: float, *, points: int, step: float, largest_use: float
+    balance: DrivenBalance, begin_hz: float, end_hz: float, *, points: int, largest_use: float
 ) -> Followed | None:
     """Follow the response from rest at one end of a band to the other end; return None if no start is found."""
     start = from_rest(balance, begin_hz, largest_use)
@@ -87,7 +103,7 @@ def followed(
         lowest=low,
         highest=high,
         points=points,
-        steps=Steps(first=0.2 * step, largest=step, smallest=1e-5 * step, kinks=balance.kinks),
+        steps=replace(_STEPS, kinks=balance.kinks),
         stop=lambda z, frequency_hz: beyond(balance, z, largest_use),
     )
     return Followed(path, _note(path, begin_hz, end_hz))

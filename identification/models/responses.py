@@ -1,7 +1,7 @@
 """Steady responses of models of any kind: one function for each question, with one set of defaults."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -11,34 +11,54 @@ from identification.experiments.simulation import Simulation
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import HarmonicResponse, SteadyStates
 from identification.linear.modes import LinearModes
-from identification.models.dynamic_model import HARMONICS, LARGEST_RANGE_USE, POINTS, DynamicModel, SteadyRequest
+from identification.models.dynamic_model import LARGEST_RANGE_USE, DynamicModel, SteadyRequest
 from identification.models.kinds import dynamic_model
 from identification.prediction.response_band import ResponseBand, band_of_responses
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.renamed import formerly
 
-_COMMON = {"harmonics", "points", "largest_range_use"}
+_COMMON = {"force", "harmonics", "points", "largest_range_use"}
 """Options that every kind of model has."""
+
+Band = tuple[float | None, float | None]
+
+
+class StateOptions(TypedDict, total=False):
+    """Options of a steady vibration; `frequency_response` describes them, `SteadyRequest` has their defaults."""
+
+    force: Held | None
+    exciter: Exciter | None
+    held_inputs: Mapping[str, float] | None
+    support: bool | None
+    harmonics: int
+    samples: int | None
+    largest_range_use: float
+
+
+class BackboneOptions(StateOptions, total=False):
+    """Options of a path of steady vibrations."""
+
+    points: int
+
+
+class HarmonicOptions(BackboneOptions, total=False):
+    """Options of a path over frequency."""
+
+    voltage_v: float | None
+    band_hz: Band | None
+
+
+class ResponseOptions(HarmonicOptions, total=False):
+    """Options of `frequency_response`."""
+
+    linear_modes: LinearModes | None
+    residuals: bool | None
+    lowest_share: float | None
 
 
 @formerly
 def frequency_response(
-    model: object,
-    force_n: float | None = None,
-    *,
-    voltage_v: float | None = None,
-    force: Held | None = None,
-    exciter: Exciter | None = None,
-    held_inputs: Mapping[str, float] | None = None,
-    support: bool | None = None,
-    linear_modes: LinearModes | None = None,
-    residuals: bool | None = None,
-    lowest_share: float | None = None,
-    band_hz: tuple[float | None, float | None] | None = None,
-    harmonics: int = HARMONICS,
-    samples: int | None = None,
-    points: int = POINTS,
-    largest_range_use: float = LARGEST_RANGE_USE,
+    model: object, force_n: float | None = None, **options: Unpack[ResponseOptions]
 ) -> SteadyPrediction:
     """Predict the steady response of a model to a constant force or voltage, on all branches.
 
@@ -88,50 +108,15 @@ def frequency_response(
         If the response of a nonlinear mode needs more than ``largest_range_use`` times the largest identified amplitude.
     """
     found = dynamic_model(model)
-    request = _request(
-        found,
-        force_n,
-        voltage_v,
-        force,
-        band_hz=band_hz,
-        exciter=exciter,
-        held_inputs=held_inputs,
-        support=support,
-        linear_modes=linear_modes,
-        residuals=residuals,
-        lowest_share=lowest_share,
-        harmonics=harmonics,
-        samples=samples,
-        points=points,
-        largest_range_use=largest_range_use,
-    )
-    return found.frequency_response(request, band_hz or (None, None))
+    return found.frequency_response(*_request(found, force_n, ResponseOptions, options))
 
 
 @formerly
 def steady_predictions(
-    model: object,
-    forces_n: Sequence[float],
-    *,
-    force: Held | None = None,
-    exciter: Exciter | None = None,
-    linear_modes: LinearModes | None = None,
-    residuals: bool | None = None,
-    largest_range_use: float = LARGEST_RANGE_USE,
+    model: object, forces_n: Sequence[float], **options: Unpack[ResponseOptions]
 ) -> tuple[SteadyPrediction, ...]:
     """Predict the `frequency_response` at several forces; the message of an error names the force."""
-    return tuple(
-        frequency_response(
-            model,
-            force_n,
-            force=force,
-            exciter=exciter,
-            linear_modes=linear_modes,
-            residuals=residuals,
-            largest_range_use=largest_range_use,
-        )
-        for force_n in forces_n
-    )
+    return tuple(frequency_response(model, force_n, **options) for force_n in forces_n)
 
 
 @formerly
@@ -175,19 +160,7 @@ def response_band(
 
 
 def harmonic_response(
-    model: object,
-    force_n: float | None = None,
-    *,
-    voltage_v: float | None = None,
-    force: Held | None = None,
-    exciter: Exciter | None = None,
-    held_inputs: Mapping[str, float] | None = None,
-    support: bool | None = None,
-    band_hz: tuple[float | None, float | None] | None = None,
-    harmonics: int = HARMONICS,
-    samples: int | None = None,
-    points: int = POINTS,
-    largest_range_use: float = LARGEST_RANGE_USE,
+    model: object, force_n: float | None = None, **options: Unpack[HarmonicOptions]
 ) -> HarmonicResponse:
     """Predict the steady response with all harmonics; parameters and errors are those of `frequency_response`.
 
@@ -197,21 +170,7 @@ def harmonic_response(
     support's filter.
     """
     found = dynamic_model(model)
-    request = _request(
-        found,
-        force_n,
-        voltage_v,
-        force,
-        band_hz=band_hz,
-        exciter=exciter,
-        held_inputs=held_inputs,
-        support=support,
-        harmonics=harmonics,
-        samples=samples,
-        points=points,
-        largest_range_use=largest_range_use,
-    )
-    return found.harmonic_response(request, band_hz or (None, None))
+    return found.harmonic_response(*_request(found, force_n, HarmonicOptions, options))
 
 
 def steady_state(
@@ -220,14 +179,8 @@ def steady_state(
     force_n: float | None = None,
     *,
     voltage_v: float | None = None,
-    force: Held | None = None,
-    exciter: Exciter | None = None,
-    held_inputs: Mapping[str, float] | None = None,
-    support: bool | None = None,
-    harmonics: int = HARMONICS,
-    samples: int | None = None,
     near: SteadyStates | None = None,
-    largest_range_use: float = LARGEST_RANGE_USE,
+    **options: Unpack[StateOptions],
 ) -> SteadyStates:
     """Compute the periodic vibration at one frequency and level: reached from rest as the level rises, or ``near`` another.
 
@@ -235,34 +188,12 @@ def steady_state(
     then exceed ``largest_range_use``.
     """
     found = dynamic_model(model)
-    request = _request(
-        found,
-        force_n,
-        voltage_v,
-        force,
-        exciter=exciter,
-        held_inputs=held_inputs,
-        support=support,
-        harmonics=harmonics,
-        samples=samples,
-        largest_range_use=largest_range_use,
-    )
+    request, _ = _request(found, force_n, StateOptions, options, voltage_v)
     return found.steady_state(request, frequency_hz, near)
 
 
 def backbone(
-    model: object,
-    force_n: float,
-    *,
-    force: Held | None = None,
-    exciter: Exciter | None = None,
-    held_inputs: Mapping[str, float] | None = None,
-    support: bool | None = None,
-    near_hz: float | None = None,
-    harmonics: int = HARMONICS,
-    samples: int | None = None,
-    points: int = POINTS,
-    largest_range_use: float = LARGEST_RANGE_USE,
+    model: object, force_n: float, *, near_hz: float | None = None, **options: Unpack[BackboneOptions]
 ) -> SteadyStates:
     """Compute the vibrations at phase resonance from 2 % of a force up to this force, as a backbone test measures them.
 
@@ -275,20 +206,7 @@ def backbone(
         If options do not fit the model, the mode has no phase resonance, or the backbone ends before the force.
     """
     found = dynamic_model(model)
-    request = _request(
-        found,
-        force_n,
-        None,
-        force,
-        exciter=exciter,
-        held_inputs=held_inputs,
-        support=support,
-        harmonics=harmonics,
-        samples=samples,
-        points=points,
-        largest_range_use=largest_range_use,
-    )
-    return found.backbone(request, near_hz)
+    return found.backbone(_request(found, force_n, BackboneOptions, options)[0], near_hz)
 
 
 def coupled_run(model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest_hz: float | None = None) -> Simulation:
@@ -317,33 +235,24 @@ def coupled_run(model: object, exciter: Exciter, voltage_v: ArrayLike, *, lowest
 
 
 def _request(
-    model: DynamicModel,
-    force_n: float | None,
-    voltage_v: float | None,
-    force: Held | None,
-    *,
-    band_hz: tuple[float | None, float | None] | None = None,
-    **options: Any,
-) -> SteadyRequest:
-    """Return what is asked; raise `IdentificationError` for an option that the kind of model does not have."""
-    given = {name: value for name, value in options.items() if value is not None}
-    asked = {
-        **given,
-        **({} if voltage_v is None else {"voltage_v": voltage_v}),
-        **({"band_hz": band_hz} if band_hz else {}),
-    }
-    for name in asked:
+    model: DynamicModel, force_n: float | None, allowed: Any, options: Any, voltage_v: float | None = None
+) -> tuple[SteadyRequest, Band]:
+    """Return what is asked, and the band; raise `IdentificationError` for an option that the kind of model does not have."""
+    if unknown := options.keys() - allowed.__optional_keys__:
+        raise TypeError(f"got an unexpected keyword argument '{min(unknown)}'")
+    given = {name: value for name, value in {"voltage_v": voltage_v, **options}.items() if value is not None}
+    for name in given:
         if name not in model.options | _COMMON:
             raise IdentificationError(f"means nothing to a {model.kind}; leave it out", field=name)
+    force, voltage, band = given.pop("force", None), given.pop("voltage_v", None), given.pop("band_hz", (None, None))
     if force == "voltage":
         raise IdentificationError(
             "force: is 'voltage', allowed are pure-sine, fundamental, rms; the amplitude of a voltage is `voltage_v`"
         )
-    if (force_n is None) == (voltage_v is None):
+    if (force_n is None) == (voltage is None):
         raise IdentificationError("force_n, voltage_v: give one of them")
-    if voltage_v is not None and force is not None:
+    if voltage is not None and force is not None:
         raise IdentificationError(f"is '{force}', which says nothing of a voltage; leave it out", field="force")
-    if voltage_v is not None:
-        return SteadyRequest(level=voltage_v, held="voltage", **given)
-    assert force_n is not None
-    return SteadyRequest(level=force_n, held=force or model.default_held(given.get("exciter")), **given)
+    if force_n is None:
+        return SteadyRequest(level=voltage, held="voltage", **given), band
+    return SteadyRequest(level=force_n, held=force or model.default_held(given.get("exciter")), **given), band

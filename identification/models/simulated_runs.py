@@ -8,7 +8,8 @@ from identification.errors import IdentificationError
 from identification.experiments.checks import check_not_zero
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation
-from identification.experiments.simulators import Simulator, simulated
+from identification.experiments.simulators import Simulator
+from identification.models.balanced_model import begun_at_rest
 from identification.models.kinds import dynamic_model, has_kind
 from identification.prediction.simulated_runs import ErrorSpectra, OutputStretch, SimulatedRun
 from vibrolock.arrays import Float
@@ -108,14 +109,9 @@ def run_of(model: Simulator, experiment: Experiment, initial_state: Float | None
     Raises `IdentificationError` if channels or sample rates differ, or the model cannot begin as the experiment does.
     """
     check_channels(model, experiment)
-    estimated = initial_state is None and experiment.initial_state == "estimated"
     if has_kind(model):
         return dynamic_model(model).simulate_experiment(experiment, initial_state)
-    if estimated or initial_state is not None:
-        raise IdentificationError(
-            f"experiment '{experiment.name}': does not begin at rest, as a {type(model).__name__} does"
-        )
-    return simulated(model, experiment)
+    return begun_at_rest(model, experiment, initial_state)
 
 
 def check_channels(model: Simulator, experiment: Experiment) -> None:

@@ -14,6 +14,17 @@ def _unknown() -> Float:
     return np.array(np.nan)
 
 
+def _shape(result: object, names: tuple[str, ...], shape: tuple[int, ...], allowed: str) -> None:
+    """Make arrays of a result read-only, and fill a single NaN; raise `IdentificationError` for one of another shape."""
+    for name in names:
+        array = np.asarray(getattr(result, name), dtype=np.float64)
+        if array.ndim == 0 and np.isnan(array):
+            array = np.full(shape, array)
+        if array.shape != shape:
+            raise IdentificationError(f"shape {array.shape}", field=name, allowed=allowed)
+        object.__setattr__(result, name, read_only(array, np.float64))
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedRun:
     """Errors of a model simulated with the input of an experiment.
@@ -53,17 +64,8 @@ class SimulatedRun:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
-        for name in ("rms", "peak"):
-            if np.ndim(getattr(self, name)) == 0:
-                object.__setattr__(self, name, np.full(len(self.outputs), np.nan))
-        for name in ("error", "rms", "peak"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
-            if getattr(self, name).shape != (len(self.outputs),):
-                raise IdentificationError(
-                    f"shape {getattr(self, name).shape}",
-                    field=name,
-                    allowed=f"one for each of {len(self.outputs)} outputs",
-                )
+        count = len(self.outputs)
+        _shape(self, ("error", "rms", "peak"), (count,), f"one for each of {count} outputs")
 
     @property
     def bounded(self) -> bool:
@@ -122,17 +124,8 @@ class ErrorSpectra:
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "frequency_hz", read_only(self.frequency_hz, np.float64))
-        for name in ("model", "noise"):
-            if np.ndim(getattr(self, name)) == 0:
-                object.__setattr__(self, name, np.full((len(self.outputs), self.frequency_hz.size), np.nan))
-        for name in ("measured", "linear_error", "error", "model", "noise"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
-            if getattr(self, name).shape != (len(self.outputs), self.frequency_hz.size):
-                raise IdentificationError(
-                    f"shape {getattr(self, name).shape}",
-                    field=name,
-                    allowed=f"({len(self.outputs)}, {self.frequency_hz.size})",
-                )
+        shape = (len(self.outputs), self.frequency_hz.size)
+        _shape(self, ("measured", "linear_error", "error", "model", "noise"), shape, str(shape))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -160,14 +153,8 @@ class OutputStretch:
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
         object.__setattr__(self, "time_s", read_only(self.time_s, np.float64))
-        for name in ("measured", "simulated"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.float64))
-            if getattr(self, name).shape != (len(self.outputs), self.time_s.size):
-                raise IdentificationError(
-                    f"shape {getattr(self, name).shape}",
-                    field=name,
-                    allowed=f"({len(self.outputs)}, {self.time_s.size})",
-                )
+        shape = (len(self.outputs), self.time_s.size)
+        _shape(self, ("measured", "simulated"), shape, str(shape))
 
 
 def _finite(value: float) -> float | None:

@@ -59,16 +59,7 @@ class ModalDynamics(DynamicModel):
         self, request: SteadyRequest, band_hz: tuple[float | None, float | None]
     ) -> SteadyPrediction:
         """Return the response on all branches, around the resonance."""
-        return mode_response(
-            self.mode,
-            request.level,
-            force=request.held,
-            linear_modes=request.linear_modes,
-            residuals=request.residuals,
-            largest_range_use=request.largest_range_use,
-            points=request.points,
-            lowest_share=request.lowest_share,
-        )
+        return mode_response(self.mode, request)
 
     def steady_state(self, request: SteadyRequest, frequency_hz: float, near: SteadyStates | None) -> SteadyStates:
         """Return the smallest vibration, to which rest leads as the force rises, or that nearest to another."""

@@ -7,8 +7,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from identification.errors import IdentificationError
-from identification.linear.modes import LinearModes
-from identification.models.modal.properties import HIGHER_LEVELS, REFUSED_BEYOND, ExtrapolationError, ModalProperties
+from identification.models.dynamic_model import SteadyRequest
+from identification.models.modal.properties import HIGHER_LEVELS, ExtrapolationError, ModalProperties
 from identification.models.modal.steady_states import OneMode, Path, fundamental_motion, range_notes
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import SteadyPrediction
@@ -21,58 +21,23 @@ FARTHEST = 20.0
 """Use of the identified range up to which branches are sought where any extrapolation is allowed. Chosen."""
 
 
-def mode_response(
-    mode: NonlinearMode,
-    force_n: float,
-    *,
-    force: str = "fundamental",
-    linear_modes: LinearModes | None = None,
-    residuals: bool = True,
-    largest_range_use: float = REFUSED_BEYOND,
-    points: int = 401,
-    lowest_share: float = 0.05,
-) -> SteadyPrediction:
+def mode_response(mode: NonlinearMode, request: SteadyRequest) -> SteadyPrediction:
     """Predict the steady response of a nonlinear mode to a constant force, on all branches.
 
-    Parameters
-    ----------
-    mode
-        The identified nonlinear mode.
-    force_n
-        Held force, N: the peak of its fundamental, or its RMS if ``force`` is ``rms``.
-    force
-        Quantity that is constant. ``fundamental``: ``|F_1|`` is held, and the force has the harmonics that the exciter caused
-        when the mode was identified; their power is included in the damping. ``rms``: the RMS of such a force is held; the
-        ratio of fundamental to RMS recorded at phase resonance is interpolated over q, and a note states this. ``pure-sine``:
-        a force without harmonics, with the damping from the total power.
-    linear_modes
-        Linear modes. They provide the responses at their other channels (the shape of the tested mode, scaled by the response
-        of the drive point) and the contribution of the other modes.
-    residuals
-        Whether to add the linear response of the other modes of ``linear_modes`` to the force.
-    largest_range_use
-        Largest modal amplitude over the largest identified; ``inf`` allows any.
-    points
-        Number of points on each branch.
-    lowest_share
-        Modal amplitude at both ends of the main branch, over its largest.
-
-    Raises
-    ------
-    IdentificationError
-        If the force is not above zero, the mode lacks properties, or ``points`` is below 20.
-    ExtrapolationError
-        If the response needs more than ``largest_range_use`` times the largest modal amplitude identified.
+    ``fundamental``: ``|F_1|`` is held, and the force has the harmonics that the exciter caused when the mode was identified;
+    their power is included in the damping. ``rms``: the RMS of such a force is held; the ratio of fundamental to RMS recorded
+    at phase resonance is interpolated over q, and a note states this. ``pure-sine``: the damping is from the total power.
     """
+    force, lowest_share = request.held, request.lowest_share
     IdentificationError.unless_one_of("force", force, get_args(HeldForce))
-    IdentificationError.unless_at_least("points", points, 20)
+    IdentificationError.unless_at_least("points", request.points, 20)
     if not 0.0 < lowest_share < 1.0:
         raise IdentificationError(field="lowest_share", value=lowest_share, allowed="between 0 and 1")
-    level = positive("force_n", force_n, "N")
+    level = positive("force_n", request.level, "N")
     properties = ModalProperties.of(
         mode,
         damping="total-power" if force == "pure-sine" else "fundamental",
-        largest_range_use=largest_range_use,
+        largest_range_use=request.largest_range_use,
     )
     one = OneMode(properties, fundamental_of(mode, level, force))
     paths, notes = _branches(one, level)
@@ -82,11 +47,13 @@ def mode_response(
         notes.append(
             "the force's harmonics per fundamental are those recorded at phase resonance, off resonance as well"
         )
-    s = [_parameters(one, path, points | 1, lowest_share) for path in paths]  # odd: the largest q is among them
+    s = [_parameters(one, path, request.points | 1, lowest_share) for path in paths]  # odd: the largest q is among them
     q, sign = np.concatenate([path.at(each) for path, each in zip(paths, s, strict=True)], axis=1)
     omega = one.omega(q, sign)
     folds = np.concatenate([_folds(one, path, each) for path, each in zip(paths, s, strict=True)], axis=0)
-    channels, motion = fundamental_motion(mode, properties, q, omega, one.fundamental_n(q), linear_modes, residuals)
+    channels, motion = fundamental_motion(
+        mode, properties, q, omega, one.fundamental_n(q), request.linear_modes, request.residuals
+    )
     return SteadyPrediction(
         force_n=level,
         force=force,

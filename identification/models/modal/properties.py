@@ -140,7 +140,13 @@ class ModalProperties:
             max(_slope(q[last], z[last]), 0.0),
             shape[-1],
         )
-        cubics = _pchip(q, np.column_stack([omega, z, shape]))
+        values = np.column_stack([omega, z, shape])
+        if q.size == 1:
+            cubics = np.concatenate([np.zeros((3, 3, 1)), values.T[:, :, None]], axis=1)
+        else:
+            from scipy.interpolate import PchipInterpolator  # only on use: it takes long to load
+
+            cubics = np.ascontiguousarray(np.moveaxis(PchipInterpolator(q, values).c, 2, 0))
         return cls(
             modal_amplitude=q,
             omega_rad_s=omega,
@@ -225,15 +231,6 @@ def _merged(table: Float) -> Float:
         else:
             groups.append([column])
     return np.array([table[:, group].mean(axis=1) for group in groups]).T
-
-
-def _pchip(q: Float, values: Float) -> Float:
-    """float[m, 4, max(n - 1, 1)]: coefficients of the monotone cubics through [n, m] values, highest power first."""
-    if q.size == 1:
-        return np.concatenate([np.zeros((values.shape[1], 3, 1)), values.T[:, :, None]], axis=1)
-    from scipy.interpolate import PchipInterpolator
-
-    return np.ascontiguousarray(np.moveaxis(PchipInterpolator(q, values).c, 2, 0))
 
 
 def _slope(x: Float, y: Float) -> float:

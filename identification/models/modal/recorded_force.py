@@ -17,10 +17,12 @@ from identification.models.modal.steady_states import OneMode, fundamental_motio
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.prediction.steady_prediction import SteadyPrediction
 from identification.renamed import formerly
-from vibrolock.arrays import Complex, Float
+from vibrolock.arrays import Float
 
 _SAME_LAG_DEG = 1.0
+"""Difference of phase lags below which the states of a point count as equally near to the measured one. Chosen."""
 _MISSED = 0.02
+"""Share of the force by which a state beyond its fold may be missed. Chosen."""
 
 
 @formerly
@@ -71,10 +73,11 @@ def recorded_force_response(
     q, forces = np.concatenate(states), reference.force_n[point]
     omegas = 2.0 * np.pi * reference.frequency_hz[point]
     channels, motion = fundamental_motion(mode, properties, q, omegas, forces, linear_modes, residuals)
-    if by_force:
-        taken = _chosen(point, q, np.zeros(q.size))
-    else:
-        taken = _chosen(point, q, _apart_deg(motion[:, 0], reference.phase_lag_deg[point]))
+    apart_deg = np.zeros(q.size)
+    if not by_force:
+        turned = motion[:, 0] * np.exp(1j * np.radians(reference.phase_lag_deg[point]))
+        apart_deg = np.abs(np.degrees(np.angle(turned)))
+    taken = _chosen(point, q, apart_deg)
     q, omegas, forces = q[taken], omegas[taken], forces[taken]
     stable = _stable(properties, q, omegas)
     notes = ["response to the force as it was recorded at each point", *range_notes(properties, q)]
@@ -126,11 +129,6 @@ def _states(properties: ModalProperties, reference: FrequencyResponse, stable_on
 def _stable(properties: ModalProperties, q: Float, omega: Float) -> NDArray[np.bool_]:
     """bool[n]: stability under constant force, which follows from q and W alone."""
     return OneMode(properties, np.ones_like).stable(q, omega)
-
-
-def _apart_deg(motion: Complex, lag_deg: Float) -> Float:
-    """float[n]: difference between predicted and measured phase lags, 0 to 180 degrees."""
-    return np.abs(np.degrees(np.angle(motion * np.exp(1j * np.radians(lag_deg)))))
 
 
 def _chosen(point: NDArray[np.int64], q: Float, apart_deg: Float) -> NDArray[np.int64]:

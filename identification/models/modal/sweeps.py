@@ -106,7 +106,9 @@ def predict_sweep(
         if isinstance(sweep, VoltageSweep):
             raise IdentificationError("is a voltage", field="sweep", allowed="an exciter", hint="give exciter")
         given = force_input(sweep)
-        return _integrate(properties, given, *_imposed(given), None, ())
+        force, load = given.amplitude, np.zeros((given.time_s.size, 3), np.complex128)
+        rate = np.gradient(force, given.step_s) if given.window_periods else np.zeros_like(force)
+        return _integrate(properties, given, force, rate, load, None, ())
     if isinstance(sweep, HalfPeriods):
         raise IdentificationError(
             "half periods of a force are imposed without an exciter; give exciter = None", field="sweep"
@@ -116,12 +118,6 @@ def predict_sweep(
     given = given.thinned(0.5 * _STEP_RAD / float(max(detuning, 1e-9)))
     notes = _coupling_notes(exciter, linear_modes, given)
     return _integrate(properties, given, *_coupled(given, exciter, linear_modes, properties), notes)
-
-
-def _imposed(given: SweepInput) -> tuple[Complex, Complex, Complex]:
-    """Return the force, its rate, and zero load (complex[n], complex[n], complex[n, 3])."""
-    rate = np.gradient(given.amplitude, given.step_s) if given.window_periods else np.zeros_like(given.amplitude)
-    return given.amplitude, rate, np.zeros((given.time_s.size, 3), np.complex128)
 
 
 def _coupled(
@@ -217,11 +213,8 @@ def _coupling_notes(exciter: Exciter, modes: LinearModes | None, given: SweepInp
     notes = [f"holds for the exciter of {exciter.source} alone" if exciter.source else "holds for this exciter alone"]
     if modes is None:
         notes.append("the structure's other modes are left out")
-    elif (
-        np.count_nonzero(
-            (modes.frequency_hz > given.frequency_hz.min()) & (modes.frequency_hz < given.frequency_hz.max())
-        )
-        > 1
-    ):
+        return tuple(notes)
+    low, high = given.frequency_hz.min(), given.frequency_hz.max()
+    if np.count_nonzero((modes.frequency_hz > low) & (modes.frequency_hz < high)) > 1:
         notes.append("more than one mode lies in the sweep's range: only the tested one is nonlinear")
     return tuple(notes)

@@ -157,33 +157,18 @@ def feature_derivatives(table: Table, v: np.ndarray, slope: np.ndarray, steep: n
 
 
 @inner_kernel
-def state_after(m: Matrices, phi: np.ndarray, v: np.ndarray, x: np.ndarray) -> None:
-    """Write ``A x + B u + E phi`` to ``x``, which must not be part of ``v``."""
-    n = m.a.shape[0]
-    for i in range(n):
+def linear_sum(a: np.ndarray, b: np.ndarray, e: np.ndarray, phi: np.ndarray, v: np.ndarray, out: np.ndarray) -> None:
+    """Write ``A x + B u + E phi`` of ``v = (x, u)`` to ``out``, which must not be part of ``v``."""
+    n = a.shape[1]
+    for i in range(a.shape[0]):
         total = 0.0
         for j in range(n):
-            total += m.a[i, j] * v[j]
-        for j in range(m.b.shape[1]):
-            total += m.b[i, j] * v[n + j]
+            total += a[i, j] * v[j]
+        for j in range(b.shape[1]):
+            total += b[i, j] * v[n + j]
         for j in range(phi.size):
-            total += m.e[i, j] * phi[j]
-        x[i] = total
-
-
-@inner_kernel
-def outputs_at(m: Matrices, chi: np.ndarray, v: np.ndarray, y: np.ndarray) -> None:
-    """Write ``C x + D u + F chi`` to ``y``."""
-    n = m.a.shape[0]
-    for i in range(m.c.shape[0]):
-        total = 0.0
-        for j in range(n):
-            total += m.c[i, j] * v[j]
-        for j in range(m.d.shape[1]):
-            total += m.d[i, j] * v[n + j]
-        for j in range(chi.size):
-            total += m.f[i, j] * chi[j]
-        y[i] = total
+            total += e[i, j] * phi[j]
+        out[i] = total
 
 
 @kernel
@@ -215,10 +200,10 @@ def simulate(
         for j in range(u.shape[1]):
             work.v[n + j] = u[k, j]
         feature_values(output_table, work.v, work.chi)
-        outputs_at(m, work.chi, work.v, y[k])
+        linear_sum(m.c, m.d, m.f, work.chi, work.v, y[k])
         for i in range(m.c.shape[0]):
             if not np.isfinite(y[k, i]):
                 return int(k)
         feature_values(state_table, work.v, work.phi)
-        state_after(m, work.phi, work.v, work.x)
+        linear_sum(m.a, m.b, m.e, work.phi, work.v, work.x)
     return int(count)

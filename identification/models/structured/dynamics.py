@@ -6,19 +6,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.channels import MOTION_ORDER
-from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
-from identification.experiments.experiment import Experiment
-from identification.harmonic_balance.driven import DrivenBalance
+from identification.harmonic_balance.basis import Basis
+from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.states import SteadyStates, largest_use, motion_rows
 from identification.models.balanced_model import BalancedModel
 from identification.models.dynamic_model import Limit, SteadyRequest
-from identification.models.structured.coupled.run import CoupledMotion, structured_coupled_run
+from identification.models.structured.balance import StructuredBalance
+from identification.models.structured.coupled import coupled_run
 from identification.models.structured.fit import StructuredFit
 from identification.models.structured.model import Motion, StructuredModel
-from identification.models.structured.steady.setting_up import balance_of, resonance_hz
 from identification.models.structured.uncertainty import drawn
 from vibrolock.arrays import Complex, Float
+
+_SAMPLES = 32
+"""Samples of a period per harmonic. Chosen: dampers and springs have bends."""
+_LEAST_SAMPLES = 256
+"""Samples of a period at least. Chosen."""
+_GUESSED = 0.5
+"""Default lowest frequency of a run with an exciter, relative to the resonance of small vibrations. Chosen."""
 
 
 class StructuredDynamics(BalancedModel):
@@ -32,14 +38,22 @@ class StructuredDynamics(BalancedModel):
         self.fit = found if isinstance(found, StructuredFit) else None
         self.driven = self.model = found.model if isinstance(found, StructuredFit) else found
 
-    def balance(self, request: SteadyRequest, highest_hz: float) -> tuple[DrivenBalance, list[str]]:
-        """Return the balance of the continuous equation of motion."""
-        given = request.level, request.held, request.exciter, request.support
-        return balance_of(self.model, *given, request.harmonics, request.samples), []
+    def samples_for(self, harmonics: int) -> int:
+        """Return enough samples for laws with bends."""
+        return max(_SAMPLES * harmonics, _LEAST_SAMPLES)
+
+    def equations(self, drive: Drive, basis: Basis, held: Float, request: SteadyRequest) -> StructuredBalance:
+        """Return the balance of the continuous equation of motion; by default the support acts if there is an exciter."""
+        supported = request.exciter is not None if request.support is None else request.support
+        return StructuredBalance(self.model, drive, basis, supported)
 
     def resonance_hz(self, near_hz: float | None = None) -> float:
-        """Return the frequency of a mode of small vibrations."""
-        return resonance_hz(self.model, near_hz)
+        """Frequency of a mode of small vibrations: the nearest one, or that which moves most at the first input."""
+        at_rest = self.model.linearised()
+        if near_hz is not None:
+            return float(at_rest.frequency_hz[np.argmin(np.abs(at_rest.frequency_hz - near_hz))])
+        compliance = at_rest.input_shapes[:, 0] ** 2 / (at_rest.damping_ratio * at_rest.omega**2)
+        return float(at_rest.frequency_hz[int(np.argmax(compliance))])
 
     def range_notes(self, points: SteadyStates) -> list[str]:
         """Return a note on elements that move further than in the training data."""
@@ -62,21 +76,9 @@ class StructuredDynamics(BalancedModel):
         elements = enumerate(self.model.elements)
         return tuple(Limit(f"element {k + 1}", float(e.largest or e.reach) * e.scale_m, "m") for k, e in elements)
 
-    def simulate(self, inputs: ArrayLike) -> Motion:
-        """Return the run from rest."""
-        return self.model.simulate(inputs)
-
-    def simulate_experiment(self, experiment: Experiment, initial_state: Float | None = None) -> Motion:
-        """Return the run of `StructuredModel.simulate_experiment`."""
-        if initial_state is not None or experiment.initial_state == "estimated":
-            raise IdentificationError(
-                f"experiment '{experiment.name}': does not begin at rest, as a {type(self.model).__name__} does"
-            )
-        return self.model.simulate_experiment(experiment)
-
-    def coupled_run(self, exciter: Exciter, voltage_v: ArrayLike, lowest_hz: float | None) -> CoupledMotion:
-        """Return the run with the exciter."""
-        return structured_coupled_run(self.model, exciter, voltage_v, lowest_hz=lowest_hz)
+    def coupled_run(self, exciter: Exciter, voltage_v: ArrayLike, lowest_hz: float | None) -> Motion:
+        """Return the run with the exciter, whose reaction is exact above half the resonance by default."""
+        return coupled_run(self.model, exciter, voltage_v, lowest_hz, lambda: _GUESSED * self.resonance_hz())
 
     def draws(self, count: int, seed: int) -> Iterator["StructuredDynamics"]:
         """Yield models about that of the fit."""

@@ -1,19 +1,52 @@
-"""Whether a further element pays, on data to which the model was not fitted."""
+"""Elements to be fitted, and whether each pays on data to which the model was not fitted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from identification.errors import IdentificationError
 from identification.experiments.errors import errors_of
 from identification.experiments.experiment import Experiment
-from identification.models.structured.further import ElementPlan
+from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
 from identification.models.structured.model import StructuredModel
 from vibrolock.arrays import Float
 
 _SURE = 0.95
+"""Confidence that errors fall. Chosen."""
 _LEAST_GAIN = 1.05
-"""Smallest factor by which errors have to fall."""
+"""Smallest factor by which errors have to fall. Chosen."""
+
+
+@dataclass(frozen=True)
+class ElementPlan:
+    """An element to be fitted.
+
+    Parameters
+    ----------
+    laws
+        Its laws.
+    between
+        Names of output channels: one for the displacement there, two for that of the first relative to the second. Empty: the
+        direction is found.
+
+    Raises
+    ------
+    IdentificationError
+        If there are no laws, or more than two channels.
+    """
+
+    laws: tuple[Law, ...] = (PolynomialSpring(), PolynomialDamper())
+    between: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("laws", "between"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        IdentificationError.raise_if(not self.laws, "is empty", field="laws", allowed="one at least")
+        if len(self.between) > 2 or len(set(self.between)) < len(self.between):
+            raise IdentificationError(
+                f"is {', '.join(self.between)}", field="between", allowed="one or two different outputs"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from identification.errors import IdentificationError
 from identification.models.structured.laws import Damper, Joint, Law, Spring
 from identification.storage import stored
 from identification.validation import finite_array, positive
-from vibrolock.arrays import Float
+from vibrolock.arrays import Complex, Float
 
 NODES = 513
 """Nodes of a table. Between them a cubic follows a polynomial of degree 5 to 1e-8 of its largest force."""
@@ -191,7 +191,8 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
         element, law = elements[e], elements[e].laws[number]
         begin = int(tables.first[e]) + sum(len(element.sliders([other])) for other in element.laws[:number])
         for k in range(law.vector.size):
-            less, more = (_nudged(law, k, sign) for sign in (-1.0, 1.0))
+            step = _NUDGE * np.eye(law.vector.size)[k]
+            less, more = law.moved(law.vector - step), law.moved(law.vector + step)
             owner.append(e)
             if isinstance(law, Spring):
                 change = (element.spring([more]) - element.spring([less])) / (2.0 * _NUDGE)
@@ -221,7 +222,27 @@ def changes_of(elements: Sequence[NonlinearElement], tables: Tables) -> Changes:
     )
 
 
-def _nudged(law: Law, number: int, sign: float) -> Law:
-    vector = law.vector
-    vector[number] += sign * _NUDGE
-    return law.moved(vector)
+def at_rest(omega: Float, zeta: Float, elements: Sequence[NonlinearElement]) -> tuple[Float, Float]:
+    """Return the matrices of stiffness and damping of small vibrations in modal coordinates, float[n, n] each.
+
+    ``omega`` (rad/s) and ``zeta``, float[n], are those of the linear part. The support is left out.
+    """
+    phi = np.array([element.phi for element in elements]).reshape(len(elements), len(omega))
+    slope, loss = np.array([element.at_rest for element in elements]).reshape(len(elements), 2).T
+    return np.diag(omega**2) + (phi.T * slope) @ phi, np.diag(2.0 * zeta * omega) + (phi.T * loss) @ phi
+
+
+def small_vibrations(omega: Float, zeta: Float, elements: Sequence[NonlinearElement]) -> tuple[Complex, Float]:
+    """Return poles (rad/s, upper half, lowest first) and shapes without damping in modal coordinates, float[n, n] by columns.
+
+    Arguments are those of `at_rest`. Raises `IdentificationError` if a mode does not oscillate and fade.
+    """
+    n = len(omega)
+    stiffness, damping = at_rest(omega, zeta, elements)
+    poles = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
+    poles = poles[poles.imag > 0.0]
+    if len(poles) < n or np.any(poles.real >= 0.0):
+        raise IdentificationError(
+            "at rest a mode does not oscillate and fade; there are no small vibrations", field="elements"
+        )
+    return poles[np.argsort(np.abs(poles))], np.asarray(np.linalg.eigh(stiffness)[1])

@@ -14,16 +14,14 @@ from identification.experiments.experiment import Experiment, excited_band, same
 from identification.fitting.result import Ending, FitResult
 from identification.fitting.threads import threads
 from identification.linear.modes import LinearModes
-from identification.models.structured.element_trials import ElementTrial
-from identification.models.structured.further import ElementPlan, with_further_element
+from identification.models.structured.element_trials import ElementPlan, ElementTrial
 from identification.models.structured.laws import Law, PolynomialDamper, PolynomialSpring
-from identification.models.structured.leading import Lead
-from identification.models.structured.modal_motion import measured_velocity, prolonged, settling_periods
-from identification.models.structured.modal_test import ModalTest
-from identification.models.structured.model import LEAD, StructuredModel
+from identification.models.structured.modal_motion import prolonged, settling_periods
+from identification.models.structured.model import StructuredModel
+from identification.models.structured.nudging import Nudging
 from identification.models.structured.parameters import HIGHEST, Parameters
-from identification.models.structured.problem import Problem
-from identification.models.structured.start import linear_start, with_element
+from identification.models.structured.problem import ModalTest, Problem
+from identification.models.structured.start import linear_start, with_element, with_further_element
 from vibrolock.arrays import Float
 
 _ROUGH, _FINE = 3e-2, 2e-4
@@ -38,8 +36,8 @@ _STAGES = {
         (0.0, True, True),
     ),
 }
-"""Damping ratio of the leading forces in each fit, whether the support is free, and whether directions are; by whether the
-support is asked for. While forces lead, or the law is far from right, directions would take on what these get wrong."""
+"""Damping ratio of the nudging forces in each fit, whether the support is free, and whether directions are; by whether the
+support is asked for. Directions are free in the last stage only: earlier they absorb errors of nudging forces and law."""
 _MISFIT = 0.01
 """Relative misfit of the samples against which the errors of the modal test are weighed at first; later that of the fit before,
 if it is smaller."""
@@ -213,45 +211,33 @@ def _fitted(
     led: int,
     support: bool,
 ) -> _Fitted:
-    """Fit all numbers, in stages with less and less of the leading forces."""
+    """Fit all numbers, in stages with smaller and smaller nudging forces."""
     tied = (find_role(start.outputs, "drive"),)
     stiffness = _SUPPORT * (linear.omega[0] / linear.input_shapes[0, 0]) ** 2
     found, evaluations, iterations, misfit = start, 0, 0, _MISFIT
-    measured = np.arange(len(linear.omega)) < led
     seen = float(linear.frequency_hz[-1]) < 0.5 * linear.sample_rate_hz  # the last may be the residual's
     poles = len(linear.frequency_hz if seen else modes.frequency_hz)
-    rough = min(start.steps, _rough_steps(start))
-    slowest = float(np.min((linear.omega * linear.damping_ratio)[measured]))
+    # fits before the last one take half of the steps, as long as every mode may rise by a fifth
+    needed = 1.2 * float(np.max(start.frequency_hz)) / (HIGHEST * start.sample_rate_hz)
+    rough = min(start.steps, max(math.ceil(0.5 * start.steps), math.ceil(needed)))
+    slowest = float(np.min((linear.omega * linear.damping_ratio)[:led]))
     for ratio, free, turned in _STAGES[support]:
         if free and not found.support_n_m:
             found = replace(found, support_n_m=stiffness)
-        # the last fit is free for so long before it counts that nothing is left of the lead
+        # the last fit runs without nudging for so long before it counts that its effect has decayed
         lengths = [0 if ratio or not e.period_samples else settling_periods(e, slowest) for e in experiments]
         settled = [prolonged(e, count) for e, count in zip(experiments, lengths, strict=True)]
-        begun = start if turned else start.with_steps(rough)
-        leads = [
-            Lead(
-                2.0 * LEAD * linear.omega * measured,
-                2.0 * ratio * linear.omega * measured,
-                np.vstack([e.inputs, measured_velocity(linear, e, int(measured.sum()))]),
-                begun.steps,
-                e.counted_from - count * e.period_samples,
-                e.period_samples,
-            )
+        begun = start if turned else replace(start, steps=rough)
+        nudgings = [
+            Nudging.of(linear, e, led, ratio, begun.steps, e.counted_from - count * e.period_samples)
             if e.period_samples
             else None
             for e, count in zip(settled, lengths, strict=True)
         ]
         parameters = Parameters(begun, tied, free, turned, poles)
-        problem = Problem(parameters, settled, leads, ModalTest(parameters, modes, linear), misfit)
+        problem = Problem(parameters, settled, nudgings, ModalTest(parameters, modes, linear), misfit)
         end = problem.solve(parameters.vector(found), _FINE if turned else _ROUGH)
         found = parameters.model(end.vector)
         evaluations, iterations = evaluations + end.evaluations, iterations + end.iterations
         misfit = min(_MISFIT, problem.error(end.vector))
     return _Fitted(found, start, problem, end.vector, end.ending, evaluations, iterations)
-
-
-def _rough_steps(model: StructuredModel) -> int:
-    """Return steps in a sample for the fits before the last: half of them, as long as every mode may rise by a fifth."""
-    needed = 1.2 * float(np.max(model.frequency_hz)) / (HIGHEST * model.sample_rate_hz)
-    return max(math.ceil(0.5 * model.steps), math.ceil(needed))

@@ -91,6 +91,16 @@ class Law:
         return tuple(out)
 
     @property
+    def n_linear(self) -> int:
+        """Number of the numbers in which the law is linear."""
+        return np.size(getattr(self, self.linear)) if self.linear else 0
+
+    @property
+    def least_linear(self) -> float:
+        """Least value of these."""
+        return 0.0 if self.linear and self.free[self.linear] in (POSITIVE, FROM_ZERO) else -np.inf
+
+    @property
     def vector(self) -> Float:
         """float[P], the numbers as a fit moves them."""
         parts = [way.to(np.atleast_1d(np.asarray(getattr(self, name), float))) for name, way in self.free.items()]
@@ -120,7 +130,9 @@ class Law:
         return [replace(self, **dict(way)) for way in product(*ways)]
 
     def basis(self) -> list[Self]:
-        """Return the law with one of its linear numbers at 1 and the others at 0, for each."""
+        """Return the law with one of its linear numbers at 1 and the others at 0, for each; none without such numbers."""
+        if not self.linear:
+            return []
         value = getattr(self, self.linear)
         if not isinstance(value, tuple):
             return [replace(self, **{self.linear: 1.0})]

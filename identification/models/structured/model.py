@@ -10,20 +10,16 @@ from identification.channels import MOTION_ORDER, Channel, find_name
 from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.experiments.simulation import Simulation, first_unbounded, use_of
-from identification.models.structured.elements import NonlinearElement, tables_of
-from identification.models.structured.held_support import held, periods_of, renew
-from identification.models.structured.modal_motion import measured_velocity, prolonged, settling_periods
-from identification.models.structured.small_vibrations import small_vibrations
-from identification.models.structured.steps import Room, System, led, run
+from identification.models.structured.elements import NonlinearElement, small_vibrations, tables_of
+from identification.models.structured.modal_motion import prolonged, settling_periods
+from identification.models.structured.nudging import Nudging, ends_of_steps, renew
+from identification.models.structured.steps import Room, System, run
 from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 from vibrolock.results import Result
 
 _SOFTEST, _STIFFEST = -0.5, 4.0
 """Slopes of the springs beyond their reach, relative to the static stiffness in their direction, all elements together."""
-LEAD = 0.05
-"""Damping ratio of the forces that lead a simulation to the measured motion before the samples that count."""
-_WINDOW = ("kaiser", 8.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -229,26 +225,16 @@ class StructuredModel(Result):
         """Return the motion under the inputs of an experiment.
 
         A periodic one begins with the measured motion: up to the samples that count, a force on every mode whose motion the
-        outputs tell apart leads it to the measured velocity; periods that are not returned follow without that force. Where
+        outputs tell apart nudges it to the measured velocity; periods that are not returned follow without that force. Where
         several steady vibrations are possible, the run is thus on the measured branch. Other experiments begin at rest.
         """
         if not experiment.period_samples:
             return self.simulate(experiment.inputs)
-        modes, told = len(self.omega), min(len(self.omega), len(self.outputs))
+        told = min(len(self.omega), len(self.outputs))
         added = settling_periods(experiment, float(np.min((self.omega * self.damping_ratio)[:told])))
         longer, until = prolonged(experiment, added), experiment.counted_from
-        rate = 2.0 * LEAD * self.omega * (np.arange(modes) < told)
-        velocity, free = measured_velocity(self, longer, told), held(self.system)
-        ends = ends_of_steps(np.vstack([longer.inputs, velocity]), self.steps)
-        stretches = [
-            (system, first, last)
-            for system, begin, end in (
-                (led(free, rate), 0, until),
-                (led(free, 0.0 * rate), until, longer.inputs.shape[1]),
-            )
-            for first, last in periods_of(begin, end, until, experiment.period_samples)
-        ]
-        run_of = self.run(stretches, longer.inputs, ends, longer.counted_from)
+        nudging = Nudging.of(self, longer, told, 0.0, self.steps, until)
+        run_of = self.run(nudging.stretches(self.system), longer.inputs, nudging.ends, longer.counted_from)
         kept = np.r_[:until, longer.counted_from : longer.inputs.shape[1]]
         cut = {name: getattr(run_of, name)[:, kept] for name in ("outputs", "states", "acceleration")}
         return replace(run_of, **cut, unbounded_at=first_unbounded(cut["outputs"]))
@@ -342,12 +328,3 @@ def room_for(system: System, columns: int = 0) -> Room:
         stuck=np.zeros(len(system.tables.sliders)),
         unsolved=np.zeros(1, dtype=np.int64),
     )
-
-
-def ends_of_steps(inputs: Float | Sequence[Sequence[float]], steps: int) -> Float:
-    """float[n steps + 1, n_inputs]: inputs between the samples, without what lies above half the sample rate."""
-    from scipy.signal import resample_poly  # only on use: it takes a second to load
-
-    u = np.asarray(inputs, dtype=np.float64)
-    ends = u if steps == 1 else resample_poly(u, steps, 1, axis=1, window=_WINDOW, padtype="line")
-    return np.ascontiguousarray(np.concatenate([ends, ends[:, -1:]], axis=1).T)

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.models.structured.elements import NonlinearElement, changes_of, laws_in_order
-from identification.models.structured.held_support import renew
-from identification.models.structured.leading import Lead, not_led
-from identification.models.structured.model import StructuredModel, ends_of_steps, outputs_of, room_for
+from identification.models.structured.model import StructuredModel, outputs_of, room_for
+from identification.models.structured.nudging import Nudging, ends_of_steps, not_led, renew
 from identification.models.structured.sensitivities import Sensitivities, run_with_sensitivities
 from identification.models.structured.steps import System
 from vibrolock.arrays import Float
@@ -160,11 +159,11 @@ class Parameters:
         )
 
     def derivatives(
-        self, model: StructuredModel, u: Float, counted_from: int, lead: Lead | None = None
+        self, model: StructuredModel, u: Float, counted_from: int, nudging: Nudging | None = None
     ) -> tuple[Float, Float]:
         """Return the counted outputs, float[n, n_outputs], and their derivatives by the vector, float[n, n_outputs, P]."""
         system, modes, inputs = model.system, len(model.frequency_hz), len(model.inputs)
-        stretches, ends = _stretches(model, u, lead)
+        stretches, ends = _stretches(model, u, nudging)
         changes = changes_of(model.elements, system.tables)
         count = 2 * modes + modes * inputs + system.phi.size + changes.element.size + 1
         count += -count % _VECTOR  # columns of zeros before the last
@@ -187,19 +186,19 @@ class Parameters:
                 np.zeros((modes, count)),
                 raw,
             )
-            if lead is not None and last == lead.until:
-                more = lead.before - lead.rate  # what follows is led at the second rate
+            if nudging is not None and last == nudging.until:
+                more = nudging.before - nudging.rate  # what follows is nudged at the second rate
                 sens = sens._replace(rows=not_led(sens.rows, system, more), sums=not_led(sens.sums, system, more))
-            if lead is not None:
+            if nudging is not None:
                 renew(part, (last - first) / model.sample_rate_hz, state, sens.rows)
-        if lead is not None:
-            raw = not_led(raw, system, lead.rate)
+        if nudging is not None:
+            raw = not_led(raw, system, nudging.rate)
         found = outputs_of(model, u, states)[:, counted_from:].T
         return found, self._by_vector(model, raw, states[counted_from:], u[:, counted_from:])
 
-    def outputs(self, model: StructuredModel, u: Float, counted_from: int, lead: Lead | None = None) -> Float:
+    def outputs(self, model: StructuredModel, u: Float, counted_from: int, nudging: Nudging | None = None) -> Float:
         """Return the counted outputs alone, float[n, n_outputs]."""
-        stretches, ends = _stretches(model, u, lead)
+        stretches, ends = _stretches(model, u, nudging)
         return model.run(stretches, u, ends).outputs[:, counted_from:].T
 
     def _by_vector(self, model: StructuredModel, raw: Float, states: Float, u: Float) -> Float:
@@ -238,8 +237,10 @@ class Parameters:
         return np.concatenate(columns, axis=2)
 
 
-def _stretches(model: StructuredModel, u: Float, lead: Lead | None) -> tuple[list[tuple[System, int, int]], Float]:
+def _stretches(
+    model: StructuredModel, u: Float, nudging: Nudging | None
+) -> tuple[list[tuple[System, int, int]], Float]:
     """Return the system with the first and last sample of each stretch, and the inputs at the ends of all steps."""
-    if lead is None:
+    if nudging is None:
         return [(model.system, 0, u.shape[1])], ends_of_steps(u, model.steps)
-    return lead.stretches(model.system, u.shape[1]), lead.ends
+    return nudging.stretches(model.system), nudging.ends

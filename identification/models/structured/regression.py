@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.kernels import slide_along
-from identification.models.structured.laws import FROM_ZERO, POSITIVE, Damper, Joint, Law, Spring
+from identification.models.structured.laws import POSITIVE, Damper, Joint, Law, Spring
 from identification.models.structured.model import StructuredModel
 from vibrolock.arrays import Float
 
@@ -46,33 +46,21 @@ def law_force(law: Law, x: Float, speed: Float) -> Float:
     return out
 
 
-def linear_in(laws: Sequence[Law]) -> list[Law]:
-    """Return the laws that are linear in some of their numbers."""
-    return [law for law in laws if law.linear]
-
-
-def bounded_regression(laws: Sequence[Law], columns: Float, right: Float) -> tuple[Float, float]:
-    """Return the numbers of least squares, and the norm of what is left.
+def bounded_regression(laws: Sequence[Law], columns: Float, right: Float) -> tuple[list[Float], Float, float]:
+    """Return the linear numbers of each law by least squares, the numbers after them, and the norm of what is left.
 
     The first columns are those of the linear numbers of ``laws``, which keep their bounds; those after them are free.
     """
     from scipy.optimize import lsq_linear  # only on use: it takes long to load
 
-    sizes = [np.size(getattr(law, law.linear)) for law in linear_in(laws)]
-    transforms = [law.free[law.linear] for law in linear_in(laws)]
+    sizes = [law.n_linear for law in laws]
     least = np.full(columns.shape[1], -np.inf)
-    least[: sum(sizes)] = np.repeat([0.0 if one in (POSITIVE, FROM_ZERO) else -np.inf for one in transforms], sizes)
+    least[: sum(sizes)] = np.repeat([law.least_linear for law in laws], sizes)
     scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     bounds = (least, np.full(least.size, np.inf))
     numbers = lsq_linear(columns / scale, right, bounds=bounds, method="bvls").x / scale
-    return numbers, float(np.linalg.norm(columns @ numbers - right))
-
-
-def by_law(laws: Sequence[Law], numbers: Float) -> tuple[list[Float], Float]:
-    """Return the linear numbers of each law, none where it has none, and the numbers after them."""
-    sizes = [np.size(getattr(law, law.linear)) if law.linear else 0 for law in laws]
     *parts, rest = np.split(numbers, np.cumsum(sizes))
-    return parts, rest
+    return parts, rest, float(np.linalg.norm(columns @ numbers - right))
 
 
 def with_regression(
@@ -103,7 +91,7 @@ def _initialised(law: Law, numbers: Float, scale_m: float) -> Law:
     if not law.linear:
         return law
     found = numbers / (scale_m**2 if isinstance(law, Damper) else scale_m)
-    least = {POSITIVE: _TINY, FROM_ZERO: 0.0}.get(law.free[law.linear], -np.inf)
+    least = _TINY if law.free[law.linear] is POSITIVE else law.least_linear
     found = np.maximum(found, least)  # the bounds of the regression hold up to rounding
     value = getattr(law, law.linear)
     return replace(law, **{law.linear: tuple(found.tolist()) if isinstance(value, tuple) else float(found[0])})

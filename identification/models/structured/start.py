@@ -1,7 +1,7 @@
-"""Initial values of a structured model: modes from a modal test, and a linear regression for the nonlinear element."""
+"""Initial values of a structured model: modes from a modal test, and linear regressions for the nonlinear elements."""
 
 from collections.abc import Callable, Sequence
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -10,21 +10,22 @@ from identification.errors import IdentificationError
 from identification.experiments.experiment import Experiment
 from identification.fitting.bounded_steps import qr_r
 from identification.linear.modes import LinearModes
-from identification.models.structured.laws import Joint, Law, Spring
+from identification.models.structured.element_trials import ElementPlan
+from identification.models.structured.laws import Damper, Joint, Law, Spring
 from identification.models.structured.modal_motion import LOWEST, modal_spectra
 from identification.models.structured.model import StructuredModel
 from identification.models.structured.regression import (
     Regression,
     bounded_regression,
-    by_law,
     law_force,
-    linear_in,
     with_regression,
 )
 from vibrolock.arrays import Complex, Float
 
-HIGHEST = 6.0
-"""Highest line of the regression, relative to the frequency of the mode."""
+_HIGHEST = 6.0
+"""Highest line of the regressions, relative to the frequency of the highest mode. Chosen."""
+_ANGLES = np.pi * np.arange(1, 8) / 8.0
+"""Angles of directions between two modes that are tried, rad. Chosen: between neighbours the residual changes little."""
 _POSITIONS = np.linspace(-1.0, 1.0, 21)
 """Mean positions that are tried, relative to the RMS of the motion: sensors of acceleration do not show it."""
 _RESIDUAL_DAMPING = 0.02
@@ -84,10 +85,7 @@ def with_element(
     tried (`Law.tried`); the combination with the least residual is taken. Mean positions in balance beyond the largest RMS are
     not found. Raises `IdentificationError` if no experiment is periodic.
     """
-    periodic = [experiment for experiment in experiments if experiment.period_samples]
-    IdentificationError.raise_if(
-        not periodic, "none is periodic", field="experiments", allowed="one at least for the initial values"
-    )
+    periodic = _periodic(experiments)
     coordinates = [modal_spectra(linear, experiment, measured_modes) for experiment in periodic]
     sizes = [np.sqrt(np.mean(np.abs(q) ** 2, axis=1)) for q, _, _ in coordinates]
     mode = int(np.argmax(np.max(sizes, axis=0)))
@@ -107,6 +105,14 @@ def with_element(
     direction = np.zeros(len(linear.omega))
     direction[mode] = shape
     return with_regression(linear, best, [mode], reach, (direction, ()))
+
+
+def _periodic(experiments: Sequence[Experiment]) -> list[Experiment]:
+    found = [experiment for experiment in experiments if experiment.period_samples]
+    IdentificationError.raise_if(
+        not found, "none is periodic", field="experiments", allowed="one at least for the initial values"
+    )
+    return found
 
 
 def _root(function: Callable[[float], float], places: Float) -> float:
@@ -135,7 +141,7 @@ class _Equation:
     ) -> None:
         coordinates, inputs, omega = spectra
         own = linear.omega[mode]
-        self.lines = (omega > LOWEST * own) & (omega < HIGHEST * own)
+        self.lines = (omega > LOWEST * own) & (omega < _HIGHEST * own)
         dynamic = own**2 - omega**2 + 2j * linear.damping_ratio[mode] * own * omega
         left = linear.input_shapes[mode] @ inputs - dynamic * coordinates[mode]
         self.left, self.phi, self.q = left[self.lines], phi, q
@@ -149,7 +155,8 @@ class _Equation:
         A joint's do not depend on the position.
         """
         if law not in self._joints:
-            found = self._spectra(self._forces(law, position))
+            x = self.phi * (self.q + position)
+            found = self._spectra([law_force(one, x, self.phi * self.rate) for one in law.basis()])
             if not isinstance(law, Joint):
                 return found
             self._joints[law] = found
@@ -159,10 +166,6 @@ class _Equation:
         kept = np.append(0, np.flatnonzero(self.lines))
         return np.asarray(np.fft.rfft(signals, axis=1)[:, kept] / self.q.size)
 
-    def _forces(self, law: Law, position: float) -> list[Float]:
-        x = self.phi * (self.q + position)
-        return [law_force(one, x, self.phi * self.rate) for one in law.basis()]
-
 
 def _regression(
     parts: Sequence[_Equation], laws: list[Law], places: Float, omega: float, element: tuple[float, float]
@@ -171,11 +174,11 @@ def _regression(
 
     ``element``: its displacement per coordinate of the mode, and its scale.
     """
-    linear = linear_in(laws)
+    linear = [law for law in laws if law.linear]
     left = np.concatenate([part.left for part in parts])
 
-    def solved(position: float) -> tuple[Float, float, Float]:
-        """Return the numbers, what they leave, and the mean forces in the first experiment."""
+    def solved(position: float) -> tuple[list[Float], Float, float, Float]:
+        """Return the numbers as `bounded_regression`, and the mean forces in the first experiment."""
         forces = [
             part.phi * np.concatenate([part.own[:0], *(part.columns(law, position) for law in linear)])
             for part in parts
@@ -186,11 +189,97 @@ def _regression(
         return *bounded_regression(laws, triangle[:, :-1], triangle[:, -1]), forces[0][:, 0].real
 
     def unbalanced(position: float) -> float:
-        numbers, _, means = solved(position)
-        return float(means @ numbers[:-2] + (omega**2 + numbers[-2]) * position)
+        numbers, rest, _, means = solved(position)
+        return float(means @ np.concatenate(numbers) + (omega**2 + rest[0]) * position)
 
     still = not any(isinstance(law, Spring) for law in linear)
-    numbers, residual, _ = solved(0.0 if still else _root(unbalanced, places))
-    found, (stiffness, damping) = by_law(laws, numbers)
+    found, (stiffness, damping), residual, _ = solved(0.0 if still else _root(unbalanced, places))
     shape, scale = element
     return Regression(np.array([shape]), scale, laws, found, np.array([stiffness]), np.array([damping]), residual)
+
+
+def with_further_element(
+    model: StructuredModel, experiments: Sequence[Experiment], measured_modes: int, plan: ElementPlan, reach: float
+) -> StructuredModel:
+    """Add an element by linear least squares on what is left of the equations of motion of the measured modes.
+
+    Coordinates come from the spectra of the periodic experiments, their means from a simulation. Each mode counts by its
+    receptance, so that the residual is that of the outputs. Directions are those between the channels of the plan, or tried:
+    along every mode, between any two of them, and at every output. Numbers in which a law is not linear are tried
+    (`Law.tried`).
+    """
+    parts = [_ModalMotion(model, one, measured_modes) for one in _periodic(experiments)]
+    shapes = model.output_shapes[:, :measured_modes]
+    directions = [model.place_of(plan.between) @ shapes] if plan.between else _directions(shapes)
+    found = [
+        _regression_of_modes(parts, direction, list(tried))
+        for direction in directions
+        for tried in product(*(law.candidates() for law in plan.laws))
+    ]
+    best = min(found, key=lambda one: one.residual)
+    direction = np.zeros(len(model.omega))
+    direction[:measured_modes] = best.direction
+    if plan.between:
+        direction = model.place_of(plan.between) @ model.output_shapes
+    return with_regression(model, best, range(measured_modes), reach, (direction, plan.between))
+
+
+def _directions(shapes: Float) -> list[Float]:
+    """Return the directions that are tried, as large as the largest shape."""
+    modes = shapes.shape[1]
+    found = [*np.eye(modes), *shapes]
+    for i, j in combinations(range(modes), 2):
+        for angle in _ANGLES:
+            direction = np.zeros(modes)
+            direction[[i, j]] = np.cos(angle), np.sin(angle)
+            found.append(direction)
+    size = float(np.max(np.abs(shapes)))
+    return [np.asarray(size * one / np.max(np.abs(one))) for one in found if np.any(one)]
+
+
+class _ModalMotion:
+    """Measured modal motion in one experiment, and the modal forces that the model leaves unexplained, weighted."""
+
+    def __init__(self, model: StructuredModel, experiment: Experiment, modes: int) -> None:
+        spectra, inputs, omega = modal_spectra(model, experiment, modes)
+        n, own = experiment.period_samples, model.omega[:modes, None]
+        counted = slice(experiment.counted_from, None)
+        means = model.simulate_experiment(experiment).displacement[:modes, counted].mean(axis=1)
+        self.q = np.fft.irfft(spectra, n, axis=1) * n + means[:, None]
+        self.rate = np.fft.irfft(1j * omega * spectra, n, axis=1) * n
+        self.lines = (omega > LOWEST * model.omega[0]) & (omega < _HIGHEST * np.max(own))
+        dynamic = own**2 - omega**2 + 2j * model.damping_ratio[:modes, None] * own * omega
+        size = np.linalg.norm(model.output_shapes[:, :modes], axis=0)[:, None]
+        self.weight = (size * np.abs(omega) ** 2 / np.abs(dynamic))[:, self.lines]
+        left = model.input_shapes[:modes] @ inputs - dynamic * spectra
+        for element in model.elements:
+            phi = element.phi[:modes]
+            force = sum(law_force(law, phi @ self.q, element.scale_m * phi @ self.rate) for law in element.laws)
+            left = left - element.scale_m * phi[:, None] * (np.fft.rfft(force) / n)
+        self.left = left[:, self.lines]
+
+    def column(self, direction: Float, force: Float) -> Complex:
+        """Weighted spectra of the modal forces of a force along a direction, mode after mode."""
+        spectrum = np.fft.rfft(force)[self.lines] / force.size
+        return np.asarray(np.ravel(self.weight * direction[:, None] * spectrum))
+
+
+def _regression_of_modes(parts: Sequence[_ModalMotion], direction: Float, laws: list[Law]) -> Regression:
+    """Return the numbers in which ``laws`` are linear."""
+    scale = max(float(np.max(np.abs(direction @ part.q))) for part in parts)
+    basis = [one for law in laws for one in law.basis()]
+    modes = np.eye(direction.size)
+    rows = []
+    for part in parts:
+        x, speed = direction @ part.q / scale, direction @ part.rate
+        columns = [part.column(direction, law_force(one, x, speed)) for one in basis]
+        columns += [
+            part.column(mode, of) for motion in (part.q, part.rate) for mode, of in zip(modes, motion, strict=True)
+        ]
+        rows.append(np.array(columns).T)
+    a, y = np.concatenate(rows), np.concatenate([np.ravel(part.weight * part.left) for part in parts])
+    found, rest, residual = bounded_regression(laws, np.concatenate([a.real, a.imag]), np.concatenate([y.real, y.imag]))
+    # a damper's numbers are N s/m, J s once they are multiplied by the squared scale
+    found = [one * scale ** (2 if isinstance(law, Damper) else 1) for one, law in zip(found, laws, strict=True)]
+    stiffness, damping = np.split(rest, 2)
+    return Regression(direction, scale, laws, found, stiffness, damping, residual)

@@ -39,7 +39,7 @@ class System(NamedTuple):
     b: np.ndarray
     """float[n, n_inputs]: shapes at the inputs, the model's first."""
     inputs: int
-    """Inputs of the model; those after them lead."""
+    """Number of the model's inputs; further columns are nudging inputs."""
     phi: np.ndarray
     """float[n_elements, n]."""
     tables: Tables

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from identification.experiments.experiment import Experiment
-from identification.models.structured.held_support import periods_of
-from identification.models.structured.leading import Lead
+from identification.models.structured.nudging import Nudging, periods_of
 from identification.models.structured.parameters import Parameters
 from tests.identification.models.structured.models import FORCE, OUTPUTS, RATE_HZ, beam, multisine
 
@@ -48,15 +47,15 @@ def test_derivatives_with_a_held_force_are_those_of_finite_differences():
     vector, u = parameters.vector(start), np.tile(multisine(1.0, 4, 200), (1, 4))
     velocity = 1e-3 * np.random.default_rng(5).standard_normal((2, u.shape[1]))
     signals = np.vstack([u, velocity])
-    lead = Lead(np.array([3.0, 9.0]), np.array([1.0, 2.0]), signals, start.steps, until=400, period=200)
-    _, exact = parameters.derivatives(parameters.model(vector), u, 600, lead)
+    nudging = Nudging(np.array([3.0, 9.0]), np.array([1.0, 2.0]), signals, start.steps, until=400, period=200)
+    _, exact = parameters.derivatives(parameters.model(vector), u, 600, nudging)
     for column, name in enumerate(parameters.names):
         step = 1e-5 * max(abs(vector[column]), 1e-1)
         moves = []
         for sign in (-1.0, 1.0):
             moved = vector.copy()
             moved[column] += sign * step
-            moves.append(parameters.derivatives(parameters.model(moved), u, 600, lead)[0])
+            moves.append(parameters.derivatives(parameters.model(moved), u, 600, nudging)[0])
         differences = (moves[1] - moves[0]) / (2.0 * step)
         size = np.linalg.norm(exact[..., column])
         assert np.linalg.norm(differences - exact[..., column]) <= 5e-5 * size + 1e-9, name

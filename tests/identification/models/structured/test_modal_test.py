@@ -7,8 +7,8 @@ import pytest
 
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.laws import Masing
-from identification.models.structured.modal_test import ModalTest
 from identification.models.structured.parameters import Parameters
+from identification.models.structured.problem import ModalTest
 from tests.identification.models.structured.models import beam, linear_modes
 
 STEP = 1e-4

@@ -11,7 +11,8 @@ from identification import IdentificationError
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.kernels import damping_at, spring_at
 from identification.models.structured.laws import Masing, PolynomialDamper, PolynomialSpring
-from identification.models.structured.model import ends_of_steps, room_for
+from identification.models.structured.model import room_for
+from identification.models.structured.nudging import ends_of_steps
 from identification.models.structured.parameters import Parameters
 from identification.models.structured.steps import end_step, run, take_input, take_step
 from tests.identification.models.structured.models import RATE_HZ, beam, multisine

@@ -6,7 +6,7 @@ import pytest
 from identification import IdentificationError, PnlssModel, harmonic_response, steady_state
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.drives import Coupled, Drive, HeldOutput, Sine
-from identification.models.pnlss.steady.balance import Balance, samples_for
+from identification.models.pnlss.balance import PnlssBalance, samples_for
 from tests.identification.models.pnlss.steady.oscillators import (
     RATE_HZ,
     driven_by_voltage,
@@ -41,7 +41,7 @@ def drives(coefficients: int) -> dict[str, tuple[PnlssModel, Drive]]:
 def test_the_jacobian_agrees_with_finite_differences(name: str) -> None:
     basis = Basis(3, 40)
     model, drive = drives(basis.size)[name]
-    balance = Balance(model, drive, basis)
+    balance = PnlssBalance(model, drive, basis)
     rng = np.random.default_rng(1)
     z = np.tile(0.2 * model.state_range, basis.size) * rng.standard_normal(basis.size * 2)
     z = np.concatenate([z, rng.standard_normal(drive.size)])

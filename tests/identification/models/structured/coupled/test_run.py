@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification import Channel, Exciter, IdentificationError, steady_state
-from identification.models.structured.coupled.run import structured_coupled_run as coupled_run
+from identification import Channel, Exciter, IdentificationError, coupled_run, steady_state
 from identification.models.structured.elements import NonlinearElement
 from identification.models.structured.laws import PolynomialDamper
 from tests.identification.models.pnlss.steady.oscillators import shaker

@@ -6,9 +6,8 @@ import pytest
 from identification import IdentificationError, harmonic_response, steady_state
 from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.drives import Coupled, Sine
+from identification.models.structured.balance import StructuredBalance, along_period
 from identification.models.structured.model import room_for
-from identification.models.structured.steady.balance import StructuredBalance
-from identification.models.structured.steady.kernels import along_period
 from identification.models.structured.steps import run
 from tests.identification.models.pnlss.steady.oscillators import shaker
 from tests.identification.models.structured.steady.beams import beam, friction, settled, smooth
@@ -141,8 +140,8 @@ def test_multipliers_are_those_of_a_simulated_period():
 
 def test_unknown_settings_are_refused_in_a_line():
     for options, message in (
-        ({"harmonics": 0}, "harmonics: is 0, needs at least 1"),
-        ({"samples": 10}, "samples: is 10, needs at least 15 for 7 harmonics"),
+        ({"harmonics": 0}, "`harmonics` = 0; allowed: 1 and above"),
+        ({"samples": 10}, "`samples` = 10; allowed: at least 15 for 7 harmonics"),
         ({"force": "fundamental"}, "'fundamental' of a model driven by a force needs an exciter"),
         (
             {"exciter": shaker(), "force": "pure-sine"},

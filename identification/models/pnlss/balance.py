@@ -13,10 +13,10 @@ from identification.harmonic_balance.basis import Basis
 from identification.harmonic_balance.driven import DrivenBalance, Period
 from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.stability import multipliers
-from identification.models.pnlss.features import Features
+from identification.models.pnlss.kernels import Matrices, Table, feature_derivatives, feature_values, linear_sum
 from identification.models.pnlss.model import PnlssModel
-from identification.models.pnlss.steady.kernels import along_period
 from vibrolock.arrays import Complex, Float
+from vibrolock.compiled import inner_kernel, kernel
 
 _ENOUGH_FOR_BENDS = 16
 """Samples per harmonic for features that are not polynomials; aliasing is then of the order of the neglected harmonics."""
@@ -27,16 +27,12 @@ def samples_for(model: PnlssModel, harmonics: int) -> int:
     both = (model.state_features, model.output_features)
     degree = max(int(features.exponents.sum(axis=1).max(initial=1)) for features in both)
     least = (degree + 1) * harmonics + 1
-    if any(_bends(features) for features in both):
+    if any(len(features.weights) or np.any(np.isfinite(features.limits)) for features in both):
         least = max(least, _ENOUGH_FOR_BENDS * harmonics)
     return max(least + least % 2, 4 * harmonics + 4)
 
 
-def _bends(features: Features) -> bool:
-    return bool(len(features.weights) or np.any(np.isfinite(features.limits)))
-
-
-class Balance(DrivenBalance):
+class PnlssBalance(DrivenBalance):
     """Equations of a driven PNLSS model."""
 
     beyond = "the states are beyond {:g} times those of the training data"
@@ -49,7 +45,7 @@ class Balance(DrivenBalance):
         n, m, outputs = model.states, len(model.inputs), len(model.outputs)
         features = max(model.e.shape[1], model.f.shape[1])
         bends = max(len(model.state_features.weights), len(model.output_features.weights))
-        self._room = (np.empty(features), np.empty((features, n + m)), np.empty((bends, 2)))
+        self._work = (np.empty(features), np.empty((features, n + m)), np.empty((bends, 2)))
         self._samples = tuple(
             np.empty((basis.samples, *shape)) for shape in ((n,), (outputs,), (n, n + m), (outputs, n + m))
         )
@@ -78,7 +74,7 @@ class Balance(DrivenBalance):
     def _evaluated(self, states: Float, inputs: Float) -> tuple[Float, ...]:
         """Next states, outputs and their derivatives, at all samples of the period."""
         v = self.basis.to_time @ np.concatenate([states, inputs], axis=1)
-        along_period(self._matrices, *self._tables, v, *self._room, *self._samples)
+        along_period(self._matrices, *self._tables, v, *self._work, *self._samples)
         return self._samples
 
     def _derivative(self, slope: Float) -> Float:
@@ -112,3 +108,47 @@ class Balance(DrivenBalance):
     def input_use(self, inputs: Float, to_time: Float) -> Float:
         """float[n_inputs]: largest magnitude of each input over the largest in the training data."""
         return use_of(np.max(np.abs(to_time @ inputs), axis=0), self.model.input_range)
+
+
+@inner_kernel
+def linear_slopes(a: np.ndarray, b: np.ndarray, e: np.ndarray, slope: np.ndarray, out: np.ndarray) -> None:
+    """Write the derivatives of `linear_sum` by v, given those of the features, float[n_features, n_variables]."""
+    n = a.shape[1]
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            total = a[i, j] if j < n else b[i, j - n]
+            for feature in range(slope.shape[0]):
+                total += e[i, feature] * slope[feature, j]
+            out[i, j] = total
+
+
+@kernel
+def along_period(
+    m: Matrices,
+    state_table: Table,
+    output_table: Table,
+    v: np.ndarray,
+    features: np.ndarray,
+    slope: np.ndarray,
+    steep: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    x_slope: np.ndarray,
+    y_slope: np.ndarray,
+) -> None:
+    """Evaluate the model at ``v`` (float[n, n_variables]): next states ``x`` (float[n, n_states]), outputs ``y``, derivatives.
+
+    ``x_slope`` (float[n, n_states, n_variables]) and ``y_slope`` (float[n, n_outputs, n_variables]) are derivatives with
+    respect to v. ``features``, ``slope`` (float[n_features, n_variables]) and ``steep`` are work arrays, sized for the longer
+    table.
+    """
+    phi, chi = m.e.shape[1], m.f.shape[1]
+    for k in range(v.shape[0]):
+        feature_values(state_table, v[k], features[:phi])
+        linear_sum(m.a, m.b, m.e, features[:phi], v[k], x[k])
+        feature_derivatives(state_table, v[k], slope[:phi], steep)
+        linear_slopes(m.a, m.b, m.e, slope[:phi], x_slope[k])
+        feature_values(output_table, v[k], features[:chi])
+        linear_sum(m.c, m.d, m.f, features[:chi], v[k], y[k])
+        feature_derivatives(output_table, v[k], slope[:chi], steep)
+        linear_slopes(m.c, m.d, m.f, slope[:chi], y_slope[k])

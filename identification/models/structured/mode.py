@@ -8,13 +8,14 @@ import numpy as np
 from identification.channels import find_role
 from identification.errors import IdentificationError
 from identification.exciter_coupling.exciter import Exciter
-from identification.harmonic_balance.backbone import Resonances, resonances
+from identification.harmonic_balance.backbone import Resonances
 from identification.harmonic_balance.setting_up import Held
 from identification.harmonic_balance.states import motion_rows
+from identification.models.dynamic_model import HARMONICS, SteadyRequest
+from identification.models.structured.balance import StructuredBalance
+from identification.models.structured.dynamics import StructuredDynamics
 from identification.models.structured.fit import StructuredFit
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.steady.balance import StructuredBalance
-from identification.models.structured.steady.setting_up import balance_of, resonance_hz
 from identification.models.structured.uncertainty import std_of
 from identification.nonlinear.nonlinear_modes import NonlinearMode
 from identification.nonlinear.properties import States, properties
@@ -22,6 +23,8 @@ from vibrolock.arrays import Float
 
 _POINTS = 25
 """Largest number of points; they are spread over the backbone."""
+_MOST_POINTS = 300
+"""Largest number of points of the backbone of which these are some. Chosen."""
 _TRIES = 12
 """Doublings of the force until an element moves as far as in the training data."""
 _REACHED = 0.8
@@ -37,7 +40,7 @@ def structured_mode(
     exciter: Exciter | None = None,
     support: bool = True,
     near_hz: float | None = None,
-    harmonics: int = 7,
+    harmonics: int = HARMONICS,
     samples: int | None = None,
 ) -> NonlinearMode:
     """Compute modal frequency and damping ratio of a structured model over the amplitude, as `nonlinear_mode` measures them.
@@ -69,8 +72,17 @@ def structured_mode(
     row = find_role(model.outputs, "drive")
 
     def backbone(force_n: float, largest_use: float) -> Resonances:
-        balance = balance_of(model, force_n, force, exciter, support, harmonics, samples)
-        return resonances(balance, resonance_hz(model, near_hz), largest_use)
+        request = SteadyRequest(
+            level=force_n,
+            held=force,
+            exciter=exciter,
+            support=support,
+            harmonics=harmonics,
+            samples=samples,
+            points=_MOST_POINTS,
+            largest_range_use=largest_use,
+        )
+        return StructuredDynamics(model).resonances(request, near_hz)
 
     path = _within_training(model, backbone, row, near_hz) if force_n is None else backbone(force_n, np.inf)
     if force_n is not None and path.reason:
@@ -79,7 +91,9 @@ def structured_mode(
         )
     path = path.some(np.unique(np.linspace(0, len(path.level) - 1, _POINTS).round().astype(int)))
     states = path.states()
-    shape, linear = _tested(model, row, near_hz)
+    at_rest, mode = _tested(model, near_hz)
+    linear = at_rest.output_shapes[:, mode]
+    shape = float(abs(linear[row]))
     of_motions = motion_rows(model.outputs)
     displacement = states.states @ model.output_shapes[of_motions].T
     values: dict[str, Any] = properties(
@@ -118,12 +132,11 @@ def structured_mode(
     )
 
 
-def _tested(model: StructuredModel, row: int, near_hz: float | None) -> tuple[float, Float]:
-    """Return the shape at the drive point and float[n_outputs] of the mode of small vibrations that is followed."""
+def _tested(model: StructuredModel, near_hz: float | None) -> tuple[StructuredModel, int]:
+    """Return the small vibrations of a model, and the mode of them that is followed."""
     at_rest = model.linearised()
-    mode = int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz(model, near_hz))))
-    shapes = at_rest.output_shapes[:, mode]
-    return float(abs(shapes[row])), shapes
+    resonance_hz = StructuredDynamics(model).resonance_hz(near_hz)
+    return at_rest, int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz)))
 
 
 def _within_training(
@@ -134,8 +147,7 @@ def _within_training(
         raise IdentificationError(
             "is missing", field="force_n", hint="the model does not know the range of its training data"
         )
-    at_rest = model.linearised()
-    mode = int(np.argmin(np.abs(at_rest.frequency_hz - resonance_hz(model, near_hz))))
+    at_rest, mode = _tested(model, near_hz)
     shape = abs(at_rest.output_shapes[row, mode])
     least = min(float(e.largest or 1.0) * e.scale_m / np.linalg.norm(e.direction) for e in model.elements)
     force_n = float(2.0 * at_rest.damping_ratio[mode] * at_rest.omega[mode] ** 2 * least / shape)
@@ -159,7 +171,8 @@ def _at_amplitudes(path: Resonances, model: StructuredModel, row: int, near_hz: 
     assert isinstance(own, StructuredBalance)
     balance, amplitude_row = path.like(own.like(model)), np.append(own.like(model).amplitude_row, 0.0)
     own_row = np.append(own.amplitude_row, 0.0)
-    shape, out = _tested(model, row, near_hz)[0], np.empty((2, len(path.level)))
+    at_rest, mode = _tested(model, near_hz)
+    shape, out = abs(at_rest.output_shapes[row, mode]), np.empty((2, len(path.level)))
     resonance = balance.equations
     for k in range(len(path.level)):
         v = np.append(path.unknowns[k], path.level[k])

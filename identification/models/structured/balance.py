@@ -16,9 +16,11 @@ from identification.harmonic_balance.basis import Basis, complex_product
 from identification.harmonic_balance.driven import DrivenBalance, Period
 from identification.harmonic_balance.drives import Drive
 from identification.harmonic_balance.stability import by_centroid, distinct
+from identification.models.structured.kernels import damping_at, slide, spring_at
 from identification.models.structured.model import StructuredModel
-from identification.models.structured.steady.kernels import along_period
+from identification.models.structured.steps import System
 from vibrolock.arrays import Complex, Float
+from vibrolock.compiled import inner_kernel, unlocked_kernel
 
 
 class StructuredBalance(DrivenBalance):
@@ -40,7 +42,7 @@ class StructuredBalance(DrivenBalance):
         self._turning = basis.turned(0.0)[1]
         self._to_rate = basis.to_time @ self._turning
         shape = (self.ranges, basis.samples)
-        self._room = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
+        self._work = np.empty(shape), np.empty(shape), np.empty((*shape, basis.size))
 
     def like(self, model: StructuredModel) -> "StructuredBalance":
         """Return the same equations of another model."""
@@ -71,17 +73,17 @@ class StructuredBalance(DrivenBalance):
         w, d, phi, b = 2.0 * np.pi * frequency_hz, self._turning, self._system.phi, model.input_shapes
         force, damping, by = self._elements(states, w)
         back = basis.to_coefficients
-        twice, drag = d @ d, 2.0 * model.damping_ratio * model.omega
-        residual = w**2 * twice @ states + w * (d @ states) * drag + states * model.omega**2
+        twice, own_damping = d @ d, 2.0 * model.damping_ratio * model.omega
+        residual = w**2 * twice @ states + w * (d @ states) * own_damping + states * model.omega**2
         residual += back @ force.T @ phi - inputs @ b.T
-        by_w = 2.0 * w * twice @ states + (d @ states) * drag
+        by_w = 2.0 * w * twice @ states + (d @ states) * own_damping
         by_w += back @ (damping.T * (self._to_rate @ states @ phi.T)) @ phi
 
         residual_by = np.zeros((size, n, size, n + b.shape[1]))
         linear = residual_by[..., :n]
         linear += np.einsum("epq,ei,ej->piqj", back @ by, phi, phi, optimize=True)
         for i in range(n):
-            linear[:, i, :, i] += w**2 * twice + w * drag[i] * d + model.omega[i] ** 2 * np.eye(size)
+            linear[:, i, :, i] += w**2 * twice + w * own_damping[i] * d + model.omega[i] ** 2 * np.eye(size)
         for p in range(size):
             residual_by[p, :, p, n:] = -b
         if model.support_n_m > 0.0:
@@ -98,8 +100,8 @@ class StructuredBalance(DrivenBalance):
         """Forces and damping of the elements, and derivatives of the forces, as `along_period`."""
         along = states @ self._system.phi.T
         x, rate = (np.ascontiguousarray((to @ along).T) for to in (self.basis.to_time, w * self._to_rate))
-        along_period(self._system, x, rate, self.basis.to_time, w * self._to_rate, *self._room)
-        return self._room
+        along_period(self._system, x, rate, self.basis.to_time, w * self._to_rate, *self._work)
+        return self._work
 
     def _support(self, displacement: Float, w: float) -> tuple[Float, Float, Float]:
         """Coefficients of the support's reaction to the displacement of the first input, and derivatives by it and by w."""
@@ -155,16 +157,16 @@ class StructuredBalance(DrivenBalance):
         stiffness = self.along(states, self.inputs_of(z, level), frequency_hz).residual_by[..., :n]
         damping = self._elements(states, w)[1]
         parts = np.array([(self.basis.to_coefficients * row) @ self.basis.to_time for row in damping])
-        drag = np.zeros((self.basis.size, n, self.basis.size, n))
+        own_damping = np.zeros((self.basis.size, n, self.basis.size, n))
         if len(parts):
-            drag += np.einsum("epq,ei,ej->piqj", parts, self._system.phi, self._system.phi, optimize=True)
+            own_damping += np.einsum("epq,ei,ej->piqj", parts, self._system.phi, self._system.phi, optimize=True)
         for i in range(n):
             own = 2.0 * self.model.damping_ratio[i] * self.model.omega[i]
-            drag[:, i, :, i] += own * np.eye(self.basis.size) + 2.0 * w * self._turning
+            own_damping[:, i, :, i] += own * np.eye(self.basis.size) + 2.0 * w * self._turning
         first = np.zeros((2 * count, 2 * count))
         first[:count, count:] = np.eye(count)
         first[count:, :count] = -stiffness.reshape(count, count) / w**2
-        first[count:, count:] = -drag.reshape(count, count) / w
+        first[count:, count:] = -own_damping.reshape(count, count) / w
         values, vectors = np.linalg.eig(first)
         order = by_centroid(vectors[:count].reshape(self.basis.size, n, -1), self.basis)
         return distinct(np.exp(2.0 * np.pi * values[order]), self.order, 1.0)
@@ -177,3 +179,57 @@ class StructuredBalance(DrivenBalance):
     def input_use(self, inputs: Float, to_time: Float) -> Float:
         """NaN: a structured model does not know the range of its inputs."""
         return np.full(inputs.shape[1], np.nan)
+
+
+@inner_kernel
+def add_slider(
+    stiffness: float, strength: float, x: np.ndarray, to_time: np.ndarray, force: np.ndarray, by: np.ndarray
+) -> None:
+    """Add the force of a slider in the second of two periods that begin at rest, and its derivatives.
+
+    After one period both extremes of x have passed, and the loop is closed. A slider that sticks has moved from where it last
+    slipped, sample ``slipped``, or from rest (-1), so that its force changes with ``x(k) - x(slipped)``.
+    """
+    r, last, slipped = 0.0, 0.0, -1
+    for repeat in range(2):
+        for k in range(x.size):
+            _, r, _, sticking = slide(r, stiffness, strength, x[k] - last)
+            last = x[k]
+            if sticking < 1.0:
+                slipped = k
+            if repeat == 1:
+                force[k] += r
+                if slipped != k:
+                    for c in range(to_time.shape[1]):
+                        begin = to_time[slipped, c] if slipped >= 0 else 0.0
+                        by[k, c] += stiffness * (to_time[k, c] - begin)
+
+
+@unlocked_kernel
+def along_period(
+    system: System,
+    x: np.ndarray,
+    rate: np.ndarray,
+    to_time: np.ndarray,
+    to_rate: np.ndarray,
+    force: np.ndarray,
+    damping: np.ndarray,
+    by: np.ndarray,
+) -> None:
+    """Write force and damping of every element at all samples of a period, float[n_elements, samples], J and J s.
+
+    ``x`` and ``rate``, float[n_elements, samples], are displacements and their derivatives by time, which ``to_time`` and
+    ``to_rate``, float[samples, size], give from Fourier coefficients. ``by``, float[n_elements, samples, size]: derivatives
+    of the force by the coefficients of x.
+    """
+    tables = system.tables
+    for e in range(x.shape[0]):
+        for k in range(x.shape[1]):
+            spring, slope, _ = spring_at(x[e, k], tables.springs[e], tables.limits[e])
+            damping[e, k], steep = damping_at(x[e, k], tables.dampers[e], tables.limits[e, 0])
+            force[e, k] = spring + damping[e, k] * rate[e, k]
+            slope += steep * rate[e, k]
+            for c in range(to_time.shape[1]):
+                by[e, k, c] = slope * to_time[k, c] + damping[e, k] * to_rate[k, c]
+        for s in range(tables.first[e], tables.first[e + 1]):
+            add_slider(tables.sliders[s, 0], tables.sliders[s, 1], x[e], to_time, force[e], by[e])

@@ -1,1 +1,0 @@
-"""Steady vibrations of nonlinear state-space models, by harmonic balance of the discrete-time model."""

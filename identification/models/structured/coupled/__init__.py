@@ -1,1 +1,0 @@
-"""Simulation of structured models together with an exciter, from its voltage."""

@@ -1,1 +1,0 @@
-"""Steady vibrations of structured models, by harmonic balance of the continuous equation of motion."""
