@@ -21,22 +21,27 @@ from rig.loop.recommendation import Settings
 from rig.loop.worker.examination import with_settings
 from rig.loop.worker.probe import smallest_steps_v
 from studies.matrix.rows import Row, Verified
-from studies.matrix.ways import Way, way_benches
+from studies.matrix.transports import Transport, transports
 
 MEASURED_S = 1.5
-DRIVE_V = 0.05  # as much as the conformance suite
+"""Length of the second examination, with the recommended settings, s; chosen."""
+DRIVE_V = 0.05
+"""Voltage by which a device that moves nothing is driven: as much as the conformance suite."""
 DRIVE_S = 0.4
+"""For how long, s; chosen."""
 LONGEST_LOOK_S = 5.0
-LOOK_S = 0.02
+"""Longest wait for 0 V, s: longer than any watchdog that is set here."""
+POLL_S = 0.02
+"""Time between two looks at the log, s; chosen."""
 SUITE_WATCHDOG_S = 1.0
 """Watchdog while the suite runs and 0 V is waited for, where the device waits for the host: it looks for 5 s."""
 
 
 def matrix_rows(bench: Bench, firmware: Sequence[Path] = (), *, verify: bool = False) -> Iterator[Row]:
     """Measure every way to run a virtual bench on this machine, one row after the other; ``verify``: also run the suite."""
-    for way in way_benches(firmware):
+    for transport in transports(firmware):
         with tempfile.TemporaryDirectory(prefix="rig-matrix-") as folder:
-            yield _row(way, bench, Path(folder) / "output.log", verify)
+            yield _row(transport, bench, Path(folder) / "output.log", verify)
 
 
 def device_row(bench: Bench, facts: Mapping[str, Any]) -> Row:
@@ -79,13 +84,13 @@ def row_from(way: str, bench: Bench, facts: Mapping[str, Any]) -> Row:
     return Row(**known)
 
 
-def _row(way: Way, bench: Bench, log: Path, verify: bool) -> Row:
-    """Measure one way; what fails stands in the row."""
-    row = Row(way=way.name, bench=bench.name, driver=way.wire or "virtual", **_here())
+def _row(transport: Transport, bench: Bench, log: Path, verify: bool) -> Row:
+    """Measure one transport; what fails stands in the row."""
+    row = Row(way=transport.name, bench=bench.name, driver=transport.wire or "virtual", **_here())
     try:
-        with way.opened(bench, log) as reached:
-            row = row_from(way.name, *_with_settings_that_hold(reached))
-            reached = _waiting(reached, way)
+        with transport.opened(bench, log) as reached:
+            row = row_from(transport.name, *_with_settings_that_hold(reached))
+            reached = _waiting(reached, transport)
             if verify:
                 row = row.model_copy(update={"verified": _verified(reached, log)})
             return row.model_copy(update=_driven(reached, log))
@@ -96,7 +101,9 @@ def _row(way: Way, bench: Bench, log: Path, verify: bool) -> Row:
 def _with_settings_that_hold(bench: Bench) -> tuple[Bench, Mapping[str, Any]]:
     """Return the bench with the settings that are recommended here, and the report of `rig.loop.doctor` with them."""
     facts = examine_bench(bench)
-    _clear_if_virtual(bench)  # the settings that the bench had may have ended with the watchdog
+    with make_daq(bench) as daq:  # the settings that the bench had may have ended with the watchdog
+        if daq.capabilities.virtual:
+            daq.clear()
     advice = facts.get("recommendation", {})
     if not advice.get("differs"):
         return bench, facts
@@ -106,16 +113,9 @@ def _with_settings_that_hold(bench: Bench) -> tuple[Bench, Mapping[str, Any]]:
     return better, {**measure_bench(better, seconds=MEASURED_S), "recommendation": advice}
 
 
-def _clear_if_virtual(bench: Bench) -> None:
-    """Clear what has latched in a device that moves nothing."""
-    with make_daq(bench) as daq:
-        if daq.capabilities.virtual:
-            daq.clear()
-
-
-def _waiting(bench: Bench, way: Way) -> Bench:
+def _waiting(bench: Bench, transport: Transport) -> Bench:
     """Return the bench with a watchdog that the suite can see act: where the device waits for the host, it is a minute."""
-    if way.wire is None or not way.lockstep:
+    if transport.wire is None or not transport.lockstep:
         return bench
     options = {**bench.driver.options, "watchdog_s": SUITE_WATCHDOG_S}
     return bench.model_copy(update={"driver": DriverChoice(name=bench.driver.name, options=options)})
@@ -158,7 +158,7 @@ def _seen_at_0_v(log: Path) -> float | None:
     """Wait for 0 V in a log of outputs (`rig.emulator.plant.LoggedPlant`); return when it was put out (monotonic clock), s."""
     end = time.monotonic() + LONGEST_LOOK_S
     while log.exists() and time.monotonic() < end:
-        time.sleep(LOOK_S)
+        time.sleep(POLL_S)
         lines = [line.split() for line in log.read_text(encoding="ascii").rpartition("\n")[0].splitlines()]
         driven = max((number for number, line in enumerate(lines) if float(line[2]) > 0.0), default=len(lines))
         if driven + 1 < len(lines):

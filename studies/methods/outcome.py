@@ -1,7 +1,7 @@
 """What came of a run: points, periods of vibration, errors against harmonic balance, coverage of the intervals."""
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -42,19 +42,19 @@ class Outcome:
     seed: int
     levels: int
     """Levels that the backbone should have."""
-    asked_points: int
+    asked_points: int = 0
     """Points that the plan asks for."""
-    refused: int
+    refused: int = 0
     """Points that were not accepted."""
-    seconds: float
+    seconds: float = UNKNOWN
     """From the first driven sample to 0 V."""
-    periods: float
+    periods: float = UNKNOWN
     """Periods of vibration in this time."""
-    frequency_errors: list[float]
-    damping_errors: list[float]
-    frequency_covered: list[bool]
+    frequency_errors: list[float] = field(default_factory=list)
+    damping_errors: list[float] = field(default_factory=list)
+    frequency_covered: list[bool] = field(default_factory=list)
     """Whether the stated 95 % interval holds the truth; empty if the method states none."""
-    damping_covered: list[bool]
+    damping_covered: list[bool] = field(default_factory=list)
     reason: str = ""
     """How the run ended early, or why the first of the refused points was refused."""
     failed: str = ""
@@ -84,23 +84,14 @@ def covered(errors: Float, stds: Float) -> list[bool]:
 def carried_out(name: str, method: str, pure: bool, condition: str, knob: float, seed: int) -> Outcome:
     """Run a method once, and compare what it found with the truth."""
     fixed: dict[str, Any] = {
-        "rig": name,
-        "method": method,
-        "pure": pure,
-        "condition": condition,
-        "knob": knob,
-        "seed": seed,
-    }
-    nothing: dict[str, Any] = {
+        **{"rig": name, "method": method, "pure": pure, "condition": condition, "knob": knob, "seed": seed},
         "levels": len(levels_of(name, pure)[0]),
-        **{"asked_points": 0, "refused": 0, "seconds": UNKNOWN, "periods": UNKNOWN},
-        **{key: [] for key in ("frequency_errors", "damping_errors", "frequency_covered", "damping_covered")},
     }
     try:
         plan = plan_of(method, name, pure, condition, knob)
         run = rig.run(plan, bench=bench_of(name, condition), seed=seed)
     except (RigError, ValueError) as error:  # a tune that fails, a plan that the bench refuses
-        return Outcome(**fixed, **nothing, failed=f"{type(error).__name__}: {error}"[:300])
+        return Outcome(**fixed, failed=f"{type(error).__name__}: {error}"[:300])
     with run:
         effort = _effort(run.recording, bench_of(name).sample_rate_hz)
         asked = len(plan.targets())
@@ -109,7 +100,7 @@ def carried_out(name: str, method: str, pure: bool, condition: str, knob: float,
         end = run.recording.parts[-1].end or {"reason": "none", "text": "the recording was cut short"}
         early = "" if end["reason"] == "completed" else str(end["text"])
         reason = early or next((point.reason for point in points if not point.accepted), "")
-        counts = nothing | effort | {"asked_points": asked, "refused": asked - accepted, "reason": reason[:300]}
+        counts: dict[str, Any] = effort | {"asked_points": asked, "refused": asked - accepted, "reason": reason[:300]}
         try:
             found = measured(run)
             return Outcome(**fixed, **counts | _compared(name, pure, found))

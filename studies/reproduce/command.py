@@ -2,6 +2,8 @@
 
 import contextlib
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -87,12 +89,12 @@ def reproduce_(
     from studies.reproduce.figures import draw_study
     from studies.reproduce.options import Options
     from studies.reproduce.report import say_study, write_tables
-    from studies.reproduce.specimens import SPECIMENS, specimen_of
+    from studies.reproduce.specimens import SPECIMENS
     from studies.reproduce.study import reproduce
 
     if specimen not in SPECIMENS:
         raise ConfigurationError(f"specimen {specimen!r}: allowed is {', '.join([*SPECIMENS, *STUDIES])}")
-    of = specimen_of(specimen)
+    of = SPECIMENS[specimen]
     if data is not None:
         raise ConfigurationError(f"`data` {data}: is for reference studies, {', '.join(STUDIES)}; leave it out")
     options = Options(
@@ -145,7 +147,9 @@ def _reference(
     study = STUDIES[name]
     paths = found(study.data, data)
     prepared(output)
+    begun = time.perf_counter()
     result = study.run(paths, int(models), seed, _say)
+    result = replace(result, seconds=time.perf_counter() - begun)
     write_reference(result, study.data, output)
     if json:
         print_json(summary_of(result, study.data))

@@ -12,18 +12,13 @@ from studies.reproduce.options import Options
 
 def prepare(options: Options) -> None:
     """Create the folders; raise `RecordingError` if one contains a study with other settings, or cannot be created."""
-    begin(options.folder, "study.json")
-    try:
-        options.recordings.mkdir(parents=True, exist_ok=True)
-        options.models_folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{options.folder}: cannot be made: {error.strerror}") from None
+    begin(options.folder, "study.json", options.recordings, options.models_folder)
     _same(options.folder / "study.json", options.of_the_recordings)
     _same(options.result("models.json"), options.of_the_models)
 
 
-def begin(folder: Path, first: str) -> None:
-    """Refuse a folder that holds files but not ``first``, the file that a study of this program has from its beginning.
+def begin(folder: Path, first: str, *needed: Path) -> None:
+    """Make the ``needed`` folders in a folder that is empty or new, or holds ``first``, which every study has at once.
 
     Raises `RecordingError`.
     """
@@ -32,6 +27,11 @@ def begin(folder: Path, first: str) -> None:
             raise RecordingError(f"{folder}: holds files that are of no such study; choose an empty or a new folder")
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be read: {error.strerror}") from None
+    try:
+        for path in needed:
+            path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be made: {error.strerror}") from None
 
 
 def write_json(path: Path, value: Any) -> None:

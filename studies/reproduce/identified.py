@@ -30,9 +30,8 @@ from rig.results.files import load_as, save
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.simulated.data_fingerprints import uses_of
 from rig.results.structured.model import IdentifiedStructured
-from studies.reproduce.exciter import exciter_of
 from studies.reproduce.options import Options
-from studies.reproduce.recordings import recorded
+from studies.reproduce.recordings import exciter_of, recorded
 
 _CHOOSES = 3
 """Every third of the experiments besides the multisines is not fitted; together with the held-out multisines it chooses the
@@ -93,13 +92,13 @@ def identify_all(
         beside_validation=beside[1::_CHOOSES],
     )
     by_name = {job.name: job for job in jobs}
-    files = {job.name: _file(options, job.name) for job in jobs}
+    files = {job.name: options.models_folder / f"{job.name.replace(' ', '-')}.h5" for job in jobs}
     kept = {name: _kept(options, path) for name, path in files.items() if path.exists()}
     fits: dict[str, Any] = {name: one.fit for name, one in kept.items()}
     scatter = {name: one.scatter for name, one in kept.items() if one.scatter is not None}
     failures: dict[str, str] = {}
     identify: Callable[..., Any] = _structured(options, say) if options.model == "structured" else _pnlss(options)
-    fit_all = partial(_with_shifts if options.shifts else _without_shifts, identify)
+    fit_all = partial(_fit, identify, options.shifts)
     for found in identify_many(jobs, fit_all, n_jobs=options.jobs, done=fits):
         if found.fit is None:
             failures[found.name] = found.reason
@@ -107,10 +106,9 @@ def identify_all(
             fits[found.name], shifts = found.fit
             if shifts is not None:
                 scatter[found.name] = shifts
-            data = by_name[found.name].training, by_name[found.name].validation
-            of = IdentifiedPnlss if options.model == "pnlss" else IdentifiedStructured
-            fit = fits[found.name]
-            one = of(model=fit.model, fit=fit, seconds=found.seconds, uses=uses_of(*data), scatter=shifts)
+            data, fit = (by_name[found.name].training, by_name[found.name].validation), fits[found.name]
+            kind = _kind(options)
+            one = kind(model=fit.model, fit=fit, seconds=found.seconds, uses=uses_of(*data), scatter=shifts)
             save(one.on(*data, _runs(*data) if shifts else ()), files[found.name])
         count = f"model {len(fits) + len(failures):>3}/{len(jobs)}  {found.name:12}"
         say(f"{count}  {_outcome(fits.get(found.name), scatter.get(found.name), found.reason)}  {found.seconds:.1f} s")
@@ -122,16 +120,13 @@ def _runs(training: Sequence[Experiment], validation: Sequence[Experiment]) -> l
     return [one.name for one in (*training, *validation)]
 
 
-def _without_shifts(
-    identify: Callable[..., Any], training: Sequence[Experiment], *, validation: Sequence[Experiment]
+def _fit(
+    identify: Callable[..., Any], shifts: bool, training: Sequence[Experiment], *, validation: Sequence[Experiment]
 ) -> tuple[Any, RunScatter | None]:
+    """Identify one model, with ``shifts`` together with the shifts of its runs."""
+    if shifts:
+        return fit_with_scatter(identify, training, validation=validation, runs=_runs(training, validation))
     return identify(training, validation=validation), None
-
-
-def _with_shifts(
-    identify: Callable[..., Any], training: Sequence[Experiment], *, validation: Sequence[Experiment]
-) -> tuple[Any, RunScatter | None]:
-    return fit_with_scatter(identify, training, validation=validation, runs=_runs(training, validation))
 
 
 def _pnlss(options: Options) -> Callable[..., PnlssFit]:
@@ -186,10 +181,12 @@ def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment
     return fit
 
 
+def _kind(options: Options) -> type[IdentifiedPnlss] | type[IdentifiedStructured]:
+    return IdentifiedPnlss if options.model == "pnlss" else IdentifiedStructured
+
+
 def _kept(options: Options, path: Path) -> IdentifiedPnlss | IdentifiedStructured:
-    found: IdentifiedPnlss | IdentifiedStructured = (
-        load_as(IdentifiedPnlss, path) if options.model == "pnlss" else load_as(IdentifiedStructured, path)
-    )
+    found = load_as(_kind(options), path)
     if found.fit is None:
         raise RecordingError(f"{path}: holds a model without its fit; remove the file, and it is identified again")
     return found
@@ -205,7 +202,3 @@ def _outcome(fit: PnlssFit | StructuredFit | None, scatter: RunScatter | None, r
         f"training {100 * fit.training_error:6.3f} %  validation {100 * fit.validation_error:6.3f} %  iteration "
         f"{fit.chosen} of {fit.history.iterations}{shifts}"
     )
-
-
-def _file(options: Options, name: str) -> Path:
-    return options.models_folder / f"{name.replace(' ', '-')}.h5"

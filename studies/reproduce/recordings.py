@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from identification import Experiment
+from identification import Exciter, Experiment, identify_exciter
 from rig.arming.run_options import Progress, RunOptions, Silent
 from rig.bench import Bench
 from rig.campaigns.kinds import KINDS
@@ -12,6 +12,7 @@ from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.runner import resume_run, run_plan
 from rig.errors import RigError
+from rig.measurements import spectra
 from rig.measurements.experiments import experiments
 from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
@@ -27,7 +28,8 @@ def multisines(options: Options, say: Callable[[str], None]) -> dict[str, tuple[
     """Return all realisations by level."""
     found: dict[str, tuple[Experiment, ...]] = {}
     for level, name in options.plans.items():
-        plan = _multisine(options, name)
+        plan = load_plan(f"{options.specimen.name}/{name}")
+        assert isinstance(plan, MultisinePlan)
         if not options.scatter:
             found[level] = training_data(options, recorded(options, name, say))
             continue
@@ -50,6 +52,14 @@ def recorded(options: Options, name: str, say: Callable[[str], None]) -> Path:
     plan = load_plan(f"{options.specimen.name}/{name}")
     _make(plan, _bench(options), path, _seed(options, name))
     return path
+
+
+def exciter_of(options: Options, say: Callable[[str], None]) -> Exciter:
+    """Identify the exciter that is coupled to models whose input is the force, from a multisine of its own."""
+    with Recording(recorded(options, options.specimen.exciter, say)) as recording:
+        measured = next(iter(spectra(recording).values()))
+        rate_hz = float(recording.configuration["bench"]["sample_rate_hz"])
+    return identify_exciter(measured, sample_rate_hz=rate_hz)
 
 
 def _own_run(options: Options, name: str, plan: MultisinePlan, index: int) -> Path:
@@ -99,12 +109,6 @@ def training_data(options: Options, path: Path, *, given: str | None = None) -> 
     outputs = (*(("force",) if by == "voltage" else ()), *options.specimen.outputs)
     with Recording(path) as recording:
         return experiments(recording, inputs=(by,), outputs=outputs, rate_hz=options.specimen.rate_hz)
-
-
-def _multisine(options: Options, name: str) -> MultisinePlan:
-    plan = load_plan(f"{options.specimen.name}/{name}")
-    assert isinstance(plan, MultisinePlan)
-    return plan
 
 
 def _bench(options: Options) -> Bench:

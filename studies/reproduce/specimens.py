@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from identification.models import Law, MagnetSpring, Masing
-from rig.errors import ConfigurationError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,10 +96,3 @@ SPECIMENS = {
     ),
 }
 """Specimens by the name that ``rig reproduce`` takes."""
-
-
-def specimen_of(name: str) -> Specimen:
-    """Return a specimen by name; raise `ConfigurationError` for an unknown name."""
-    if name not in SPECIMENS:
-        raise ConfigurationError(f"specimen {name!r}: allowed is {', '.join(SPECIMENS)}")
-    return SPECIMENS[name]

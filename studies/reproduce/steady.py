@@ -6,14 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from identification import (
-    Exciter,
-    IdentificationError,
-    SteadyPrediction,
-)
+from identification import IdentificationError, SteadyPrediction
 from rig.results.simulated.driven_models import DrivenModel, frequency_response_at
-from studies.reproduce.exciter import exciter_of
 from studies.reproduce.options import Options
+from studies.reproduce.recordings import exciter_of
 from studies.reproduce.true_responses import Truth, truths
 
 
@@ -39,7 +35,7 @@ class Steady:
 
     def row(self) -> dict[str, Any]:
         """Return the numbers for tables and JSON."""
-        head = {
+        row: dict[str, Any] = {
             "training_set": self.training_set,
             "model": self.model,
             "force_n": self.truth.force_n,
@@ -48,28 +44,17 @@ class Steady:
             "truth_m": self.truth.amplitude_m,
             "truth_hz": self.truth.frequency_hz,
         }
+        row |= dict.fromkeys(("peak_m", "peak_hz", "error", "frequency_error", "range_use"))
+        row |= {"complete": self.complete, "notes": [self.reason]}
         if self.prediction is None:
-            return {
-                **head,
-                "peak_m": None,
-                "peak_hz": None,
-                "error": None,
-                "frequency_error": None,
-                "range_use": None,
-                "complete": False,
-                "notes": [self.reason],
-            }
-        peak, reached = self.prediction.peak(), self.prediction.peak_reached()
-        return {
-            **head,
-            "peak_m": peak.amplitude_m,
-            "peak_hz": peak.frequency_hz,
-            "error": peak.amplitude_m / self.truth.amplitude_m - 1.0 if reached else None,
-            "frequency_error": peak.frequency_hz / self.truth.frequency_hz - 1.0 if reached else None,
-            "range_use": float(np.max(self.prediction.range_use)),
-            "complete": self.complete,
-            "notes": list(self.prediction.notes),
-        }
+            return row
+        peak = self.prediction.peak()
+        row |= {"peak_m": peak.amplitude_m, "peak_hz": peak.frequency_hz, "notes": list(self.prediction.notes)}
+        row["range_use"] = float(np.max(self.prediction.range_use))
+        if self.prediction.peak_reached():
+            row["error"] = peak.amplitude_m / self.truth.amplitude_m - 1.0
+            row["frequency_error"] = peak.frequency_hz / self.truth.frequency_hz - 1.0
+        return row
 
 
 def steady(
@@ -86,18 +71,13 @@ def steady(
     found = []
     for training_set, (name, model) in models.items():
         for truth in known:
-            prediction, reason = _predicted(options, model, truth, exciter)
+            used = exciter if truth.held == "fundamental" else None
+            prediction, reason = None, ""
+            try:
+                prediction = frequency_response_at(
+                    model, truth.level, force=truth.held, exciter=used, band_hz=options.specimen.band_hz
+                )
+            except IdentificationError as error:
+                reason = str(error)
             found.append(Steady(training_set, name, truth, prediction, reason))
     return found, known
-
-
-def _predicted(
-    options: Options, model: DrivenModel, truth: Truth, exciter: Exciter | None
-) -> tuple[SteadyPrediction | None, str]:
-    low, high = options.specimen.band_hz
-    used = exciter if truth.held == "fundamental" else None
-    try:
-        found = frequency_response_at(model, truth.level, force=truth.held, exciter=used, band_hz=(low, high))
-    except IdentificationError as error:
-        return None, str(error)
-    return found, ""

@@ -12,9 +12,8 @@ from identification.common import find_role
 from rig.campaigns.plans import load_plan
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.results.simulated.driven_models import DrivenModel
-from studies.reproduce.exciter import exciter_of
 from studies.reproduce.options import Options
-from studies.reproduce.recordings import recorded, training_data
+from studies.reproduce.recordings import exciter_of, recorded, training_data
 
 COUPLED = "voltage, exciter coupled"
 _LOWEST = 0.8

@@ -16,7 +16,7 @@ from rig.rehearsal.rehearsal import discard_draws
 from studies.reproduce.folder import prepare
 from studies.reproduce.options import Options
 from studies.reproduce.references.output import prepared
-from studies.reproduce.specimens import specimen_of
+from studies.reproduce.specimens import SPECIMENS
 from tests.recorded import recorded
 from tests.rig.rigs import bench_with
 from vibrolock import kernel_cache
@@ -119,7 +119,7 @@ def test_a_figure_replaces_figures_of_this_program_alone(users, tmp_path, suffix
 
 def test_a_study_begins_in_no_folder_with_other_files(users, tmp_path):
     users("study/errors.csv")
-    options = Options(specimen=specimen_of("magnet-beam"), bench=load_bench("magnet-beam"), folder=tmp_path / "study")
+    options = Options(specimen=SPECIMENS["magnet-beam"], bench=load_bench("magnet-beam"), folder=tmp_path / "study")
     with pytest.raises(RecordingError, match="holds files that are of no such study"):
         prepare(options)
     with pytest.raises(RecordingError, match="holds files that are of no such study"):

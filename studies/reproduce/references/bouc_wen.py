@@ -5,15 +5,24 @@ training data, a multisine of five periods with noise, are those of M. Forgione 
 architecture for learning dynamical systems, International Journal of Adaptive Control and Signal Processing 35, 2021.
 """
 
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from identification import Channel, Experiment, FitSettings, PnlssFit, identify_pnlss, linear_pnlss, pnlss_errors
+from identification import (
+    Channel,
+    Experiment,
+    FitSettings,
+    PnlssFit,
+    PnlssModel,
+    identify_pnlss,
+    linear_pnlss,
+    pnlss_errors,
+)
 from rig.errors import RecordingError
 from studies.reproduce.references.data import DataFile, DataSet
+from studies.reproduce.references.fits import fit_text, lines_of
 from studies.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
 from vibrolock.arrays import Float
 
@@ -89,20 +98,13 @@ def fitted(data: HystereticData, *, settings: FitSettings | None = None, **asked
 
 
 def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyResult:
-    data, begun = read(*paths), time.perf_counter()
+    data = read(*paths)
     fits: dict[str, PnlssFit] = {"polynomials of degrees 2 and 3": fitted(data, degrees=(2, 3), output_degrees=())}
     for number in range(seed, seed + models):
         name = f"{_FEATURES} saturating features, seed {number}"
         fits[name] = fitted(data, saturating=_FEATURES, seed=number)
-        took = fits[name].history.seconds[-1]
-        say(f"{name}: iteration {fits[name].chosen} of {fits[name].history.iterations}, {took:.1f} s")
+        say(fit_text(name, fits[name]))
     chosen = min(fits, key=lambda name: fits[name].validation_error)
-    first = fits[chosen]
-    linear = {} if first.linear is None else _figures(first.linear, data)
-    lines = [Line("linear start", linear)]
-    for name, fit in fits.items():
-        more = {"validation_percent": 100.0 * fit.validation_error, "seconds": float(fit.history.seconds[-1])}
-        lines.append(Line(name, {**_figures(fit.model, data), **more}, chosen=name == chosen))
     return StudyResult(
         title="Bouc-Wen, a simulated hysteresis",
         columns=(
@@ -111,19 +113,17 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
             Column("validation_percent", "validation, %", ".2f"),
             Column("seconds", "s", ".1f"),
         ),
-        lines=tuple(lines),
+        lines=lines_of(fits, chosen, lambda model: _figures(model, data)),
         published=_PUBLISHED,
         notes=(f"errors as 20 log10 of their RMS in m; {_NOISE}", _UNIT),
-        panels=(_panel(first, data.tests[0]),),
-        models={"chosen": first},
-        seconds=time.perf_counter() - begun,
+        panels=(_panel(fits[chosen], data.tests[0]),),
+        models={"chosen": fits[chosen]},
     )
 
 
-def _figures(model: object, data: HystereticData) -> dict[str, float]:
-    rms = pnlss_errors(model, data.tests).rms[:, 0]  # type: ignore[arg-type]
-    both = dict(zip(("multisine_db", "sweep_db"), rms, strict=True))
-    return {key: float(20.0 * np.log10(value)) for key, value in both.items() if np.isfinite(value)}
+def _figures(model: PnlssModel, data: HystereticData) -> dict[str, float]:
+    decibels = 20.0 * np.log10(pnlss_errors(model, data.tests).rms[:, 0])
+    return dict(zip(("multisine_db", "sweep_db"), decibels.tolist(), strict=True))
 
 
 def _panel(fit: PnlssFit, test: Experiment) -> Panel:

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from rig.errors import RecordingError
 from rig.results.files import save
 from rig.text.console import number, print_table
 from studies.reproduce.folder import begin, write_json
@@ -16,11 +15,7 @@ RESULTS = "reference.json"
 
 def prepared(folder: Path) -> None:
     """Make the folder; raise `RecordingError` if that fails or it holds other files, before anything is computed."""
-    begin(folder, RESULTS)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be made: {error.strerror}") from None
+    begin(folder, RESULTS, folder)
 
 
 def summary_of(result: StudyResult, data: DataSet) -> dict[str, Any]:

@@ -80,7 +80,7 @@ class StudyResult:
     models: Mapping[str, Any] = field(default_factory=dict)
     """Models to be stored, by name of the file without its ending."""
     seconds: float = 0.0
-    """Time of all fits."""
+    """Time of the study."""
 
 
 @dataclass(frozen=True)

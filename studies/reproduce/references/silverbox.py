@@ -5,7 +5,6 @@ Control Conference 2013. The record has an arrow (a noise of rising amplitude) a
 seven of these, chosen by the other three, and simulated on the whole arrow.
 """
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from identification import (
 )
 from rig.errors import RecordingError
 from studies.reproduce.references.data import DataFile, DataSet
+from studies.reproduce.references.fits import fit_text, lines_of
 from studies.reproduce.references.result import Column, Curve, Line, Panel, ReferenceStudy, Say, StudyResult
 
 _ARROW = 40_000
@@ -94,20 +94,13 @@ def fitted(data: Oscillator, saturating: int, *, seed: int = 0, settings: FitSet
 
 
 def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyResult:
-    data, begun = read(paths[0]), time.perf_counter()
+    data = read(paths[0])
     fits: dict[str, PnlssFit] = {}
     for count in _CANDIDATES[:models]:
         name = "degrees 2 and 3" + (f", {count} saturating" if count else "")
         fits[name] = fitted(data, count, seed=seed)
-        took = fits[name].history.seconds[-1]
-        say(f"{name}: iteration {fits[name].chosen} of {fits[name].history.iterations}, {took:.1f} s")
+        say(fit_text(name, fits[name]))
     chosen = _chosen({name: fit.model for name, fit in fits.items()}, data)
-    first = fits[chosen]
-    linear = {} if first.linear is None else _figures(first.linear, data)
-    lines = [Line("linear start", linear)]
-    for name, fit in fits.items():
-        seconds = float(fit.history.seconds[-1])
-        lines.append(Line(name, {**_figures(fit.model, data), "seconds": seconds}, chosen=name == chosen))
     return StudyResult(
         title="Silverbox, a measured oscillator with a hardening spring",
         columns=(
@@ -118,16 +111,15 @@ def _study(paths: tuple[Path, ...], models: int, seed: int, say: Say) -> StudyRe
             Column("parameters", "parameters", ".0f"),
             Column("seconds", "s", ".1f"),
         ),
-        lines=tuple(lines),
+        lines=lines_of(fits, chosen, lambda model: _figures(model, data)),
         published=_PUBLISHED,
         notes=(
             f"the arrow: the first {_ARROW} samples; models are judged by {_CHOOSING} multisines, which are not fitted",
             "chosen: the model with the fewest parameters within one standard error of the best on these multisines",
             "published figures are of the whole arrow and second-hand, from lists in later works",
         ),
-        panels=(_panel(first.model, data.test[0]),),
-        models={"chosen": first},
-        seconds=time.perf_counter() - begun,
+        panels=(_panel(fits[chosen].model, data.test[0]),),
+        models={"chosen": fits[chosen]},
     )
 
 
@@ -153,11 +145,11 @@ def _figures(model: PnlssModel, data: Oscillator) -> dict[str, float]:
     groups = {"arrow_mv": data.test, "validation_mv": data.validation, "estimation_mv": data.estimation}
     errors = {key: pnlss_errors(model, group) for key, group in groups.items()}
     found = {key: 1e3 * float(np.sqrt(np.mean(error.rms**2))) for key, error in errors.items()}
-    found |= {
+    return {
+        **found,
         "range_use": float(errors["arrow_mv"].range_use[0]),
         "parameters": float(_parameters(model)),
     }
-    return {key: value for key, value in found.items() if np.isfinite(value)}
 
 
 def _panel(model: PnlssModel, arrow: Experiment) -> Panel:

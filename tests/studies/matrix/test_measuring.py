@@ -11,7 +11,7 @@ from rig.drivers import make_daq
 from rig.wire.messages import EmergencyStop
 from studies.matrix import measuring
 from studies.matrix.measuring import device_row, matrix_rows
-from studies.matrix.ways import Way, is_arm, way_benches
+from studies.matrix.transports import Transport, is_arm, transports
 from tests.rig.rigs import bench_with
 
 BENCH = bench_with()
@@ -40,7 +40,7 @@ def one_way(monkeypatch):
     """Let only some ways be measured."""
 
     def only(*ways):
-        monkeypatch.setattr(measuring, "way_benches", lambda firmware: list(ways))
+        monkeypatch.setattr(measuring, "transports", lambda firmware: list(ways))
 
     return only
 
@@ -48,7 +48,7 @@ def one_way(monkeypatch):
 def test_a_row_over_an_emulator_has_its_converter_and_the_time_to_0_v_that_a_witness_has_seen(one_way, monkeypatch):
     """In lockstep the ramp takes no time: the watchdog's second, and what the processes take."""
     monkeypatch.setattr(measuring, "LONGEST_LOOK_S", 120.0)  # of a busy machine
-    one_way(Way("serial", "serial"))
+    one_way(Transport("serial", "serial"))
     (row,) = matrix_rows(BENCH)
     assert row.failure == ""
     assert row.resolution_mv == pytest.approx(dict.fromkeys(row.resolution_mv, STEP_MV), rel=1e-4)
@@ -66,7 +66,7 @@ def test_a_row_over_an_emulator_has_its_converter_and_the_time_to_0_v_that_a_wit
 
 
 def test_a_row_of_the_virtual_driver_has_no_clock_and_no_watchdog(one_way):
-    one_way(Way("virtual"))
+    one_way(Transport("virtual"))
     (row,) = matrix_rows(BENCH)
     assert row.late_p99_9_ms is row.watchdog_s is row.to_0v_s is None
     assert row.to_0v == "ends with its process"
@@ -87,7 +87,7 @@ def test_what_latched_while_settings_were_tried_does_not_spoil_the_row(one_way, 
         return facts
 
     monkeypatch.setattr(measuring, "examine_bench", ends_latched)
-    one_way(Way("serial", "serial"))
+    one_way(Transport("serial", "serial"))
     latched = []
     monkeypatch.setattr(measuring, "_driven", lambda bench, log: latched.append(_latched(bench)) or {})
     (row,) = matrix_rows(BENCH)
@@ -104,7 +104,7 @@ def test_what_the_suite_has_found_is_counted(one_way, monkeypatch):
     outcomes = [("a", "passed"), ("b", "failed"), ("c", "not applicable"), ("d", "passed"), ("e", "unproven")]
     found = [Finding(name, "", outcome, "why") for name, outcome in outcomes]
     monkeypatch.setattr(measuring, "check_driver", lambda bench, log: iter(found))
-    one_way(Way("virtual"))
+    one_way(Transport("virtual"))
     (row,) = matrix_rows(BENCH, verify=True)
     assert (row.verified.passed, row.verified.failed, row.verified.not_applicable) == (2, 1, 2)
     assert row.verified.failures == ("b: why",)
@@ -112,7 +112,7 @@ def test_what_the_suite_has_found_is_counted(one_way, monkeypatch):
 
 
 def test_a_way_that_cannot_be_opened_is_a_row_that_says_why(one_way):
-    one_way(Way("none", "serial", settings={"interface": "slcan"}))
+    one_way(Transport("none", "serial", settings={"interface": "slcan"}))
     (row,) = matrix_rows(BENCH)
     assert row.failure.startswith("ConfigurationError: ")
     assert row.block is None
@@ -159,9 +159,9 @@ def test_firmware_is_a_row_on_every_wire_by_the_clock_and_in_lockstep_and_for_ar
         asked.append((wire, settings))
         yield bench
 
-    monkeypatch.setattr("studies.matrix.ways.emulated", emulated)
-    plain = len(way_benches())
-    ways = way_benches([host, arm])[plain:]
+    monkeypatch.setattr("studies.matrix.transports.emulated", emulated)
+    plain = len(transports())
+    ways = transports([host, arm])[plain:]
     for way in ways:
         with way.opened(BENCH, tmp_path / "log") as bench:
             assert bench.block == 10
@@ -173,13 +173,13 @@ def test_firmware_is_a_row_on_every_wire_by_the_clock_and_in_lockstep_and_for_ar
     assert [told["firmware"] for _, told in asked] == [host] * 6 + [arm]
     assert asked[6][1]["lockstep"] is True
     assert "QEMU" in ways[6].name
-    assert len({way.name for way in way_benches([host, arm])}) == plain + 7
+    assert len({way.name for way in transports([host, arm])}) == plain + 7
     assert not is_arm(host)
     assert not is_arm(Path("nothing"))
 
 
 def test_classical_can_has_half_the_rate_with_a_filter_below_it():
-    way = next(way for way in way_benches() if "classical" in way.name)
+    way = next(way for way in transports() if "classical" in way.name)
     bench = way.scaled(BENCH)
     assert bench.sample_rate_hz == 2500.0
     assert bench.driver.options["converter"]["anti_alias_hz"] == pytest.approx(1000.0)

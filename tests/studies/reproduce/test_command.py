@@ -16,7 +16,7 @@ from rig.results.pnlss.model import IdentifiedPnlss
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response
 from studies.reproduce.options import Options
-from studies.reproduce.specimens import specimen_of
+from studies.reproduce.specimens import SPECIMENS
 from studies.reproduce.steady import steady
 from studies.reproduce.sweeps import COUPLED, simulated_sweeps
 from tests.command import run_command
@@ -47,7 +47,7 @@ def test_a_model_of_the_lowest_level_is_near_its_noise_at_its_own_level(results)
 
 def study_of(folder, **changes):
     """Options of the study in the folder with other forces and sweeps, and its model."""
-    specimen = replace(specimen_of("magnet-beam"), **changes)
+    specimen = replace(SPECIMENS["magnet-beam"], **changes)
     options = Options(specimen=specimen, bench=load_bench("magnet-beam"), folder=folder, levels=1)
     (path,) = (folder / "force" / "models").glob("*01.h5")
     return options, {"0.5 N": (path.stem, load(path).model)}
@@ -218,7 +218,7 @@ def test_structured_models_stand_beside_the_others_in_the_same_folder(command, f
     assert "all kinds of models in this folder" in done.out
     (again,) = [line for line in command(f"{line} -o {folder}").err.splitlines() if "model " in line] or [""]
     assert again == ""  # the model is not fitted twice
-    specimen = replace(specimen_of("magnet-beam"), sweeps=("sweep-1",))
+    specimen = replace(SPECIMENS["magnet-beam"], sweeps=("sweep-1",))
     options = Options(specimen=specimen, bench=load_bench("magnet-beam"), folder=folder, levels=1, model="structured")
     (path,) = (folder / "structured-r1" / "models").glob("*01.h5")
     alone, coupled = simulated_sweeps(options, {"0.5 N": (path.stem, load(path).model)}, print)

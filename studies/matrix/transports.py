@@ -1,4 +1,4 @@
-"""Ways to run a test without a rig: the virtual driver, emulators of each wire, firmware for the host or in QEMU."""
+"""Transports by which a test runs without a rig: virtual driver, emulators of each wire, firmware for the host or in QEMU."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -9,15 +9,19 @@ from typing import Any
 from rig.bench import Bench
 from rig.emulator.emulated import emulated
 
-EMULATED_BLOCK = 10  # samples, 2 ms at 5 kHz: what a host with ordinary scheduling keeps up with
-ARM = 40  # machine in the header of an ELF file
-CLASSICAL_PART = 0.5  # of the bench's rate: classical CAN cannot carry 5 kHz sample by sample
-FILTER_PART = 0.4  # of the sample rate, for the virtual converter's filter at another rate
+EMULATED_BLOCK = 10
+"""Samples a block, 2 ms at 5 kHz: what a host with ordinary scheduling keeps up with."""
+ARM = 40
+"""Machine in the header of an ELF file."""
+CLASSICAL_PART = 0.5
+"""Part of the bench's sample rate: classical CAN cannot carry 5 kHz sample by sample."""
+FILTER_PART = 0.4
+"""Corner of the virtual converter's filter at another sample rate, as a part of that rate; chosen."""
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way to run a test."""
+class Transport:
+    """What carries a test between host and device."""
 
     name: str
     wire: str | None = None
@@ -30,7 +34,7 @@ class Way:
     """Further settings of the emulator (`rig.emulator.settings.EmulatorSettings`)."""
 
     def scaled(self, bench: Bench) -> Bench:
-        """Return the bench at the rate and with the block of this way."""
+        """Return the bench at the rate and with the block of this transport."""
         changes: dict[str, Any] = {}
         if self.wire is not None:
             changes["block"] = max(bench.block, EMULATED_BLOCK)
@@ -52,27 +56,24 @@ class Way:
             yield reached
 
 
-def way_benches(firmware: Sequence[Path] = ()) -> list[Way]:
-    """Return the ways that there are on every machine, and those over ``firmware``: files for the host or for ARM (QEMU)."""
-    out = [Way("virtual")]
-    out += [way for lockstep in (False, True) for way in _wires("emulator", lockstep)]
+def transports(firmware: Sequence[Path] = ()) -> list[Transport]:
+    """Return the transports that every machine has, and those to ``firmware``: files for the host or for ARM (QEMU)."""
+    out = [Transport("virtual"), *_wires("emulator")]
     for path in firmware:
         settings = {"firmware": path}
         if is_arm(path):  # time in QEMU is not real, and its serial line is slow
-            out.append(Way(f"serial, firmware {path.stem} in QEMU, in lockstep", "serial", settings=settings))
-            continue
-        out += [way for lockstep in (False, True) for way in _wires(f"firmware {path.name}", lockstep, **settings)]
+            out.append(Transport(f"serial, firmware {path.stem} in QEMU, in lockstep", "serial", settings=settings))
+        else:
+            out += _wires(f"firmware {path.name}", **settings)
     return out
 
 
-def _wires(device: str, lockstep: bool, **settings: Any) -> list[Way]:
-    """Return serial, CAN FD and classical CAN to a device."""
-    how = "in lockstep" if lockstep else "by the clock"
-    return [
-        Way(f"serial, {device} {how}", "serial", lockstep, settings=settings),
-        Way(f"CAN FD, {device} {how}", "can", lockstep, settings=settings),
-        Way(f"classical CAN, {device} {how}", "can", lockstep, CLASSICAL_PART, {"fd": False, **settings}),
-    ]
+def _wires(device: str, **settings: Any) -> Iterator[Transport]:
+    """Yield serial, CAN FD and classical CAN to a device, by the clock and in lockstep."""
+    for lockstep, how in ((False, "by the clock"), (True, "in lockstep")):
+        yield Transport(f"serial, {device} {how}", "serial", lockstep, settings=settings)
+        yield Transport(f"CAN FD, {device} {how}", "can", lockstep, settings=settings)
+        yield Transport(f"classical CAN, {device} {how}", "can", lockstep, CLASSICAL_PART, {"fd": False, **settings})
 
 
 def is_arm(path: Path) -> bool:
