@@ -47,9 +47,10 @@ class ArmingRequest:
         """Return the request as lines for the terminal."""
         bench, limits, check = self.bench, self.bench.limits, self.memory.check
         device = ", ".join(f"{key} {value}" for key, value in self.identity.items()) or "unknown"
-        last = (
-            "never" if check is None else f"{_age_h(check.at):.1f} h ago, {_verdict(check.failed)} ({check.recording})"
-        )
+        last = "never"
+        if check is not None:
+            verdict = f"failed: {', '.join(check.failed)}" if check.failed else "passed"
+            last = f"{_age_h(check.at):.1f} h ago, {verdict} ({check.recording})"
         return [
             f"bench    {bench.name}: {bench.specimen.name}",
             f"device   {bench.driver.name}: {device}",
@@ -79,7 +80,10 @@ def armed(bench: Bench, session: Session, what: str, arm: Arm) -> dict[str, Any]
     if bench.arming.require_calibration and overdue and what != CHECK:
         raise NotArmed(f"bench {bench.name}: {'; '.join(overdue)}, and [arming] require_calibration = true")
     memory = memory_of(bench)
-    unseen = _unseen(memory, session.latched)
+    unseen: tuple[str, ...] = () if memory.trip is None else (memory.trip.text,)
+    if memory.trip is not None and memory.trip.recording:
+        unseen = (f"the last run tripped: {memory.trip.text}",)
+    unseen += (session.latched,) if session.latched else ()
     unguarded = unguarded_text(bench, session.capabilities)
     cautions = (*unseen, *filter(None, [unguarded]), *cautions_of(bench, memory, what, session.identity))
     how = _how(ArmingRequest(bench, what, session.identity, memory, cautions, unseen, unguarded), arm)
@@ -105,8 +109,7 @@ def _how(request: ArmingRequest, arm: Arm) -> str:
             f"bench {bench.name}: something physical would move and nobody has seen that {'; '.join(request.unseen)}; run at a "
             "terminal without `arm` and type the bench's name, or ask with a callable (arm=ask from Python)"
         )
-    if request.unguarded and (arm or bench.arming.automated):
-        raise NotArmed(request.unguarded_refusal)
+    NotArmed.raise_if(request.unguarded and (arm or bench.arming.automated), request.unguarded_refusal)
     against = f" ({'; '.join(request.cautions)})" if request.cautions else ""
     switch = "" if request.unguarded else ", or give `arm`"
     automated = "" if bench.arming.automated else ", or [arming] automated = true in a bench made for it"
@@ -153,16 +156,6 @@ def unguarded_text(bench: Bench, capabilities: Capabilities) -> str:
     )
 
 
-def _unseen(memory: BenchMemory, latched: str) -> tuple[str, ...]:
-    """Return what no person has seen yet: a trip, a run without an end, or flags latched in the device."""
-    out: list[str] = []
-    if memory.trip is not None:
-        out.append(f"the last run tripped: {memory.trip.text}" if memory.trip.recording else memory.trip.text)
-    if latched:
-        out.append(latched)
-    return tuple(out)
-
-
 def asked_once(arm: Arm) -> Arm:
     """Wrap a permission for several parts of one recording: a person is asked before the first part, and again after a trip."""
     if not callable(arm):
@@ -175,10 +168,6 @@ def asked_once(arm: Arm) -> Arm:
         return answers[-1]
 
     return ask
-
-
-def _verdict(failed: tuple[str, ...]) -> str:
-    return f"failed: {', '.join(failed)}" if failed else "passed"
 
 
 def _age_h(at: str) -> float:

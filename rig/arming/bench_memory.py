@@ -94,33 +94,16 @@ def memory_of(bench: Bench) -> BenchMemory:
         table = json.loads(read_text(path, LARGEST_BYTES, RecordingError))
         check, trip = table["check"], table["trip"]
         for found in (check, trip):
-            if found is not None:
-                _check_time(found["at"])
-        return BenchMemory(
-            None if check is None else _check_from(check),
-            None if trip is None else RememberedTrip(**trip),
-        )
+            if found is not None and datetime.fromisoformat(found["at"]).tzinfo is None:
+                raise InputError("has no time zone", field="at", value=found["at"])
+        if check is not None:
+            scale = check.get("scale")
+            known = {"failed": tuple(check["failed"]), "scale": None if scale is None else CheckedScale(**scale)}
+            check = RememberedCheck(**{**check, **known})
+        return BenchMemory(check, None if trip is None else RememberedTrip(**trip))
     except (OSError, ValueError, KeyError, TypeError, RecordingError, RecursionError) as error:
         text = f"{path} cannot be read, it may have held a trip ({type(error).__name__}: {error})"
         return BenchMemory(trip=RememberedTrip(now(), text, ""))
-
-
-def _check_from(table: dict[str, Any]) -> RememberedCheck:
-    """Return the check of a stored table; raise `ValueError`, `KeyError` or `TypeError` if it is none."""
-    scale = table.get("scale")
-    return RememberedCheck(
-        **{
-            **table,
-            "failed": tuple(table["failed"]),
-            "scale": None if scale is None else CheckedScale(**scale),
-        }
-    )
-
-
-def _check_time(at: str) -> None:
-    """Raise `ValueError` or `TypeError` for a text that is not a time, or a time without time zone."""
-    if datetime.fromisoformat(at).tzinfo is None:
-        raise InputError("has no time zone", field="at", value=at)
 
 
 def remember(bench: Bench, **changes: Any) -> None:

@@ -5,9 +5,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
-from typing import Protocol
 
-from pydantic import JsonValue
+from pydantic import BaseModel, JsonValue
 
 from rig.arming.run_facts import user_name
 from rig.bench import Bench
@@ -15,13 +14,6 @@ from rig.errors import NotArmed
 
 BESIDE = {"name", "description", "arming"}
 """Keys of plan and bench that no test depends on."""
-
-
-class _Table(Protocol):
-    """A plan or a bench."""
-
-    def model_dump(self, *, mode: str, exclude: set[str]) -> dict[str, JsonValue]:
-        """Return its keys as plain data."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +40,13 @@ class Rehearsed:
     """What it foresees, point by point (`rig.rehearsal.forecast`)."""
 
 
-def subject_digest(plan: _Table, bench: _Table) -> str:
+def subject_digest(plan: BaseModel, bench: BaseModel) -> str:
     """Digest of plan and bench without what no test depends on: a rehearsal holds for these alone."""
     facts = [table.model_dump(mode="json", exclude=BESIDE) for table in (plan, bench)]
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def rehearsal_facts(plan: _Table, bench: Bench, rehearsed: Rehearsed | None, override: str) -> dict[str, JsonValue]:
+def rehearsal_facts(plan: BaseModel, bench: Bench, rehearsed: Rehearsed | None, override: str) -> dict[str, JsonValue]:
     """Return what a recording keeps of a rehearsal: empty without one.
 
     Where the bench states ``arming.largest_trip_probability``, a rehearsal of this plan on this bench is needed whose
@@ -73,8 +65,7 @@ def rehearsal_facts(plan: _Table, bench: Bench, rehearsed: Rehearsed | None, ove
     return out
 
 
-def _against(plan: _Table, bench: Bench, rehearsed: Rehearsed | None) -> str:
-    """Return the reason against arming; empty if there is none."""
+def _against(plan: BaseModel, bench: Bench, rehearsed: Rehearsed | None) -> str:
     largest = bench.arming.largest_trip_probability
     if rehearsed is None:
         if largest is None:

@@ -170,11 +170,6 @@ class Channel(Configured):
         return self
 
     @property
-    def role_code(self) -> Role:
-        """The role as an integer code for the kernels."""
-        return Role[self.role.upper()]
-
-    @property
     def range_in_unit(self) -> float:
         """Largest reading in the physical unit."""
         return self.range_v / abs(self.sensitivity_v_per_unit)

@@ -126,12 +126,12 @@ def invalid(error: ValidationError, model: type[BaseModel], where: str = "") -> 
     count = error.error_count()
     details = error.errors(include_url=False)[: 4 * MOST_FAULTS]
     keys = _keys(model)
-    faults = [_fault(detail, keys) for detail in details if not _follows(detail, details)][:MOST_FAULTS]
+    faults = [_fault(detail, keys) for detail in details if not _is_consequence(detail, details)][:MOST_FAULTS]
     more = [f"and {count - len(faults)} more"] if count > len(details) or len(faults) == MOST_FAULTS < count else []
     return ConfigurationError.of(faults[0], where=where, further=(*faults[1:], *more))
 
 
-def _follows(detail: "ErrorDetails", details: "list[ErrorDetails]") -> bool:
+def _is_consequence(detail: "ErrorDetails", details: "list[ErrorDetails]") -> bool:
     """Return whether the fault only says that a list is too short because its items are faulty."""
     inside = (other for other in details if other["loc"][: len(detail["loc"])] == detail["loc"] and other is not detail)
     return detail["type"] == "too_short" and any(inside)
@@ -174,7 +174,6 @@ def _fault(detail: "ErrorDetails", keys: set[str]) -> ConfigurationError:
 
 
 def _keys(model: object) -> set[str]:
-    """Return all keys of a model and of the models inside it."""
     if isinstance(model, type) and issubclass(model, BaseModel):
         fields = model.model_fields
         return set(fields).union(*(_keys(field.annotation) for field in fields.values()))

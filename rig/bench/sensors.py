@@ -94,18 +94,14 @@ class SensorFile(Configured):
         return self
 
 
-def load_sensors(path: Path) -> dict[str, Sensor]:
-    """Return the sensors in a file by serial number; raise `ConfigurationError` if it is not valid."""
-    return {sensor.serial_number: sensor for sensor in validated(SensorFile, read_toml(path), str(path)).sensors}
-
-
 def with_sensors(table: Table, path: Path) -> Table:
     """Return the table of a bench, its channels completed by the sensors in a file.
 
     Raises `ConfigurationError` for a channel that says itself what the file says of its sensor, and for one that has no
     sensitivity and a serial number that the file does not have.
     """
-    sensors = load_sensors(path)
+    read = validated(SensorFile, read_toml(path), str(path)).sensors
+    sensors = {sensor.serial_number: sensor for sensor in read}
     channels = table.get("channels")
     if not isinstance(channels, list):
         return table

@@ -14,12 +14,11 @@ from rig.daq import CONTINUED, DAQ, HELD, LOST, Channel, flag_names
 
 FILTER_SAMPLES = 32  # over which a filter spreads an output
 LONGEST_RUN_S = 30.0  # s; chosen: longest run of a test that a person waits for
+FARTHEST = 6.0  # times its RMS: beyond it there is no noise in any number of samples that is tried
+MEDIAN_TO_RMS = 1.4826  # of the magnitude of a normal variable
 SHORTEST_BLOCK_S = 0.001  # of a device with a clock, over hundreds of blocks
-TOO_LATE = (
-    HELD,
-    CONTINUED,
-    "watchdog",
-)  # flags of samples at which the converter had another output, for the next one came too late
+TOO_LATE = (HELD, CONTINUED, "watchdog")
+"""Flags of samples at which the converter had another output, because the next one came too late."""
 NO_LOOPBACK = (
     "nothing shows the output itself: connect it to an input, by a cable or a tee, and declare that channel with "
     "loopback = true"
@@ -36,7 +35,7 @@ def with_loopback(bench: Bench) -> Bench | None:
     return bench.model_copy(update={"channels": (*bench.channels, loop)})
 
 
-class Heard(NamedTuple):
+class LoopbackRecord(NamedTuple):
     """Outputs and what the loopbacks read of them."""
 
     outputs: np.ndarray
@@ -88,14 +87,14 @@ class Answer(NamedTuple):
     """Standard error of the sum of the taps."""
 
     @classmethod
-    def of(cls, heard: Heard, column: int, samples: int | None = None) -> "Answer":
+    def of(cls, recorded: LoopbackRecord, column: int, samples: int | None = None) -> "Answer":
         """Least squares over the first ``samples``; what it leaves, over all."""
-        delays = math.ceil(max(0.0, heard.latency_samples)) + 2 * heard.block + FILTER_SAMPLES
-        outputs, read = heard.outputs, heard.read[:, column]
+        delays = math.ceil(max(0.0, recorded.latency_samples)) + 2 * recorded.block + FILTER_SAMPLES
+        outputs, read = recorded.outputs, recorded.read[:, column]
         part = slice(0, None if samples is None else max(samples, 4 * delays))
         columns = [np.concatenate([np.zeros(lag), outputs[: outputs.size - lag]])[part] for lag in range(delays)]
         shifted = np.column_stack([*columns, np.ones(outputs[part].size)])
-        there = (heard.usable & np.isfinite(read))[part]
+        there = (recorded.usable & np.isfinite(read))[part]
         found = np.linalg.lstsq(shifted[there], read[part][there], rcond=None)[0]
         taps, offset_v = found[:-1], float(found[-1])
         left = read - offset_v - np.convolve(outputs, taps)[: outputs.size]
@@ -103,7 +102,7 @@ class Answer(NamedTuple):
         return cls(taps, offset_v, left, scatter * math.sqrt(delays))
 
 
-class HearingTheOutput(DriverUnderTest):
+class LoopbackSteps(DriverUnderTest):
     """Steps of tests that use a loopback."""
 
     def loopback(self) -> DAQ:
@@ -111,33 +110,28 @@ class HearingTheOutput(DriverUnderTest):
         daq = self.make_loopback()
         if daq is None:
             self.unproven(NO_LOOPBACK)
-        assert daq is not None
         return daq
 
-    def allowed_blocks(self, daq: DAQ) -> list[int]:
-        """The block sizes that are tried, up to the largest that the driver allows.
+    def answer(self, recorded: LoopbackRecord, column: int, samples: int | None = None) -> Answer:
+        """The answer of a loopback, if enough of its readings are usable."""
+        if recorded.usable[:samples].sum() < recorded.usable[:samples].size // 2:
+            self.unproven(f"{TOO_BUSY}: outputs came too late for half of the samples")
+        return Answer.of(recorded, column, samples)
+
+    def record_each_block(self) -> list[LoopbackRecord]:
+        """Random outputs in blocks of every size that is tried, up to the largest that the driver allows.
 
         By a clock none is shorter than a millisecond, which Python is too slow for.
         """
-        shortest = math.ceil(SHORTEST_BLOCK_S * daq.sample_rate_hz) if has_clock(daq) else 1
-        return sorted({min(max(block, shortest), daq.capabilities.largest_block) for block in self.blocks})
-
-    def answer(self, heard: Heard, column: int, samples: int | None = None) -> Answer:
-        """The answer of a loopback, if enough of its readings are usable."""
-        if heard.usable[:samples].sum() < heard.usable[:samples].size // 2:
-            self.unproven(f"{TOO_BUSY}: outputs came too late for half of the samples")
-        return Answer.of(heard, column, samples)
-
-    def hear_each_block(self) -> list[Heard]:
-        """Random outputs in blocks of every size that is tried."""
         with self.loopback() as daq:
-            blocks = self.allowed_blocks(daq)
-        return [self._heard_in(block) for block in blocks]
-
-    def _heard_in(self, block: int) -> Heard:
-        with self.loopback_running(block) as daq:
-            delays = math.ceil(max(0.0, daq.latency_samples)) + 2 * block + FILTER_SAMPLES
-            return self.hear(daq, self.signs(block * -(-(4 * delays + 400) // block)))
+            shortest = math.ceil(SHORTEST_BLOCK_S * daq.sample_rate_hz) if has_clock(daq) else 1
+            blocks = sorted({min(max(block, shortest), daq.capabilities.largest_block) for block in self.blocks})
+        recorded = []
+        for block in blocks:
+            with self.loopback_running(block) as daq:
+                delays = math.ceil(max(0.0, daq.latency_samples)) + 2 * block + FILTER_SAMPLES
+                recorded.append(self.record(daq, self.signs(block * -(-(4 * delays + 400) // block))))
+        return recorded
 
     @contextmanager
     def loopback_running(self, block: int | None = None) -> Iterator[DAQ]:
@@ -146,13 +140,13 @@ class HearingTheOutput(DriverUnderTest):
             daq.start(min(block or max(self.blocks), daq.capabilities.largest_block))
             yield daq
 
-    def hear(
+    def record(
         self,
         daq: DAQ,
         outputs: np.ndarray,
         pauses: dict[int, float] | None = None,
         periods: np.ndarray | None = None,
-    ) -> Heard:
+    ) -> LoopbackRecord:
         """Hand over outputs, whole blocks, in one array; ``pauses``: seconds that are waited before a block.
 
         ``periods``: of the outputs of each block, samples; 0 for none. A run that takes longer than half a minute ends there.
@@ -160,11 +154,8 @@ class HearingTheOutput(DriverUnderTest):
         block, columns = daq.block, [index for index, channel in enumerate(daq.channels) if channel.loopback]
         names = flag_names(daq.counters)
         bits = {name: 1 << names.index(name) for name in TOO_LATE if name in names}
-        voltages, read, flags = (
-            np.zeros(block),
-            np.full((outputs.size, len(columns)), np.nan),
-            np.zeros(outputs.size, int),
-        )
+        voltages, flags = np.zeros(block), np.zeros(outputs.size, int)
+        read = np.full((outputs.size, len(columns)), np.nan)
         put_out = np.full(outputs.size, np.nan)
         began, end = time.monotonic(), outputs.size
         for first in range(0, outputs.size, block):
@@ -182,15 +173,5 @@ class HearingTheOutput(DriverUnderTest):
         read /= [channel.sensitivity_v_per_unit for channel in channels]
         flagged = (LOST, sum(bits.values()), bits.get(CONTINUED, 0))
         lost, held, continued = (flags[:end] & mask != 0 for mask in flagged)
-        return Heard(
-            outputs[:end],
-            read[:end],
-            lost,
-            held,
-            continued,
-            put_out[:end],
-            block,
-            daq.queue_blocks * block,
-            daq.latency_samples,
-            channels,
-        )
+        arrays = outputs[:end], read[:end], lost, held, continued, put_out[:end]
+        return LoopbackRecord(*arrays, block, daq.queue_blocks * block, daq.latency_samples, channels)

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from rig.conformance.answers import Answer, Heard, HearingTheOutput
-from rig.conformance.looking import STILL, LookingAtTheOutput
+from rig.conformance.answers import FARTHEST, MEDIAN_TO_RMS, Answer, LoopbackRecord, LoopbackSteps
+from rig.conformance.looking import STILL, OutputSteps
 from rig.conformance.subject import has_clock
 from rig.daq import DAQ
 from rig.errors import DaqWatchdog
@@ -17,11 +17,9 @@ FIT_SAMPLES = 2000  # samples of random output that the answer is fitted to; cho
 FIRST_BLOCKS = 20  # blocks of 0 V before anything is driven; chosen
 SINE_BLOCKS = 60  # blocks of the sine about the pause; chosen
 PAUSE_SHARE = 0.5  # of the watchdog
-FARTHEST = 6.0  # times its RMS: beyond it there is no noise
-MEDIAN_TO_RMS = 1.4826  # of the magnitude of a normal variable
 
 
-class ContinuingTests(HearingTheOutput, LookingAtTheOutput):
+class ContinuingTests(LoopbackSteps, OutputSteps):
     """Tests of a late host, for devices that say in ``identity`` that they go on with a ``longest_period``."""
 
     def test_late_outputs_are_continued_with_the_last_period(self) -> None:
@@ -34,21 +32,23 @@ class ContinuingTests(HearingTheOutput, LookingAtTheOutput):
             outputs[: fit * daq.block] = self.signs(fit * daq.block)
             outputs[: FIRST_BLOCKS * daq.block] = 0.0  # those that are late after the start are flagged by nobody
             periods = np.where(np.arange(blocks) >= fit, PERIOD, 0.0)
-            heard = self.hear(daq, outputs, {fit + SINE_BLOCKS // 2: pause_s}, periods)
-        if not heard.held.any():
+            recorded = self.record(daq, outputs, {fit + SINE_BLOCKS // 2: pause_s}, periods)
+        if not recorded.held.any():
             self.unproven("the host was not late enough: nothing was missing")
-        assert heard.continued.any(), "outputs came too late and were held: the device says that it goes on with them"
-        off_v = np.abs(heard.as_put_out - outputs)[heard.handed_over(heard.continued)]
+        assert recorded.continued.any(), (
+            "outputs came too late and were held: the device says that it goes on with them"
+        )
+        off_v = np.abs(recorded.as_put_out - outputs)[recorded.handed_over(recorded.continued)]
         assert off_v.max() <= OFF_SHARE * self.amplitude_v, (
             f"a sine with a period of {PERIOD:g} samples is off by {off_v.max():.3g} V where it is continued: allowed is "
             f"{OFF_SHARE * self.amplitude_v:.3g} V"
         )
-        self._require_what_was_put_out(heard, fit * heard.block)
+        self._require_what_was_put_out(recorded, fit * recorded.block)
 
-    def _require_what_was_put_out(self, heard: Heard, fit: int) -> None:
-        known = heard._replace(outputs=heard.as_put_out, held=np.zeros_like(heard.held))
-        for column, channel in enumerate(heard.channels):
-            left = np.abs(Answer.of(known, column, fit).left)[~heard.lost]
+    def _require_what_was_put_out(self, recorded: LoopbackRecord, fit: int) -> None:
+        known = recorded._replace(outputs=recorded.as_put_out, held=np.zeros_like(recorded.held))
+        for column, channel in enumerate(recorded.channels):
+            left = np.abs(Answer.of(known, column, fit).left)[~recorded.lost]
             allowed_v = OFF_SHARE * self.amplitude_v + FARTHEST * MEDIAN_TO_RMS * float(np.nanmedian(left[:fit]))
             if allowed_v > self.amplitude_v:
                 self.unproven(f"channel {channel.name}: noise hides {self.amplitude_v:g} V")
@@ -63,9 +63,9 @@ class ContinuingTests(HearingTheOutput, LookingAtTheOutput):
             period = 40.0 * daq.block + 0.4
             pause_s = self._pause_s(daq, period)
             outputs = self.amplitude_v * np.sin(2.0 * np.pi / period * np.arange(60 * daq.block))
-            heard = self.hear(daq, outputs[: 20 * daq.block], {19: pause_s}, np.full(20, period))
-            more = self.hear(daq, np.zeros((daq.queue_blocks + 4) * daq.block))
-        self._require_none_continued(heard, more, "before a period had come")
+            recorded = self.record(daq, outputs[: 20 * daq.block], {19: pause_s}, np.full(20, period))
+            more = self.record(daq, np.zeros((daq.queue_blocks + 4) * daq.block))
+        self._require_none_continued(recorded, more, "before a period had come")
 
     def test_nothing_is_continued_after_0_v(self) -> None:
         """Once 0 V was handed over, without a period, a host that is late leaves 0 V."""
@@ -75,14 +75,14 @@ class ContinuingTests(HearingTheOutput, LookingAtTheOutput):
             outputs = self.amplitude_v * np.sin(2.0 * np.pi / PERIOD * np.arange((sine + 2 * zeros) * daq.block))
             outputs[sine * daq.block :] = 0.0
             periods = np.where(np.arange(sine + 2 * zeros) < sine, PERIOD, 0.0)
-            heard = self.hear(daq, outputs, {sine + zeros - 1: pause_s}, periods)
-            more = self.hear(daq, np.zeros((zeros + math.ceil(pause_s * daq.sample_rate_hz / daq.block)) * daq.block))
-        self._require_none_continued(heard, more, "after 0 V had been handed over")
+            recorded = self.record(daq, outputs, {sine + zeros - 1: pause_s}, periods)
+            more = self.record(daq, np.zeros((zeros + math.ceil(pause_s * daq.sample_rate_hz / daq.block)) * daq.block))
+        self._require_none_continued(recorded, more, "after 0 V had been handed over")
 
-    def _require_none_continued(self, heard: Heard, more: Heard, when: str) -> None:
-        if not (heard.held.any() or more.held.any()):
+    def _require_none_continued(self, recorded: LoopbackRecord, more: LoopbackRecord, when: str) -> None:
+        if not (recorded.held.any() or more.held.any()):
             self.unproven("the host was not late enough: nothing was missing")
-        continued = int(heard.continued.sum() + more.continued.sum())
+        continued = int(recorded.continued.sum() + more.continued.sum())
         assert continued == 0, f"{continued} outputs were continued {when}"
 
     def test_the_watchdog_ends_what_is_continued(self) -> None:
@@ -91,7 +91,7 @@ class ContinuingTests(HearingTheOutput, LookingAtTheOutput):
             daq.start(min(max(self.blocks), daq.capabilities.largest_block))
             watchdog_s = self._pause_s(daq, PERIOD) / PAUSE_SHARE
             wave = self.amplitude_v * np.sin(2.0 * np.pi / PERIOD * np.arange(SINE_BLOCKS * daq.block))
-            self.hear(daq, wave, periods=np.full(SINE_BLOCKS, PERIOD))
+            self.record(daq, wave, periods=np.full(SINE_BLOCKS, PERIOD))
             self.pause(daq, 1.5 * watchdog_s + self.message_s)
             seen, told = self.witness(daq), False
             try:

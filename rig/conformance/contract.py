@@ -11,16 +11,39 @@ cannot be judged, because nothing sees the output or because this machine was bu
 Where something physical moves, outputs stay within ``amplitude_v``.
 """
 
+from rig.bench import Bench
+from rig.conformance.answers import with_loopback
 from rig.conformance.continuing import ContinuingTests
-from rig.conformance.gone import GoneTests
 from rig.conformance.life_cycle import LifeCycleTests
 from rig.conformance.loopback import LoopbackTests
 from rig.conformance.samples import SamplesTests
+from rig.conformance.timing import TimingTests
 from rig.conformance.ways_out import WaysOutTests
 from rig.conformance.without_host import WithoutHostTests
+from rig.daq import DAQ
+from rig.drivers import make_daq
 
 
 class DriverContract(
-    LifeCycleTests, SamplesTests, LoopbackTests, ContinuingTests, WaysOutTests, WithoutHostTests, GoneTests
+    LifeCycleTests, SamplesTests, LoopbackTests, ContinuingTests, WaysOutTests, WithoutHostTests, TimingTests
 ):
     """Tests of one driver. Override `make`; and ``amplitude_v``, ``tolerance_v`` for a physical bench."""
+
+
+class BenchContract(DriverContract):
+    """Tests of the installed driver of ``bench``."""
+
+    bench: Bench
+
+    def make(self) -> DAQ:
+        """A driver as the bench asks for it."""
+        return make_daq(self.bench)
+
+    def make_loopback(self) -> DAQ | None:
+        """The same with a loopback, if it has one or is virtual."""
+        bench = with_loopback(self.bench)
+        return None if bench is None else make_daq(bench)
+
+    def bench_for_another_process(self) -> Bench:
+        """The bench itself."""
+        return self.bench

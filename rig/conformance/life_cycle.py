@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -26,14 +27,10 @@ class LifeCycleTests(DriverUnderTest):
     def test_the_life_cycle_is_open_start_stop_close(self) -> None:
         """Every step leads to its state."""
         daq = self.make()
-        steps = [
-            (daq.open, State.OPEN),
-            (daq.start, State.RUNNING),
-            (daq.stop, State.OPEN),
-            (daq.close, State.CLOSED),
-        ]
+        steps: list[Callable[[], None]] = [daq.open, daq.start, daq.stop, daq.close]
+        states = State.OPEN, State.RUNNING, State.OPEN, State.CLOSED
         try:
-            for step, state in steps:
+            for step, state in zip(steps, states, strict=True):
                 step()
                 assert daq.state is state, f"after {step.__name__} the driver is {daq.state.value}, not {state.value}"
         finally:
@@ -167,7 +164,6 @@ class LifeCycleTests(DriverUnderTest):
         bench = self.bench_for_another_process()
         if bench is None:
             self.unproven("the contract has no bench to compare with (override bench_for_another_process)")
-        assert bench is not None
         wanted = bench.sample_rate_hz, bench.output_range_v, bench.channels
         with self.make() as daq:
             for when in ("once open", "while running"):

@@ -22,14 +22,14 @@ BLIND = (
 )
 
 
-class Seen(NamedTuple):
+class OutputReading(NamedTuple):
     """What is on the output, V, and whether that was read after a restart, which may itself have brought it to 0 V."""
 
     volts: float
     after_restart: bool
 
 
-class LookingAtTheOutput(DriverUnderTest):
+class OutputSteps(DriverUnderTest):
     """Steps of tests that look at the output."""
 
     message_s = 1.0
@@ -65,17 +65,17 @@ class LookingAtTheOutput(DriverUnderTest):
             if seen is None or abs(seen - abs(level_v)) <= STILL * self.amplitude_v or time.monotonic() > end:
                 return seen
 
-    def look(self, daq: DAQ) -> Seen:
+    def look(self, daq: DAQ) -> OutputReading:
         """What is on the output once a message has had its time; without a witness by the loopback, which needs a block."""
         end = time.monotonic() + self.message_s
         while (seen := self.witness(daq)) is not None and seen > STILL * self.amplitude_v and time.monotonic() < end:
             time.sleep(POLL_S)
         if seen is not None:
-            return Seen(seen, after_restart=False)
+            return OutputReading(seen, after_restart=False)
         was_running = daq.state is State.RUNNING
-        return Seen(self.reading_before_new_output(daq), after_restart=not was_running)
+        return OutputReading(self.reading_before_new_output(daq), after_restart=not was_running)
 
-    def require_still(self, seen: Seen, when: str, *taken_away: str) -> None:
+    def require_still(self, seen: OutputReading, when: str, *taken_away: str) -> None:
         """Require 0 V. What a restart shows counts only if it shows an output left without the methods ``taken_away``."""
         assert seen.volts <= STILL * self.amplitude_v, f"{seen.volts:g} V are on the output {when}"
         if seen.after_restart and not self._restart_shows_what_was_left(*taken_away):
@@ -99,7 +99,7 @@ class LookingAtTheOutput(DriverUnderTest):
             try:
                 with ExitStack() as without:
                     for name in taken_away:
-                        without.enter_context(replaced(daq, name, _do_nothing))
+                        without.enter_context(replaced(daq, name, lambda *_: None))
                     daq.close() if "_close" in taken_away else daq.stop()
                 return self.reading_before_new_output(daq) > 0.5 * self.amplitude_v
             finally:
@@ -111,10 +111,6 @@ class LookingAtTheOutput(DriverUnderTest):
 def loopback_of(daq: DAQ) -> int | None:
     """Column of the first loopback; None if there is none."""
     return next((index for index, channel in enumerate(daq.channels) if channel.loopback), None)
-
-
-def _do_nothing(*arguments: object) -> None:
-    pass
 
 
 @contextmanager

@@ -5,13 +5,12 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, NoReturn, get_args
 
 import numpy as np
 
 from rig.bench import Bench
-from rig.conformance.answers import with_loopback
-from rig.conformance.contract import DriverContract
+from rig.conformance.contract import BenchContract, DriverContract
 from rig.conformance.subject import NotApplicable, Unproven
 from rig.conformance.timing import SLOW_TEST
 from rig.conformance.without_host import KILLING_TEST, last_output_v
@@ -35,37 +34,25 @@ class Finding:
     detail: str = ""
 
 
-class _OnBench(DriverContract):
-    """The contract over the driver of a bench."""
-
+class _OnBench(BenchContract):
     def __init__(self, bench: Bench, output_log: Path | None) -> None:
-        self._bench, self._output_log = bench, output_log
-
-    def make(self) -> DAQ:
-        return make_daq(self._bench)
-
-    def make_loopback(self) -> DAQ | None:
-        bench = with_loopback(self._bench)
-        return None if bench is None else make_daq(bench)
-
-    def bench_for_another_process(self) -> Bench:
-        return self._bench
+        self.bench, self._output_log = bench, output_log
 
     def witness(self, daq: DAQ | None) -> float | None:
         return super().witness(daq) if self._output_log is None else last_output_v(self._output_log)
 
     def known_inputs(self, outputs: np.ndarray, block: int) -> np.ndarray | None:
         """Those of a virtual rig of the same bench."""
-        if self._bench.driver.name != "virtual":
+        if self.bench.driver.name != "virtual":
             return None
-        with VirtualDAQ(self._bench) as known:
+        with VirtualDAQ(self.bench) as known:
             known.start(block)
             return np.vstack([known.exchange(part.copy()) for part in outputs.reshape(-1, block)])
 
-    def skip(self, reason: str) -> None:
+    def skip(self, reason: str) -> NoReturn:
         raise NotApplicable(reason)
 
-    def unproven(self, reason: str) -> None:
+    def unproven(self, reason: str) -> NoReturn:
         raise Unproven(reason)
 
 
@@ -94,9 +81,13 @@ def check_driver(bench: Bench, output_log: Path | None = None) -> Iterator[Findi
     names = [name for name, _ in inspect.getmembers(contract, inspect.ismethod) if name.startswith("test_")]
     slow = False
     for name in sorted(names, key=lambda name: name != SLOW_TEST):
-        found = _found(contract, name) if not slow else _left_out(contract, name)
+        found = _found(contract, name, left_out=slow)
         yield found
-        _clear_after(found, name, contract)
+        # the watchdog that a test makes latch, or that a test that was not passed has left latched where nothing moves
+        if name == KILLING_TEST or found.outcome in ("failed", "unproven"):
+            with suppress(DaqError), contract.make() as daq:
+                if name == KILLING_TEST or daq.capabilities.virtual:
+                    daq.clear()
         slow = slow or (name == SLOW_TEST and found.outcome == "failed")
 
 
@@ -109,35 +100,20 @@ def unproven(findings: Iterable[Finding]) -> dict[str, list[str]]:
     return out
 
 
-def _clear_after(found: Finding, name: str, contract: DriverContract) -> None:
-    """Clear the watchdog that a test makes latch, or that a test that was not passed has left latched where nothing moves."""
-    if name != KILLING_TEST and found.outcome not in ("failed", "unproven"):
-        return
-    with suppress(DaqError), contract.make() as daq:
-        if name == KILLING_TEST or daq.capabilities.virtual:
-            daq.clear()
-
-
-def _found(contract: DriverContract, name: str) -> Finding:
-    words, duty = _words(contract, name)
+def _found(contract: DriverContract, name: str, left_out: bool) -> Finding:
+    """Finding of one test, or that it was ``left_out``."""
+    duty = " ".join((inspect.getdoc(getattr(contract, name)) or "").split())
+    outcome: Outcome = "passed"
+    detail = ""
     try:
+        if left_out:
+            raise NotApplicable("the driver is too slow to be tested any further")
         with contract.punctual():
             getattr(contract, name)()
     except Unproven as reason:
-        return Finding(words, duty, "unproven", str(reason))
+        outcome, detail = "unproven", str(reason)
     except NotApplicable as reason:
-        return Finding(words, duty, "not applicable", str(reason))
+        outcome, detail = "not applicable", str(reason)
     except Exception as error:  # a driver may fail in any way: that is what is looked for
-        return Finding(words, duty, "failed", " ".join(f"{type(error).__name__}: {error}".split()))
-    return Finding(words, duty, "passed")
-
-
-def _left_out(contract: DriverContract, name: str) -> Finding:
-    return Finding(*_words(contract, name), "not applicable", "the driver is too slow to be tested any further")
-
-
-def _words(contract: DriverContract, name: str) -> tuple[str, str]:
-    """Name and duty of a test."""
-    return name.removeprefix("test_").replace("_", " "), " ".join(
-        (inspect.getdoc(getattr(contract, name)) or "").split()
-    )
+        outcome, detail = "failed", " ".join(f"{type(error).__name__}: {error}".split())
+    return Finding(name.removeprefix("test_").replace("_", " "), duty, outcome, detail)

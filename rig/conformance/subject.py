@@ -4,6 +4,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import NoReturn
 
 import numpy as np
 
@@ -86,7 +87,7 @@ class DriverUnderTest(ABC):
         """A context that notes when this machine was late."""
         return HostWatch()
 
-    def skip(self, reason: str) -> None:
+    def skip(self, reason: str) -> NoReturn:
         """Skip a test that does not apply: by pytest if it is installed, else by `NotApplicable`."""
         try:
             import pytest
@@ -94,7 +95,7 @@ class DriverUnderTest(ABC):
             raise NotApplicable(reason) from None
         pytest.skip(reason)
 
-    def unproven(self, reason: str) -> None:
+    def unproven(self, reason: str) -> NoReturn:
         """End a test that applies and cannot be judged, with what it would take."""
         self.skip(f"unproven: {reason}")
 

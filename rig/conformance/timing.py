@@ -10,11 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.conformance.subject import TOO_BUSY, DriverUnderTest, has_clock
-from rig.daq import DAQ
+from rig.daq import DAQ, State
+from rig.errors import DaqError
 
 SLOW_TEST = "test_a_block_takes_no_longer_than_it_lasts"
 BLOCK_S = 0.05  # s; duration of the blocks that are timed; chosen: long beside the clock, short beside a test
 BLOCKS = 5  # number of them; chosen
+STORED_BLOCKS = 1000  # that a driver may have in store of a device that is gone; chosen
 PACED_FACTOR = 2.0  # of a block's own time: the median block of a device with a clock
 WAITING_FACTOR = 10.0  # of one that returns at once, or waits for the host
 SHORTEST_S = 0.1  # that a busy machine may need for any block
@@ -34,7 +36,7 @@ class Drift(NamedTuple):
 
 
 class TimingTests(DriverUnderTest):
-    """Tests of the clock."""
+    """Tests of the clock, and of the time in which a device that is gone is noticed."""
 
     late_s = 0.025
     """Time by which no block may come later than usual, s."""
@@ -52,7 +54,8 @@ class TimingTests(DriverUnderTest):
             daq.start(block)
             daq.exchange(np.zeros(block))  # what is compiled or filled at first takes no part
             taken_s = [self.seconds(daq, lambda: daq.exchange(np.zeros(block))) for _ in range(BLOCKS)]
-            allowed_s = max(SHORTEST_S, _longest_s(daq))
+            factor = PACED_FACTOR if has_clock(daq) else WAITING_FACTOR
+            allowed_s = max(SHORTEST_S, factor * daq.block / daq.sample_rate_hz)
         median_s = float(np.median(taken_s))
         block_s = block / daq.sample_rate_hz
         assert median_s <= allowed_s, (
@@ -148,16 +151,42 @@ class TimingTests(DriverUnderTest):
         for name, seconds in taken_s.items():
             assert min(seconds) <= self.prompt_s, f"{name} takes {min(seconds):.3g} s: allowed is {self.prompt_s:g} s"
 
+    def test_a_device_that_is_gone_is_a_daq_error_and_can_be_closed(self) -> None:
+        """`unplug` takes the device away: within a second exchange raises a `DaqError` that says something, and close ends."""
+        daq, message = self.make(), ""
+        try:
+            daq.open()
+            daq.start(1)
+            if not self.unplug(daq):
+                self.unproven("the contract has not been told how this device is unplugged (override unplug)")
+            with self.host() as host:
+                began = time.perf_counter()
+                try:
+                    for _ in range(STORED_BLOCKS):
+                        before_s = self.now_s(daq)
+                        daq.exchange(np.zeros(1))
+                except DaqError as error:
+                    message = str(error)
+                assert message, "exchange went on without a device, or failed without a word"
+                closing_s = self.now_s(daq)
+                daq.close()
+                closed_s = self.now_s(daq)
+                host_late_s = host.late_s(began, time.perf_counter())
+        finally:
+            daq.close()
+        assert daq.state is State.CLOSED, f"after close the driver is {daq.state.value}"
+        for what, taken_s in (("exchange", closing_s - before_s), ("close", closed_s - closing_s)):
+            if self.prompt_s < taken_s <= self.prompt_s + host_late_s:
+                self.unproven(TOO_BUSY)
+            assert taken_s <= self.prompt_s, (
+                f"{what} takes {taken_s:.3g} s once the device is gone: allowed is {self.prompt_s:g} s"
+            )
+
     def seconds(self, daq: DAQ, action: Callable[[], object]) -> float:
         """Time that an action takes by the clock of `now_s`, s."""
         began = self.now_s(daq)
         action()
         return self.now_s(daq) - began
-
-
-def _longest_s(daq: DAQ) -> float:
-    """Time that a block may take in the median, s."""
-    return daq.block / daq.sample_rate_hz * (PACED_FACTOR if has_clock(daq) else WAITING_FACTOR)
 
 
 @contextmanager

@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rig.conformance.looking import STILL, UNSEEN, LookingAtTheOutput, replaced
+from rig.conformance.looking import STILL, UNSEEN, OutputSteps, replaced
 from rig.conformance.subject import TOO_BUSY
 from rig.daq import HELD, State
 from rig.errors import DaqError
 
 
-class WaysOutTests(LookingAtTheOutput):
+class WaysOutTests(OutputSteps):
     """Tests that look at the output from outside."""
 
     def test_a_witness_sees_the_voltage_that_was_handed_over(self) -> None:

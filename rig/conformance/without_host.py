@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from rig.bench import Bench
-from rig.conformance.looking import POLL_S, STILL, LookingAtTheOutput, Seen, loopback_of
+from rig.conformance.looking import POLL_S, STILL, OutputReading, OutputSteps, loopback_of
 
 KILLING_TEST = "test_the_output_comes_to_0_v_without_the_host"
 NOTHING_TO_LOOK_AT = "nothing is left to look at once the process is dead: no witness (override witness), no loopback"
@@ -25,7 +25,7 @@ def last_output_v(log: Path) -> float:
     return abs(float(lines[-1].split()[2])) if lines else 0.0
 
 
-class WithoutHostTests(LookingAtTheOutput):
+class WithoutHostTests(OutputSteps):
     """A host that is killed."""
 
     safe_within_s = 5.0
@@ -44,7 +44,6 @@ class WithoutHostTests(LookingAtTheOutput):
             self.unproven(
                 "the contract has no bench that another process could open (override bench_for_another_process)"
             )
-        assert bench is not None
         if self.witness(None) is None and capabilities.virtual:
             self.skip(NOTHING_TO_LOOK_AT)
         if self.witness(None) is None and column is None:
@@ -57,22 +56,21 @@ class WithoutHostTests(LookingAtTheOutput):
         if seen.after_restart:
             self.unproven(REOPENED)
 
-    def _waited_for_0_v(self) -> Seen:
+    def _waited_for_0_v(self) -> OutputReading:
         """Output once it is at 0 V or the time is over; without a witness it is read from the loopback of a new driver."""
         end = time.monotonic() + self.safe_within_s
         while time.monotonic() < end:
             seen = self.witness(None)
             if seen is not None and seen <= STILL * self.amplitude_v:
-                return Seen(seen, after_restart=False)
+                return OutputReading(seen, after_restart=False)
             time.sleep(POLL_S)
         seen = self.witness(None)
         if seen is not None:
-            return Seen(seen, after_restart=False)
+            return OutputReading(seen, after_restart=False)
         with self.make_visible() as daq:
-            return Seen(self.reading_before_new_output(daq), after_restart=True)
+            return OutputReading(self.reading_before_new_output(daq), after_restart=True)
 
     def _drive_and_kill(self, bench: Bench) -> None:
-        """Have another process drive the bench, and kill it."""
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or str(Path.cwd()) for path in sys.path)}
         command = [sys.executable, "-P", "-m", "rig.conformance.driving"]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}

@@ -40,13 +40,6 @@ class CanOptions(WireOptions):
         return BusTiming(self.fd, self.bitrate, self.data_bitrate)
 
 
-def make_bus(options: CanOptions) -> FrameBus:
-    """The bus that the options describe, not yet open."""
-    if options.interface == "slcan":
-        return SlcanBus(str(options.channel), options.timing, options.baud)
-    return PythonCanBus(options.interface, options.channel, options.timing, options.node, options.backend)
-
-
 class CanDAQ(WireDAQ):
     """A device that speaks the wire protocol on a CAN bus.
 
@@ -60,4 +53,9 @@ class CanDAQ(WireDAQ):
 
     def _make_link(self) -> Link:
         can = self._can
-        return CanLink(make_bus(can), len(self.channels), can.timing, can.node, can.dbc)
+        bus: FrameBus
+        if can.interface == "slcan":
+            bus = SlcanBus(str(can.channel), can.timing, can.baud)
+        else:
+            bus = PythonCanBus(can.interface, can.channel, can.timing, can.node, can.backend)
+        return CanLink(bus, len(self.channels), can.timing, can.node, can.dbc)

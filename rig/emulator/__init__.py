@@ -2,6 +2,6 @@
 
 from rig.emulator.device import Device
 from rig.emulator.faults import Faults
-from rig.emulator.plant import Plant, VirtualPlant, Wiring
+from rig.emulator.plant import VirtualPlant, Wiring
 
-__all__ = ["Device", "Faults", "Plant", "VirtualPlant", "Wiring"]
+__all__ = ["Device", "Faults", "VirtualPlant", "Wiring"]

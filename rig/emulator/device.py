@@ -7,13 +7,14 @@ import numpy as np
 
 from rig.emulator.faults import Faults, FaultySender
 from rig.emulator.parameters import Parameters, Words, carried
-from rig.emulator.plant import Plant
+from rig.emulator.plant import VirtualPlant
 from rig.emulator.sampling import Sampling
-from rig.emulator.states import Life
+from rig.emulator.states import StateMachine
 from rig.wire.link import Link
 from rig.wire.messages import (
     HEARTBEATS_HZ,
     LOWEST_VERSION,
+    MISSED,
     Answer,
     Command,
     DeviceFlag,
@@ -32,7 +33,6 @@ from rig.wire.messages import (
 
 BEAT_S = 1.0 / HEARTBEATS_HZ
 COUNTED = {DeviceFlag.OUTPUT_HELD: "held_blocks", DeviceFlag.OUTPUT_CONTINUED: "continued_blocks"}
-MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
 
 
 class Device:
@@ -44,7 +44,7 @@ class Device:
     """
 
     def __init__(
-        self, plant: Plant, words: Words, link: Link, *, lockstep: bool = False, faults: Faults | None = None
+        self, plant: VirtualPlant, words: Words, link: Link, *, lockstep: bool = False, faults: Faults | None = None
     ) -> None:
         self.plant, self.link = plant, link
         self.faults = faults or Faults()
@@ -53,7 +53,7 @@ class Device:
         self._parameters = Parameters(carried(words, plant, link), self.faults)
         self._sampling = Sampling(plant, lockstep=lockstep)
         self._speak()
-        self._life = Life(self._sampling, self._parameters, self.counts, self._beat)
+        self._states = StateMachine(self._sampling, self._parameters, self.counts, self._beat)
         self._sender = FaultySender(link, self.faults)
         self._beat_s = -math.inf
         self._last: tuple[Request, Answer] | None = None
@@ -69,7 +69,7 @@ class Device:
     @property
     def state(self) -> DeviceState:
         """Its present state."""
-        return self._life.state
+        return self._states.state
 
     @property
     def measured(self) -> int:
@@ -82,11 +82,6 @@ class Device:
         return self._sampling.output_v
 
     @property
-    def is_sampling(self) -> bool:
-        """Whether it samples."""
-        return self._sampling.on
-
-    @property
     def due_s(self) -> float:
         """When the block under way will be complete; never while it does not sample, or in lockstep."""
         return self._sampling.due_s
@@ -94,8 +89,8 @@ class Device:
     @property
     def wake_s(self) -> float:
         """Time by which `advance` must be called."""
-        life, sender = self._life, self._sender
-        return min(self._sampling.due_s, self._beat_s + BEAT_S, life.bites_s, self._reset_s, sender.wake_s)
+        states, sender = self._states, self._sender
+        return min(self._sampling.due_s, self._beat_s + BEAT_S, states.bites_s, self._reset_s, sender.wake_s)
 
     def handle(self, message: Message, now_s: float) -> None:
         """Carry out a message."""
@@ -107,7 +102,7 @@ class Device:
         elif isinstance(message, Request):
             self._answer(message, now_s)
         elif isinstance(message, EmergencyStop):
-            self._life.emergency_stop(now_s)
+            self._states.emergency_stop(now_s)
 
     def _take_output(self, output: Output, now_s: float) -> None:
         if not self._sampling.on:
@@ -117,7 +112,7 @@ class Device:
         if in_time is None:
             self.counts["bad_outputs"] += 1
         else:
-            self._life.feed(now_s, in_time=in_time > 0)
+            self._states.feed(now_s, in_time=in_time > 0)
 
     def _answer(self, request: Request, now_s: float) -> None:
         if self._last is not None and request == self._last[0]:
@@ -130,14 +125,14 @@ class Device:
         self._sender.send(answer, now_s)
 
     def _carry_out(self, request: Request, now_s: float) -> tuple[Status, int]:
-        life, parameters = self._life, self._parameters
+        states, parameters = self._states, self._parameters
         match request.command:
             case Command.GET if request.parameter == Parameter.STATE and request.item == 0:
-                return Status.DONE, int(life.state)
+                return Status.DONE, int(states.state)
             case Command.GET:
                 return parameters.get(request.parameter, request.item)
             case Command.SET if self._sampling.on:
-                return Status.WRONG_STATE, int(life.state)
+                return Status.WRONG_STATE, int(states.state)
             case Command.SET:
                 answer = parameters.set(request.parameter, request.item, request.value)
                 self._speak()
@@ -146,13 +141,13 @@ class Device:
                 return self._start(now_s)
             case Command.STOP:
                 self._reset_s = math.inf
-                return life.stop(now_s)
+                return states.stop(now_s)
             case Command.ARM:
-                return life.arm(request.value, now_s)
+                return states.arm(request.value, now_s)
             case Command.DISARM:
-                return life.disarm(now_s)
+                return states.disarm(now_s)
             case Command.CLEAR:
-                return life.clear(now_s)
+                return states.clear(now_s)
         return Status.UNKNOWN, 0
 
     def _speak(self) -> None:
@@ -173,7 +168,7 @@ class Device:
             self._reset_s = now_s + faults.reset_after_s if faults.reset_after_s is not None else math.inf
             self._deaf_s = now_s + faults.deaf_after_s if faults.deaf_after_s is not None else math.inf
             self._sender.start(now_s)
-        return self._life.start(now_s)
+        return self._states.start(now_s)
 
     def press_emergency_stop(self) -> None:
         """Press the device's own emergency stop, also from a signal handler; it acts at the next `advance`."""
@@ -182,22 +177,22 @@ class Device:
     def set_emergency_stop(self, pressed: bool, now_s: float) -> None:
         """Press or release an emergency stop that stays as it is."""
         self._catch_up(now_s)
-        self._life.is_pressed = pressed
+        self._states.is_pressed = pressed
         self._mind_the_switch(now_s)
 
     def _mind_the_switch(self, now_s: float) -> None:
-        life = self._life
-        if self._pressed or (life.is_pressed and not life.latch & DeviceFlag.EMERGENCY_STOP):
+        states = self._states
+        if self._pressed or (states.is_pressed and not states.latch & DeviceFlag.EMERGENCY_STOP):
             self._pressed = False
-            life.emergency_stop(now_s)
+            states.emergency_stop(now_s)
 
     def switch_off(self, now_s: float) -> None:
         """Switch off: output to 0 V."""
-        self._life.stop(now_s)
+        self._states.stop(now_s)
 
     def reset(self, now_s: float) -> None:
         """Restart the device, as after a loss of supply."""
-        self._life.begin_anew()
+        self._states.begin_anew()
         self._parameters.begin_anew()
         self.words[Parameter.BOOT, 0] = (self.words[Parameter.BOOT, 0] + 1) & 0xFFFFFFFF
         self._speak()
@@ -219,22 +214,17 @@ class Device:
 
     def _catch_up(self, now_s: float) -> None:
         """Measure the blocks that were complete before a time, and before the watchdog bit; check the watchdog."""
-        self._mind_a_stall(now_s)
-        while self._sampling.due_s < min(now_s, self._life.bites_s):
-            self._measure(now_s)
-        self._life.watch(now_s)
-
-    def _mind_a_stall(self, now_s: float) -> None:
-        if now_s <= self._sampling.due_s:
-            return
-        late_s = self._sampling.stand_still(now_s)
+        late_s = self._sampling.stand_still(now_s) if now_s > self._sampling.due_s else 0.0
         if late_s:
-            self._life.stand_still(late_s)
+            self._states.stand_still(late_s)
             self.counts["stalls"] += 1
             self.counts["stalled_us"] += round(1e6 * late_s)
+        while self._sampling.due_s < min(now_s, self._states.bites_s):
+            self._measure(now_s)
+        self._states.watch(now_s)
 
     def _measure(self, now_s: float) -> None:
-        latch = self._life.latch
+        latch = self._states.latch
         first, readings, flags, put_out = self._sampling.measure()
         for flag, name in COUNTED.items():
             if flags & flag:
@@ -253,4 +243,4 @@ class Device:
         self._beat_s = now_s
         boot = self._parameters.value(Parameter.BOOT) & 0xFF
         measured, dropped = self.measured & 0xFFFFFFFF, self._sender.dropped_samples
-        self._sender.send(Heartbeat(int(self.state), self._life.latch, boot, measured, dropped), now_s)
+        self._sender.send(Heartbeat(int(self.state), self._states.latch, boot, measured, dropped), now_s)

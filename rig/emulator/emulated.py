@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Self, TypedDict
+from typing import Self
 
 from rig import errors
 from rig.bench import Bench, DriverChoice
@@ -28,21 +28,6 @@ def driver_options(options: Table, *, lockstep: bool, as_hardware: bool = False)
     watchdog_s = HARDWARE_S if as_hardware else LOCKSTEP_S
     patience = {"watchdog_s": watchdog_s, "timeout_s": LOCKSTEP_S} if lockstep else {}
     return {**patience, **options}
-
-
-class Reached(TypedDict):
-    """Facts on an emulator that can be reached, of `rig.emulator.process.Ready`."""
-
-    options: Table
-
-
-class Said(TypedDict, total=False):
-    """A line of the emulator's process."""
-
-    ready: Reached
-    error: str
-    message: str
-    counted: dict[str, int]
 
 
 class Emulator:
@@ -70,29 +55,24 @@ class Emulator:
             start_new_session=True,  # Ctrl-C at the terminal reaches the host only
         )
         assert self.process.stdin is not None
+        assert self.process.stdout is not None
         self.process.stdin.write(self._settings.model_dump_json() + "\n")
         self.process.stdin.flush()
-        ready = self._heard()["ready"]
-        lockstep, as_hardware = self._settings.lockstep, self._settings.as_hardware
-        options = {**ready["options"], **self._options}
-        options = driver_options(options, lockstep=lockstep, as_hardware=as_hardware)
-        driver = DriverChoice(name=self._settings.wire, options=options)
-        self.bench = self._settings.bench.model_copy(update={"driver": driver})
-        return self
-
-    def _heard(self) -> Said:
-        assert self.process is not None
-        assert self.process.stdout is not None
         line = self.process.stdout.readline()
         if not line:
             self.stop()
             raise errors.DaqRefused("the emulator ended before it could be reached")
-        said: Said = json.loads(line)
-        if "error" in said:
+        message = json.loads(line)  # of `rig.emulator.__main__`
+        if "error" in message:
             self.process.wait(ENDING_S)
             self.stop()
-            raise getattr(errors, said["error"], errors.DaqError)(said["message"])
-        return said
+            raise getattr(errors, message["error"], errors.DaqError)(message["message"])
+        lockstep, as_hardware = self._settings.lockstep, self._settings.as_hardware
+        options = {**message["ready"]["options"], **self._options}
+        options = driver_options(options, lockstep=lockstep, as_hardware=as_hardware)
+        driver = DriverChoice(name=self._settings.wire, options=options)
+        self.bench = self._settings.bench.model_copy(update={"driver": driver})
+        return self
 
     def press_emergency_stop(self) -> None:
         """Press the device's own emergency stop. `DaqRefused` on a system without SIGUSR1 (Windows)."""

@@ -17,7 +17,7 @@ from typing import IO
 import numpy as np
 
 from rig.emulator.parameters import LARGEST_BLOCK, LONGEST_WATCHDOG_US, SHORTEST_WATCHDOG_US
-from rig.emulator.plant import LoggedPlant, Plant
+from rig.emulator.plant import OutputLog, VirtualPlant
 from rig.emulator.programs import Running, running
 from rig.emulator.settings import EmulatorSettings
 from rig.errors import ConfigurationError, DaqDisconnected, DaqProtocol
@@ -36,7 +36,7 @@ HEADER = struct.Struct("<I")
 class Firmware:
     """A program that runs, as the structure behind it sees it."""
 
-    def __init__(self, program: Running, plant: Plant) -> None:
+    def __init__(self, program: Running, plant: VirtualPlant) -> None:
         self.child, self.port = program.child, program.port
         self._has_stop = not program.in_qemu
         self._requests, self._answers, self._plant = program.requests, program.answers, plant
@@ -67,7 +67,6 @@ class Firmware:
         return bool(select.select((self._requests,), (), (), POLL_S)[0])
 
     def _answer(self) -> bool:
-        """Answer a request; False at the end of the program."""
         head = self._read(HEADER.size)
         n = HEADER.unpack(head)[0] if head else 0
         if n > LARGEST_BLOCK:
@@ -103,11 +102,7 @@ class Firmware:
 
     def failure(self) -> ConfigurationError | DaqDisconnected:
         """The error for a program that has ended by itself, with what it said."""
-        try:
-            self.child.wait(ENDING_S)
-        except subprocess.TimeoutExpired:
-            self.child.kill()
-            self.child.wait()
+        self._wait(ENDING_S)
         said = _text(self.child.stderr) or "it said nothing"
         if self.child.returncode == BAD_DESCRIPTION:
             return ConfigurationError(f"refuses to be this device: {said}", field="firmware")
@@ -118,64 +113,59 @@ class Firmware:
         self.child.terminate()
         until_s = time.monotonic() + ENDING_S
         self.serve(lambda: time.monotonic() > until_s)  # for it may wait for an answer
+        self._wait(POLL_S)
+        words = _text(self.child.stdout).split()
+        counts = zip(words[::2], words[1::2], strict=False)
+        return {name: int(count) for name, count in counts if count.isdigit() and int(count)}
+
+    def _wait(self, longest_s: float) -> None:
         try:
-            self.child.wait(POLL_S)
+            self.child.wait(longest_s)
         except subprocess.TimeoutExpired:
             self.child.kill()
             self.child.wait()
-        return _counters(_text(self.child.stdout))
 
 
 def _text(pipe: IO[bytes] | None) -> str:
     return " ".join(pipe.read().decode("utf-8", "replace").split()) if pipe is not None else ""
 
 
-def _counters(text: str) -> dict[str, int]:
-    words = text.split()
-    counts = zip(words[::2], words[1::2], strict=False)
-    return {name: int(count) for name, count in counts if count.isdigit() and int(count)}
-
-
 @contextmanager
-def started(settings: EmulatorSettings, plant: Plant) -> Iterator[Firmware]:
+def started(settings: EmulatorSettings, plant: VirtualPlant) -> Iterator[Firmware]:
     """The firmware of the settings, reachable. Raises `ConfigurationError`, `rig.errors.DaqError`."""
     with running(settings) as program:
         if settings.log_output is not None and program.in_qemu:
-            plant = LoggedPlant(plant, settings.log_output)
+            plant.log = OutputLog(settings.log_output)
         firmware = Firmware(program, plant)
         firmware.begin(description(settings, plant))
         yield firmware
 
 
-def description(settings: EmulatorSettings, plant: Plant) -> str:
+def description(settings: EmulatorSettings, plant: VirtualPlant) -> str:
     """The lines by which a program learns what device it is."""
     lines = {
         "model": "vibrolock firmware",
         "firmware": "1.0",
         "serial_number": _printable(settings.serial_number),
         "boot": time.time_ns() >> 20 & 0xFFFFFFFF,  # milliseconds or so: another number at every start
-        "simulated": 0 if settings.as_hardware else 2 if settings.lockstep else 1,
+        "simulated": settings.simulated,
         "bits": plant.bits,
         "rate_mhz": round(1e3 * plant.rate_hz),
         "shortest_watchdog_us": SHORTEST_WATCHDOG_US,
         "longest_watchdog_us": LONGEST_WATCHDOG_US,
         "filter_delay_ns": round(1e9 * plant.filter_delay_s),
-        "filter_delay_s": _hexadecimal(plant.filter_delay_s),
-        "output": f"{_hexadecimal(plant.output_range_v)} {_hexadecimal(plant.output_v_per_count)}",
+        "filter_delay_s": float(plant.filter_delay_s).hex(),
+        "output": f"{float(plant.output_range_v).hex()} {float(plant.output_v_per_count).hex()}",
         "wire": "serial" if settings.wire == "serial" else "can-fd" if settings.fd else "can",
         "node": settings.node,
         "lockstep": int(settings.lockstep),
     }
     channels = zip(plant.names, plant.range_v, plant.v_per_count, plant.skew_s, strict=True)
     rows = [
-        f"channel {_printable(name)} {_hexadecimal(range_v)} {_hexadecimal(step_v)} {round(1e9 * float(skew_s))}"
+        f"channel {_printable(name)} {float(range_v).hex()} {float(step_v).hex()} {round(1e9 * float(skew_s))}"
         for name, range_v, step_v, skew_s in channels
     ]
     return "\n".join([*(f"{name} {value}" for name, value in lines.items()), *rows, "end\n"])
-
-
-def _hexadecimal(value: float) -> str:
-    return float(value).hex()
 
 
 def _printable(text: str) -> str:

@@ -47,7 +47,10 @@ class Converter:
     def put_out(self, first: int, volts: np.ndarray, there: np.ndarray) -> np.ndarray:
         """Put out samples from ``first`` on: outputs [n] where ``there`` [n] says so, V; returns the voltages [n]."""
         if self.is_open:
-            volts = volts if there.all() else self._filled(volts, there)
+            if not there.all():
+                came = np.where(there, np.arange(volts.size), -1)
+                last = np.maximum.accumulate(came)  # the last output that has come up to each sample; -1: none
+                volts = np.where(last >= 0, volts[last], self.held_v)
         elif self.is_closing(first):
             beyond = np.arange(first, first + volts.size) - self._closes
             volts = self._from_v * np.clip(1.0 - beyond / self._ramp_samples, 0.0, 1.0)
@@ -55,13 +58,6 @@ class Converter:
             volts = np.zeros(volts.size)
         self.held_v = min(max(float(volts[-1]), -self._range_v), self._range_v)
         return volts
-
-    def _filled(self, volts: np.ndarray, there: np.ndarray) -> np.ndarray:
-        """The outputs, with the last voltage where there is none."""
-        out, last = volts.copy(), self.held_v
-        for index in range(volts.size):
-            last = out[index] = volts[index] if there[index] else last
-        return out
 
 
 class Due(NamedTuple):

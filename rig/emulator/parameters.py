@@ -1,7 +1,7 @@
 """A device's parameters: the values that it reports, and the settings that are allowed."""
 
 from rig.emulator.faults import Faults
-from rig.emulator.plant import Plant
+from rig.emulator.plant import VirtualPlant
 from rig.wire.link import Link
 from rig.wire.messages import LOWEST_VERSION, VERSION, Parameter, Status
 from rig.wire.parameter_words import NAME_WORDS, double_words, float_word, text_words
@@ -27,7 +27,7 @@ SETTINGS = {
 
 
 def described(
-    plant: Plant,
+    plant: VirtualPlant,
     *,
     model: str = "vibrolock emulator",
     firmware: str = "1.0",
@@ -37,51 +37,56 @@ def described(
     boot: int = 1,
 ) -> Words:
     """Return the words of a device in front of a plant."""
-    words: Words = {}
-
-    def put(parameter: Parameter, word: int, item: int = 0) -> None:
-        words[int(parameter), item] = word
-
-    def put_text(parameter: Parameter, text: str, channel: int = 0) -> None:
-        for number, word in enumerate(text_words(text)):
-            put(parameter, word, NAME_WORDS * channel + number)
-
-    for parameter in (Parameter.LOWEST_VERSION, Parameter.VERSION):
-        put(parameter, LOWEST_VERSION)
-    put(Parameter.HIGHEST_VERSION, VERSION)
-    put(Parameter.LONGEST_PERIOD, LONGEST_PERIOD)
-    put_text(Parameter.MODEL, model)
-    put_text(Parameter.FIRMWARE, firmware)
-    put_text(Parameter.SERIAL_NUMBER, serial_number)
-    put(Parameter.SIMULATED, simulated)
-    put(Parameter.N_CHANNELS, len(plant.names))
+    rate_mhz = round(1e3 * plant.rate_hz)
+    numbers = {
+        Parameter.LOWEST_VERSION: LOWEST_VERSION,
+        Parameter.HIGHEST_VERSION: VERSION,
+        Parameter.VERSION: LOWEST_VERSION,
+        Parameter.BOOT: boot,
+        Parameter.SIMULATED: simulated,
+        Parameter.N_CHANNELS: len(plant.names),
+        Parameter.OUTPUT_RANGE_V: float_word(plant.output_range_v),
+        Parameter.OUTPUT_V_PER_COUNT: float_word(plant.output_v_per_count),
+        Parameter.BITS: plant.bits,
+        Parameter.LOWEST_RATE_MHZ: rate_mhz,
+        Parameter.HIGHEST_RATE_MHZ: rate_mhz,
+        Parameter.LARGEST_BLOCK: LARGEST_BLOCK,
+        Parameter.LARGEST_QUEUE: LARGEST_QUEUE,
+        Parameter.SHORTEST_WATCHDOG_US: SHORTEST_WATCHDOG_US,
+        Parameter.LONGEST_WATCHDOG_US: LONGEST_WATCHDOG_US,
+        Parameter.FILTER_DELAY_NS: round(1e9 * plant.filter_delay_s),
+        Parameter.LONGEST_PERIOD: LONGEST_PERIOD,
+        Parameter.RATE_MHZ: rate_mhz,
+        Parameter.BLOCK: 1,
+        Parameter.QUEUE: 1,
+        Parameter.WATCHDOG_US: 100_000,
+        Parameter.RAMP_US: 50_000,
+        Parameter.LAYOUT_CRC: layout_crc,
+    }
+    words: Words = {(int(parameter), 0): word for parameter, word in numbers.items()}
+    words |= {
+        (int(Parameter.FILTER_DELAY_S), item): word for item, word in enumerate(double_words(plant.filter_delay_s))
+    }
+    texts = [
+        (Parameter.MODEL, 0, model),
+        (Parameter.FIRMWARE, 0, firmware),
+        (Parameter.SERIAL_NUMBER, 0, serial_number),
+    ]
     for channel, name in enumerate(plant.names):
-        put_text(Parameter.CHANNEL_NAME, name, channel)
-        put_text(Parameter.CHANNEL_UNIT, "V", channel)
-        put(Parameter.CHANNEL_RANGE_V, float_word(float(plant.range_v[channel])), channel)
-        put(Parameter.CHANNEL_V_PER_COUNT, float_word(float(plant.v_per_count[channel])), channel)
-        put(Parameter.SKEW_NS, round(1e9 * float(plant.skew_s[channel])), channel)
-    put(Parameter.OUTPUT_RANGE_V, float_word(plant.output_range_v))
-    put(Parameter.OUTPUT_V_PER_COUNT, float_word(plant.output_v_per_count))
-    put(Parameter.BITS, plant.bits)
-    for parameter in (Parameter.LOWEST_RATE_MHZ, Parameter.HIGHEST_RATE_MHZ, Parameter.RATE_MHZ):
-        put(parameter, round(1e3 * plant.rate_hz))
-    put(Parameter.LARGEST_BLOCK, LARGEST_BLOCK)
-    put(Parameter.LARGEST_QUEUE, LARGEST_QUEUE)
-    put(Parameter.SHORTEST_WATCHDOG_US, SHORTEST_WATCHDOG_US)
-    put(Parameter.LONGEST_WATCHDOG_US, LONGEST_WATCHDOG_US)
-    put(Parameter.FILTER_DELAY_NS, round(1e9 * plant.filter_delay_s))
-    for item, word in enumerate(double_words(plant.filter_delay_s)):
-        put(Parameter.FILTER_DELAY_S, word, item)
-    for parameter, word in {Parameter.BLOCK: 1, Parameter.QUEUE: 1, Parameter.WATCHDOG_US: 100_000}.items():
-        put(parameter, word)
-    put(Parameter.RAMP_US, 50_000)
-    put(Parameter.LAYOUT_CRC, layout_crc)
-    put(Parameter.BOOT, boot)
+        texts += [(Parameter.CHANNEL_NAME, channel, name), (Parameter.CHANNEL_UNIT, channel, "V")]
+        words[Parameter.CHANNEL_RANGE_V, channel] = float_word(float(plant.range_v[channel]))
+        words[Parameter.CHANNEL_V_PER_COUNT, channel] = float_word(float(plant.v_per_count[channel]))
+        words[Parameter.SKEW_NS, channel] = round(1e9 * float(plant.skew_s[channel]))
+    for parameter, channel, text in texts:
+        _put_text(words, parameter, channel, text)
     return words
 
 
-def carried(words: Words, plant: Plant, link: Link) -> Words:
+def _put_text(words: Words, parameter: Parameter, channel: int, text: str) -> None:
+    words.update({(int(parameter), NAME_WORDS * channel + k): word for k, word in enumerate(text_words(text))})
+
+
+def carried(words: Words, plant: VirtualPlant, link: Link) -> Words:
     """The words of a device whose blocks and versions are no larger than its wire carries."""
     carried_block = link.largest_block_of(len(plant.names), plant.bits)
     most = {Parameter.LARGEST_BLOCK: carried_block, Parameter.HIGHEST_VERSION: link.highest_version}
@@ -99,8 +104,7 @@ class Parameters:
             if faults.version == LOWEST_VERSION:
                 del self.words[Parameter.LONGEST_PERIOD, 0]
         for channel, name in enumerate(faults.channel_names or ()):
-            for number, word in enumerate(text_words(name)):
-                self.words[Parameter.CHANNEL_NAME, NAME_WORDS * channel + number] = word
+            _put_text(self.words, Parameter.CHANNEL_NAME, channel, name)
         self._settings = {(int(one), 0): self.words[one, 0] for one in SETTINGS}
 
     def begin_anew(self) -> None:

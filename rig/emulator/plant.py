@@ -5,7 +5,6 @@ import re
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -20,35 +19,6 @@ from simulators.kernels import Flag
 
 WHOLE_RANGE = 2.0**31
 """Counts of full scale where the virtual converter has no steps: 32 bits, signed."""
-
-
-class Plant(Protocol):
-    """What stands behind a device's converters."""
-
-    names: tuple[str, ...]
-    """Of the channels."""
-    range_v: np.ndarray
-    """Largest reading [n_channels], V."""
-    v_per_count: np.ndarray
-    """Volts of one count [n_channels]."""
-    skew_s: np.ndarray
-    """Delay behind the first channel [n_channels], s."""
-    output_range_v: float
-    """Largest output, V."""
-    output_v_per_count: float
-    """Volts of one count of the output."""
-    bits: int
-    """16 or 32: size of the counts."""
-    rate_hz: float
-    """Sample rate, Hz: the only one it has."""
-    filter_delay_s: float
-    """Mean delay of the converters' filters at low frequency, s."""
-
-    def reset(self) -> None:
-        """Back to rest, at sample 0."""
-
-    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
-        """Hold one voltage a sample [n], V; returns the counts (int16 or int32 [n, n_channels]) and `DeviceFlag` bits."""
 
 
 class Wiring:
@@ -89,6 +59,8 @@ class Wiring:
 class VirtualPlant:
     """The virtual rig of a bench, read in counts of its converters: counts times volts per count are the rig's readings.
 
+    ``range_v``, ``v_per_count`` and ``skew_s`` (delay behind the first channel) are by channel [n_channels]; counts have
+    ``bits``, 16 or 32. It samples at ``rate_hz`` alone; ``filter_delay_s`` is the mean delay of its filters at low frequency.
     A rig that has diverged reads full scale, with the overload flag.
     """
 
@@ -125,6 +97,8 @@ class VirtualPlant:
             int(Flag.AMPLIFIER_CLIPPED): int(DeviceFlag.OUTPUT_CLIPPED),
             OUTPUT_HELD: int(DeviceFlag.OUTPUT_HELD),
         }
+        self.log: OutputLog | None = None
+        """Where a line is written for every block, and one of 0 V when the device is stopped."""
         self.reset()
 
     def reset(self) -> None:
@@ -136,6 +110,8 @@ class VirtualPlant:
         self._converters = self._daq.converters(counts, loopback)
         self._first = 0
         self._buffers_for(0)
+        if self.log is not None:
+            self.log.write(0, 0.0)
 
     def _buffers_for(self, n: int) -> None:
         """Allocate the kernel's output arrays for blocks of ``n``: the kernel does not check their size."""
@@ -147,6 +123,8 @@ class VirtualPlant:
     def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
         """Advance the virtual rig by one sample a voltage [n], V; returns counts [n, n_channels] and `DeviceFlag` bits."""
         n = voltages.size
+        if self.log is not None:
+            self.log.write(self._first, float(np.abs(voltages).max()))
         if self._raised.size != n:
             self._buffers_for(n)
         for arrays, part in self._realised.pieces(self._arrays, self._first, n):
@@ -199,17 +177,14 @@ def check_log(path: Path) -> None:
         )
 
 
-class LoggedPlant:
-    """A plant that writes one line a block: time of ``time.monotonic`` in s, first sample, largest absolute output in V.
-
-    A further line with 0 V marks that the device was stopped.
+class OutputLog:
+    """A log of the output: a line has the time of ``time.monotonic`` in s, a sample, and the largest absolute output in V.
 
     A file that cannot be made, or that exists and is no such log, is a `ConfigurationError`; a disk that is full later ends
     the writing and nothing else.
     """
 
-    def __init__(self, plant: Plant, path: Path) -> None:
-        self._plant = plant
+    def __init__(self, path: Path) -> None:
         try:
             check_log(path)
             # open as long as the device lives
@@ -219,38 +194,12 @@ class LoggedPlant:
                 f"cannot be written: {error.strerror}", field="log_output", value=str(path)
             ) from error
         self._is_full = False
-        self._first = 0
 
-    names: tuple[str, ...]
-    range_v: np.ndarray
-    v_per_count: np.ndarray
-    skew_s: np.ndarray
-    output_range_v: float
-    output_v_per_count: float
-    bits: int
-    rate_hz: float
-    filter_delay_s: float
-
-    def __getattr__(self, name: str) -> object:
-        """Everything else is the plant's."""
-        return getattr(self._plant, name)
-
-    def reset(self) -> None:
-        """Sample 0, and 0 V on the converter."""
-        self._plant.reset()
-        self._first = 0
-        self._write(0.0)
-
-    def step(self, voltages: np.ndarray) -> tuple[np.ndarray, int]:
-        """Log the output, then measure."""
-        self._write(float(np.abs(voltages).max()))
-        self._first += voltages.size
-        return self._plant.step(voltages)
-
-    def _write(self, largest_v: float) -> None:
+    def write(self, first: int, largest_v: float) -> None:
+        """Write the line of a block from sample ``first`` on."""
         if self._is_full:
             return
         try:
-            os.write(self._descriptor, f"{time.monotonic():.6f} {self._first} {largest_v:.6g}\n".encode("ascii"))
+            os.write(self._descriptor, f"{time.monotonic():.6f} {first} {largest_v:.6g}\n".encode("ascii"))
         except OSError:
             self._is_full = True

@@ -23,12 +23,24 @@ def device_end(settings: EmulatorSettings) -> Iterator[tuple[Link, Table]]:
     Raises `ConfigurationError`, `rig.errors.DaqError`.
     """
     with ExitStack() as stack:
+        link: Link
         if settings.wire == "can" and settings.interface not in (None, "slcan"):
-            link, options = _can_interface(settings)
+            from rig.wire.can.bus import PythonCanBus
+
+            assert settings.interface is not None
+            assert settings.channel is not None
+            bus = PythonCanBus(settings.interface, settings.channel, settings.timing, settings.node)
+            link = _can_link(settings, bus)
+            options = {"interface": settings.interface, "channel": settings.channel, **_can_options(settings)}
         else:
             descriptor, path = stack.enter_context(pseudo_terminal(settings.link))
-            link = _slcan(settings, descriptor) if settings.wire == "can" else SerialLink.on(descriptor, path)
             options = driver_options_of(settings, path)
+            if settings.wire == "serial":
+                link = SerialLink.on(descriptor, path)
+            else:  # the device on a bus behind an adapter
+                from rig.wire.can.slcan import SlcanBus
+
+                link = _can_link(settings, SlcanBus(descriptor, settings.timing, adapter=True))
         link.open()
         stack.callback(link.close)
         yield link, options
@@ -48,23 +60,6 @@ def largest_block(settings: EmulatorSettings) -> int | None:
     from rig.wire.can.protocol import protocol
 
     return protocol(len(settings.bench.channels), settings.fd, settings.node).shape.largest_block
-
-
-def _slcan(settings: EmulatorSettings, descriptor: int) -> Link:
-    """An adapter on a pseudo-terminal, and the device on the bus behind it."""
-    from rig.wire.can.slcan import SlcanBus
-
-    return _can_link(settings, SlcanBus(descriptor, settings.timing, adapter=True))
-
-
-def _can_interface(settings: EmulatorSettings) -> tuple[Link, Table]:
-    from rig.wire.can.bus import PythonCanBus
-
-    assert settings.interface is not None
-    assert settings.channel is not None
-    bus = PythonCanBus(settings.interface, settings.channel, settings.timing, settings.node)
-    options = {"interface": settings.interface, "channel": settings.channel, **_can_options(settings)}
-    return _can_link(settings, bus), options
 
 
 def _can_link(settings: EmulatorSettings, bus: "FrameBus") -> Link:

@@ -13,11 +13,10 @@ from rig.emulator.device import Device
 from rig.emulator.faults import Faults
 from rig.emulator.firmware import started
 from rig.emulator.parameters import LARGEST_BLOCK, described
-from rig.emulator.plant import LoggedPlant, Plant, VirtualPlant, Wiring
+from rig.emulator.plant import OutputLog, VirtualPlant, Wiring
 from rig.emulator.ports import device_end, driver_options_of, largest_block
 from rig.emulator.settings import EmulatorSettings
 from rig.system.privileges import prepare
-from rig.wire.link import Link
 
 PRIORITY = 60
 """Of SCHED_FIFO: below the wall-clock loop's, above the kernel's interrupt threads."""
@@ -50,12 +49,6 @@ def keep_serving(device: Device, should_end: Callable[[], bool], clock: Callable
     device.switch_off(clock())
 
 
-def ask_for_priority() -> str:
-    """Request real-time scheduling and locked memory, and turn off garbage collection; return the scheduling granted."""
-    scheduling = prepare(priority=PRIORITY)["scheduling"]
-    return scheduling if scheduling.startswith("SCHED") else "ordinary scheduling"
-
-
 @dataclass
 class Ready:
     """Facts on an emulator that can now be reached."""
@@ -70,21 +63,13 @@ class Ready:
     process: int = field(default_factory=os.getpid)
 
 
-class _End:
-    """Whether to end: after SIGTERM, SIGINT or SIGHUP, or when the parent process is gone."""
-
-    def __init__(self, parent: int | None) -> None:
-        self._parent = parent
-        self._told = False
-        for name in ("SIGTERM", "SIGINT", "SIGHUP"):
-            if hasattr(signal, name):  # SIGHUP does not exist on every system
-                signal.signal(getattr(signal, name), self._tell)
-
-    def _tell(self, _number: int, _frame: object) -> None:
-        self._told = True
-
-    def __call__(self) -> bool:
-        return self._told or (self._parent is not None and os.getppid() != self._parent)
+def _ending(parent: int | None) -> Callable[[], bool]:
+    """What tells whether to end: after SIGTERM, SIGINT or SIGHUP, or when the parent process is gone."""
+    told: list[int] = []
+    for name in ("SIGTERM", "SIGINT", "SIGHUP"):
+        if hasattr(signal, name):  # SIGHUP does not exist on every system
+            signal.signal(getattr(signal, name), lambda number, _: told.append(number))
+    return lambda: bool(told) or (parent is not None and os.getppid() != parent)
 
 
 def run_emulator(
@@ -95,18 +80,25 @@ def run_emulator(
     ``when_ready`` is called once it can be reached. With ``parent`` it ends as soon as that process is no longer its
     parent. SIGUSR1 presses the emergency stop. Raises `ConfigurationError`, `rig.errors.DaqError`.
     """
-    should_end = _End(parent)
+    should_end = _ending(parent)
+    names = tuple(channel.name for channel in settings.bench.channels)
+    wiring = Wiring(names, settings.flip, settings.dead, settings.swap)
+    plant = VirtualPlant(settings.bench, settings.seed, wiring)
+    plant.step(np.zeros(settings.bench.block))  # compiles the kernels before a host waits for samples
+    plant.reset()
     run = _run_device if settings.firmware is None else _run_firmware
-    return run(settings, _warm(_plant(settings), settings.bench.block), when_ready, should_end)
+    return run(settings, plant, when_ready, should_end)
 
 
 def _run_device(
-    settings: EmulatorSettings, plant: Plant, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
+    settings: EmulatorSettings, plant: VirtualPlant, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
 ) -> dict[str, int]:
     if settings.log_output is not None:
-        plant = LoggedPlant(plant, settings.log_output)
+        plant.log = OutputLog(settings.log_output)
     with device_end(settings) as (link, options):
-        device = _device(settings, plant, link)
+        number, crc = settings.serial_number, link.layout_crc
+        words = described(plant, simulated=settings.simulated, serial_number=number, layout_crc=crc, boot=os.getpid())
+        device = Device(plant, words, link, lockstep=settings.lockstep, faults=Faults(**settings.faults))
         _when_pressed(device.press_emergency_stop)
         when_ready(Ready(settings.wire, options, settings.lockstep, _scheduling(settings), link.largest_block))
         keep_serving(device, should_end)
@@ -114,7 +106,7 @@ def _run_device(
 
 
 def _run_firmware(
-    settings: EmulatorSettings, plant: Plant, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
+    settings: EmulatorSettings, plant: VirtualPlant, when_ready: Callable[[Ready], None], should_end: Callable[[], bool]
 ) -> dict[str, int]:
     scheduling = _scheduling(settings)  # before it starts, for a child inherits it
     with started(settings, plant) as firmware:
@@ -127,32 +119,13 @@ def _run_firmware(
 
 
 def _scheduling(settings: EmulatorSettings) -> str:
-    return "ordinary scheduling" if settings.lockstep else ask_for_priority()
+    """Request real-time scheduling and locked memory for a device with a clock; return the scheduling granted."""
+    if settings.lockstep:
+        return "ordinary scheduling"
+    granted = prepare(priority=PRIORITY)["scheduling"]
+    return granted if granted.startswith("SCHED") else "ordinary scheduling"
 
 
 def _when_pressed(press: Callable[[], None]) -> None:
     if hasattr(signal, "SIGUSR1"):
         signal.signal(signal.SIGUSR1, lambda *_: press())
-
-
-def _plant(settings: EmulatorSettings) -> Plant:
-    names = tuple(channel.name for channel in settings.bench.channels)
-    wiring = Wiring(names, settings.flip, settings.dead, settings.swap)
-    return VirtualPlant(settings.bench, settings.seed, wiring)
-
-
-def _warm(plant: Plant, block: int) -> Plant:
-    """Compile the kernels before a host waits for samples."""
-    plant.reset()
-    plant.step(np.zeros(block))
-    plant.reset()
-    return plant
-
-
-def _device(settings: EmulatorSettings, plant: Plant, link: Link) -> Device:
-    faults = Faults(**settings.faults)
-    simulated = 0 if settings.as_hardware else 2 if settings.lockstep else 1
-    words = described(
-        plant, simulated=simulated, serial_number=settings.serial_number, layout_crc=link.layout_crc, boot=os.getpid()
-    )
-    return Device(plant, words, link, lockstep=settings.lockstep, faults=faults)

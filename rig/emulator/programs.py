@@ -6,7 +6,7 @@ import select
 import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -111,7 +111,6 @@ def _image(path: Path, settings: EmulatorSettings, held: ExitStack) -> Running:
 
 
 def _qemu(image: Path, from_structure: Path, to_structure: Path) -> list[str]:
-    """The command that runs an image (``firmware/boards/mps2-an386``)."""
     arguments = ",".join(f"arg={one}" for one in ("mps2-an386", from_structure, to_structure))
     semihosting = f"enable=on,target=native,{arguments}"
     machine = [QEMU, "-M", "mps2-an386", "-nographic", "-serial", "pty", "-monitor", "none"]
@@ -121,43 +120,33 @@ def _qemu(image: Path, from_structure: Path, to_structure: Path) -> list[str]:
 def _port_of(child: "subprocess.Popen[bytes]") -> str:
     """The pseudo-terminal that QEMU says it has made."""
     assert child.stdout is not None
-    said = b""
-
-    def has_said() -> bool:
-        nonlocal said
-        if child.stdout is not None and select.select((child.stdout,), (), (), POLL_S)[0]:
+    said, until_s = b"", time.monotonic() + STARTING_S
+    while (found := PORT.search(said)) is None:
+        _require_running(child, until_s, "names its port")
+        if select.select((child.stdout,), (), (), POLL_S)[0]:
             said += os.read(child.stdout.fileno(), 4096)
-        return PORT.search(said) is not None
-
-    _wait(has_said, child, "names its port")
-    found = PORT.search(said)
-    assert found is not None
     return found[1].decode("ascii")
 
 
 def _opened(fifo: Path, child: "subprocess.Popen[bytes]") -> int:
     """A FIFO, open for writing once the image has opened it for reading."""
-    out: list[int] = []
-
-    def is_open() -> bool:
+    until_s = time.monotonic() + STARTING_S
+    while True:
+        _require_running(child, until_s, "opens its structure")
         try:
-            out.append(os.open(fifo, os.O_WRONLY | os.O_NONBLOCK))
+            out = os.open(fifo, os.O_WRONLY | os.O_NONBLOCK)
         except OSError:  # nobody reads yet
             time.sleep(POLL_S)
-        return bool(out)
-
-    _wait(is_open, child, "opens its structure")
-    os.set_blocking(out[0], True)
-    return out[0]
+        else:
+            os.set_blocking(out, True)
+            return out
 
 
-def _wait(is_done: Callable[[], bool], child: "subprocess.Popen[bytes]", what: str) -> None:
-    until_s = time.monotonic() + STARTING_S
-    while not is_done():
-        if child.poll() is not None or time.monotonic() > until_s:
-            child.kill()
-            said = " ".join(child.communicate()[1].decode("utf-8", "replace").split())
-            raise DaqRefused(f"firmware: {QEMU} ended, or was too slow, before it {what}: {said or 'it said nothing'}")
+def _require_running(child: "subprocess.Popen[bytes]", until_s: float, what: str) -> None:
+    if child.poll() is not None or time.monotonic() > until_s:
+        child.kill()
+        said = " ".join(child.communicate()[1].decode("utf-8", "replace").split())
+        raise DaqRefused(f"firmware: {QEMU} ended, or was too slow, before it {what}: {said or 'it said nothing'}")
 
 
 @contextmanager

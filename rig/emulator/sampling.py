@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.emulator.outputs import Converter, OutputQueue
-from rig.emulator.plant import Plant
+from rig.emulator.plant import VirtualPlant
 from rig.wire.messages import DeviceFlag, Output
 
 ROUNDING_SAMPLES = 1e-6  # an instant that falls on a sample is that sample's
@@ -31,7 +31,7 @@ class Sampling:
     once its outputs have come.
     """
 
-    def __init__(self, plant: Plant, *, lockstep: bool) -> None:
+    def __init__(self, plant: VirtualPlant, *, lockstep: bool) -> None:
         self.plant, self.lockstep = plant, lockstep
         self.on = False
         self.measured = 0
@@ -164,12 +164,9 @@ class Sampling:
         self.output_v = volts
         self.measured = first + block
         self.blocks += 1
-        return Measured(first, readings, seen | missing, self._counts_of(self._put_out_in_place_of(volts)))
-
-    def _put_out_in_place_of(self, volts: np.ndarray) -> np.ndarray:
-        """The voltages of a block, or what the plant's own faults have put out instead."""
-        instead = getattr(self.plant, "put_out", None)
-        return volts if instead is None else np.where(np.isfinite(instead), instead, volts)
+        instead = getattr(self.plant, "put_out", None)  # what the plant's own faults have put out instead
+        put_out = volts if instead is None else np.where(np.isfinite(instead), instead, volts)
+        return Measured(first, readings, seen | missing, self._counts_of(put_out))
 
     def _counts_of(self, volts: np.ndarray) -> np.ndarray:
         """What the converter makes of voltages: the nearest counts within its range."""

@@ -60,6 +60,11 @@ class EmulatorSettings(Configured):
         """CAN: frames and bit rates of the bus."""
         return BusTiming(self.fd, self.bitrate, self.data_bitrate)
 
+    @property
+    def simulated(self) -> int:
+        """Value of the device's parameter SIMULATED (`rig.wire.messages.Parameter`)."""
+        return 0 if self.as_hardware else 2 if self.lockstep else 1
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         unknown = sorted(set(self.faults) - set(asdict(Faults())))
@@ -69,12 +74,8 @@ class EmulatorSettings(Configured):
             raise InputError("a serial device has none", field="interface", value=self.interface)
         if self.interface not in (None, "slcan") and self.channel is None:
             raise InputError(f"is missing, interface {self.interface!r} has several", field="channel")
-        if self.firmware is not None:
-            self._allowed_with_a_firmware()
-        return self
-
-    def _allowed_with_a_firmware(self) -> None:
-        if self.faults:
+        if self.firmware is not None and self.faults:
             raise InputError(f"{min(self.faults)!r}: a firmware has none", field="faults", allowed="no fault")
-        if self.interface not in (None, "slcan"):
+        if self.firmware is not None and self.interface not in (None, "slcan"):
             raise InputError("allowed with a firmware is 'slcan'", field="interface", value=self.interface)
+        return self

@@ -9,7 +9,7 @@ from rig.emulator.sampling import Sampling
 from rig.wire.messages import ARM_KEY, DeviceFlag, DeviceState, Parameter, Status
 
 
-class Life:
+class StateMachine:
     """States and the transitions between them.
 
     ``changed`` is called with the time at every change of the state or of what has latched. Commands return the status and

@@ -22,7 +22,7 @@ from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
 from rig.live.place import FRAME_FILE, LINES, STOP, TRACES, new_folder, remove
 from rig.live.stopping import stopping_on_request
 from rig.live.time_left import time_left_s
-from rig.loop.loop import RunningLoop
+from rig.loop.session import RunningLoop
 from rig.recording.jsontext import encode
 from rig.system.closing import Closing
 from rig.tick.layout import recorded_row

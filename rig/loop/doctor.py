@@ -4,6 +4,7 @@ import os
 import platform
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict, cast
 
@@ -78,13 +79,8 @@ def examine_bench(bench: Bench, seed: int = 0, seconds: float = MEASURED_S) -> "
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the device cannot be opened.
     """
     from rig.loop.worker.examination import examine_device
-    from rig.loop.worker.spawn import ask, supported
 
-    return (
-        cast("DeviceReport", ask("examination", bench, seed, seconds))
-        if supported()
-        else examine_device(bench, seed, seconds)
-    )
+    return _measured("examination", examine_device, bench, seed, seconds)
 
 
 def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> "DeviceReport":
@@ -93,13 +89,17 @@ def measure_bench(bench: Bench, seed: int = 0, seconds: float = 2.0) -> "DeviceR
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError` if the device cannot be opened.
     """
     from rig.loop.worker.probe import round_trips
+
+    return _measured("round trips", round_trips, bench, seed, seconds)
+
+
+def _measured(
+    order: str, measure: "Callable[[Bench, int, float], DeviceReport]", bench: Bench, seed: int, seconds: float
+) -> "DeviceReport":
+    """Measure in a process like that of a wall-clock loop, where the system has one; else in this process."""
     from rig.loop.worker.spawn import ask, supported
 
-    return (
-        cast("DeviceReport", ask("round trips", bench, seed, seconds))
-        if supported()
-        else round_trips(bench, seed, seconds)
-    )
+    return cast("DeviceReport", ask(order, bench, seed, seconds)) if supported() else measure(bench, seed, seconds)
 
 
 def _probed(*, privileged: bool) -> "WakeUps":

@@ -9,7 +9,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from rig.daq import DAQ
-from rig.errors import DaqError
 from rig.loop.driven_loop import DrivenLoop
 from rig.text.json_values import JsonObject
 from rig.tick.kernels import tick_block
@@ -54,57 +53,6 @@ class LoopStatistics:
         return {**asdict(self), "periods": periods, **factors}
 
 
-class RunningLoop(Protocol):
-    """Interface of a loop to a campaign; the loop runs in this process or in another."""
-
-    tick: Tick
-    """The tick, with its state at the last row that `run` has yielded."""
-    failure: DaqError | None
-    """Error of the driver that ended the loop, if one did."""
-    cause: str
-    """Why the ramp was requested, or by whom, in one sentence; else empty."""
-    statistics: LoopStatistics
-    """Statistics so far."""
-
-    @property
-    def waits(self) -> bool:
-        """Whether the loop pauses while its rows are not taken."""
-
-    def run(self) -> Iterator[np.ndarray]:
-        """Telemetry in chunks, until the output is off."""
-
-    def request_stop(self, cause: str = "") -> None:
-        """Request the ramp to 0 V, with an optional ``cause`` that is recorded.
-
-        Returns at once; may be called at any time and from a signal handler.
-        """
-
-    def release_start(self) -> None:
-        """Let the start segment of a tick with ``start_judged`` end at its time. Returns at once; any thread may call it."""
-
-    def continue_start(self, judgements: int) -> None:
-        """Let the start segment go on after so many judgements (`Tick.start_judgements`). Returns at once, as above."""
-
-    def bring_down(self) -> None:
-        """Ramp to 0 V if the loop still runs, and wait for its end; for a caller that takes no more rows."""
-
-    @property
-    def lateness_us(self) -> tuple[float, float, float, float]:
-        """Response times of the loop so far, us: p50, p99, p99.9 and the largest; NaN where no clock paces it."""
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """The driver's counters."""
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """The driver's remarks on the bench."""
-
-    @property
-    def report(self) -> JsonObject:
-        """Timing statistics of the loop as plain data, for the recording."""
-
-
 class Loop(DrivenLoop):
     """Runs a tick over a started driver until the guard has brought the output to 0 V.
 
@@ -125,7 +73,7 @@ class Loop(DrivenLoop):
 
     @property
     def waits(self) -> bool:
-        """True unless the loop is paced or its device has a clock."""
+        """Whether the loop pauses while its rows are not taken: unless it is paced or its device has a clock."""
         return not (self.paced or self.daq.wall_clock)
 
     def run(self) -> Iterator[np.ndarray]:
@@ -151,20 +99,26 @@ class Loop(DrivenLoop):
             self.statistics.samples += done
             if self.over:
                 self.stop()  # before its rows are yielded: the caller may take long
-            if self.paced:
-                self._wait_for_the_clock(began)
+            early_s = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()
+            if self.paced and early_s > 0.0:
+                time.sleep(early_s)
+            elif self.paced:
+                self.statistics.overruns += 1
             self.statistics.wall_s = time.perf_counter() - began
             if done:
                 yield self.tick.joined(readings[:done], rows[:done])
         self.statistics.wall_s = time.perf_counter() - began
 
     def request_stop(self, cause: str = "") -> None:
-        """Request the ramp to 0 V; it begins with the next chunk."""
+        """Request the ramp to 0 V, which begins with the next chunk; an optional ``cause`` is recorded.
+
+        Returns at once; may be called at any time and from a signal handler.
+        """
         self.cause = self.cause or cause
         self.tick.request_stop()
 
     def release_start(self) -> None:
-        """Let the start segment end at its time."""
+        """Let the start segment of a tick with ``start_judged`` end at its time. Any thread may call it."""
         self.tick.release_start()
 
     def continue_start(self, judgements: int) -> None:
@@ -172,7 +126,7 @@ class Loop(DrivenLoop):
 
     @property
     def lateness_us(self) -> tuple[float, float, float, float]:
-        """Unknown: this loop counts late chunks alone."""
+        """Response times so far, us: p50, p99, p99.9 and the largest; NaN, for this loop counts late chunks alone."""
         return (math.nan,) * 4
 
     @property
@@ -186,7 +140,6 @@ class Loop(DrivenLoop):
         return {**self.statistics.report(int(self.tick.arrays.loop["cycles"][0])), **self.daq.statistics}
 
     def _load_kernels(self) -> None:
-        """Compile the loop's kernels, or load them from the cache, before the clock runs."""
         readings, rows = self.tick.buffers(0)
         if self._fused is not None:
             self._fused.run_fused(self.tick.arrays, readings, rows)
@@ -229,10 +182,3 @@ class Loop(DrivenLoop):
             if self.over:
                 return first + block
         return int(rows.size)
-
-    def _wait_for_the_clock(self, began: float) -> None:
-        early = began + self.statistics.samples / self.daq.sample_rate_hz - time.perf_counter()
-        if early > 0.0:
-            time.sleep(early)
-        else:
-            self.statistics.overruns += 1

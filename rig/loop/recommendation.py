@@ -144,20 +144,16 @@ def _block(
     """Return the shortest block, that of the bench or longer, which driver and wire can carry, and why."""
     busy = f"the driver computes {milliseconds(timing.busy_s)} a block"
     for size in _sizes(now.block, allowed, largest_block):
-        if timing.busy_s <= BUSY * size / rate_hz and _fits_wire(size, allowed):
+        fits_wire = not allowed or allowed.wire_share.get(size, 0.0) < allowed.largest_wire_share
+        if timing.busy_s <= BUSY * size / rate_hz and fits_wire:
             lasts = f"{busy}, which lasts {milliseconds(size / rate_hz)}"
             return size, lasts if size == now.block else f"{lasts}: at most {BUSY:.0%} are allowed, or the wire is full"
     return now.block, f"{busy}, and no longer block would help"
 
 
 def _sizes(block: int, allowed: Adjustable | None, largest_block: int) -> list[int]:
-    """Return the block sizes that are looked at, that of the bench first."""
     sizes = allowed.wire_share if allowed else [digit * 10**power for power in range(4) for digit in (1, 2, 5)]
     return [block, *(size for size in sorted(sizes) if block < size <= largest_block)]
-
-
-def _fits_wire(block: int, allowed: Adjustable | None) -> bool:
-    return not allowed or allowed.wire_share.get(block, 0.0) < allowed.largest_wire_share
 
 
 def _wire_s(block: int, rate_hz: float, allowed: Adjustable | None) -> float:
@@ -179,7 +175,7 @@ def _watchdog(timing: Timing, now: Settings, allowed: Adjustable | None) -> tupl
     wanted_s = GAPS * timing.gap_s
     if wanted_s <= now.watchdog_s:
         return now.watchdog_s, why
-    chosen_s = min(max(_rounded_up(wanted_s), shortest_s), longest_s)
+    chosen_s = min(max(-_rounded_down(-wanted_s), shortest_s), longest_s)
     return chosen_s, f"{why}; more than {longest_s:g} s are not allowed" if longest_s < wanted_s else why
 
 
@@ -210,17 +206,11 @@ def _rate(
     return (rate_hz if rate_hz <= bound < 1.1 * rate_hz else _rounded_down(bound)), why
 
 
-def _rounded_up(value: float) -> float:
-    """Return a positive value rounded up to two digits."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 1)
-    return float(f"{math.ceil(value / step - 1e-9) * step:.2g}")
-
-
 def _rounded_down(value: float) -> float:
     """Return a value rounded down to two digits; 0 stays."""
-    if value <= 0.0:
+    if value == 0.0:
         return 0.0
-    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
     return float(f"{math.floor(value / step + 1e-9) * step:.2g}")
 
 

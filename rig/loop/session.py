@@ -7,49 +7,32 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, TypeAlias
 
 from rig.bench import Bench
 from rig.bench.cross_checks import refuse
-from rig.daq import DAQ, Capabilities
+from rig.daq import DAQ
 from rig.drivers import make_daq
 from rig.errors import RigError
-from rig.loop.loop import Loop, RunningLoop
+from rig.loop.loop import Loop
 from rig.loop.worker.queue_choice import QueueChoice, settle_queue
 from rig.tick.tick import TickSettings
+
+if TYPE_CHECKING:
+    from rig.loop.worker.session import WorkerLoop, WorkerSession
+
+RunningLoop: TypeAlias = "Loop | WorkerLoop"
+"""A loop as a campaign sees it; it runs in this process or in another."""
 
 NO_PROCESS = "this system has no process for the loop alone: it shares its time with the recorder, nothing is promised"
 
 
-class Session(Protocol):
-    """A bench whose device is open."""
-
-    capabilities: Capabilities
-    """Capabilities of its driver."""
-    identity: dict[str, str]
-    """Identity of the device behind the driver, for the record."""
-    latched: str
-    """What the device had latched when it was opened, in words; empty if nothing."""
-
-    def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
-        """Set the queue of the device for the run, once in a session and before `start`; return the choice.
-
-        With ``queue_blocks = "auto"`` 0 V is exchanged with the device for a second and a half, see
-        `rig.loop.worker.queue_choice.settle_queue`. ``feedback``: whether the plan's outputs answer what is measured;
-        ``delay_s``: the longest delay that its gains bear. None if the driver has no queue to set. Conditions that the device
-        had latched when it was opened are reset, so the caller must be armed if there are any. Raises `rig.errors.DaqError`.
-        """
-
-    def start(self, settings: TickSettings) -> RunningLoop:
-        """Start the device and a loop over it, once in a session; the loop runs when its rows are requested.
-
-        The queue is settled as for feedback unless that was done. Conditions that the device had latched when it was opened
-        are reset, so the caller must be armed.
-        """
-
-
 class LocalSession:
-    """A session in this process."""
+    """A session in this process.
+
+    ``capabilities`` and ``identity`` are those of driver and device, ``latched`` is what the device had latched when it was
+    opened, in words.
+    """
 
     def __init__(self, daq: DAQ, bench: Bench, *, realtime: bool) -> None:
         self._daq, self._bench, self._realtime = daq, bench, realtime
@@ -60,13 +43,23 @@ class LocalSession:
         self.latched = daq.latched
 
     def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
-        """Settle the queue of the device, see `Session.settle_queue`."""
+        """Set the queue of the device for the run, once in a session and before `start`; return the choice.
+
+        With ``queue_blocks = "auto"`` 0 V is exchanged with the device for a second and a half, see
+        `rig.loop.worker.queue_choice.settle_queue`. ``feedback``: whether the plan's outputs answer what is measured;
+        ``delay_s``: the longest delay that its gains bear. None if the driver has no queue to set. Conditions that the device
+        had latched when it was opened are reset, so the caller must be armed if there are any. Raises `rig.errors.DaqError`.
+        """
         self._daq.clear()
         self._settled = True
         return settle_queue(self._daq, self._bench, feedback=feedback, delay_s=delay_s)
 
-    def start(self, settings: TickSettings) -> RunningLoop:
-        """Start the device; the loop runs while its rows are taken."""
+    def start(self, settings: TickSettings) -> Loop:
+        """Start the device and a loop over it, once in a session; the loop runs while its rows are taken.
+
+        The queue is settled as for feedback unless that was done. Conditions that the device had latched when it was opened
+        are reset, so the caller must be armed.
+        """
         if not self._settled:
             self.settle_queue()
         self._daq.start(settings.bench.block)
@@ -80,6 +73,10 @@ class LocalSession:
         """Ramp down a loop that still runs when the session is left early."""
         if self._loop is not None and not self._loop.over:
             self._loop.bring_down()
+
+
+Session: TypeAlias = "LocalSession | WorkerSession"
+"""A bench whose device is open."""
 
 
 @contextmanager
@@ -107,12 +104,7 @@ def open_session(bench: Bench, seed: int = 0, *, realtime: bool = False) -> Iter
         finally:
             local.finish()
     finally:
-        _closed(daq)
-
-
-def _closed(daq: DAQ) -> None:
-    """Close a driver; an error in closing is dropped, so that the recording is not lost."""
-    try:
-        daq.close()
-    except RigError as error:
-        warnings.warn(f"the driver failed when it was closed: {error}", RuntimeWarning, stacklevel=2)
+        try:
+            daq.close()
+        except RigError as error:  # dropped, so that the recording is not lost
+            warnings.warn(f"the driver failed when it was closed: {error}", RuntimeWarning, stacklevel=2)

@@ -11,7 +11,7 @@ from controller import LockState
 from rig.live.facts import ChannelFacts, Line, RunFacts, number_in, text_in
 from rig.live.reader import Frame
 from rig.text.json_values import JsonValue
-from rig.tick.safety.layout import TEXT, EndReason, GuardMode
+from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.sequencer.layout import Drive, SegmentKind
 from vibrolock.arrays import Complex, Float
 
@@ -181,7 +181,7 @@ def cause_of(frame: Frame, facts: RunFacts, lines: Sequence[Line]) -> str:
         if reason in (EndReason.DISPLACEMENT_LIMIT, EndReason.OVERTRAVEL):
             unit = "m"
         where = f" on channel {facts.channels[channel].name}: {float(frame.state['value']):.4g} {unit}"
-    return TEXT[reason] + where
+    return reason.text + where
 
 
 def _end_of(lines: Sequence[Line]) -> Line | None:

@@ -24,11 +24,11 @@ def message_entries() -> Iterator[Entry]:
 
 
 def _end_reasons() -> Iterator[tuple[str, str, str]]:
-    from rig.tick.safety.layout import TEXT, EndReason
+    from rig.tick.safety.layout import EndReason
 
-    for reason, text in TEXT.items():
+    for reason in EndReason:
         if reason not in (EndReason.NONE, EndReason.COMPLETED):
-            yield page_of(reason.name), "end of a run", text
+            yield page_of(reason.name), "end of a run", reason.text
 
 
 def _qualities() -> Iterator[tuple[str, str, str]]:

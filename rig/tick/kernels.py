@@ -31,13 +31,7 @@ from rig.daq import LOST
 from rig.tick.layout import DEVICE_SHIFT, FREQUENCY_CLAMPED, HELD, SATURATED, TickArrays
 from rig.tick.measure import bridge_lost_sample, read_inputs
 from rig.tick.periods import close_period
-from rig.tick.safety.kernels import (
-    permitted_amplitude,
-    permitted_command_phase,
-    release,
-    shut_down,
-    watch_frequency,
-)
+from rig.tick.safety.kernels import permitted_amplitude, permitted_command_phase, release, shut_down, watch_frequency
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.response_plausibility import contradicts_exciter, permitted_level, reset_output, set_reference
 from rig.tick.sequencer.kernels import advance, is_ramp

@@ -83,6 +83,12 @@ class DeviceFlag(IntFlag):
     """An output did not arrive in time: the device went on with the last period (version 2)."""
 
 
+STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
+"""Flags of a device that has brought its output to 0 V by itself."""
+MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
+"""Flags of a block in which an output did not arrive in time."""
+
+
 class Parameter(IntEnum):
     """Four bytes each, little-endian: unsigned, or float32 where ``_V``, or four ASCII bytes of a text, zeros behind."""
 

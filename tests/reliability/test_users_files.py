@@ -8,7 +8,7 @@ import rig
 from rig.bench import load_bench
 from rig.cli.emulate import WRITTEN, _check_bench_file
 from rig.drawing.page import check_replaceable, page_for
-from rig.emulator.plant import LoggedPlant, VirtualPlant
+from rig.emulator.plant import OutputLog, VirtualPlant
 from rig.emulator.ports import named
 from rig.errors import ConfigurationError, RecordingError
 from rig.hil.results import Results
@@ -84,11 +84,13 @@ def test_an_emulator_replaces_its_own_bench_log_and_link_alone(users, tmp_path):
     ours.write_text(f"{WRITTEN}\nblock = 10\n")
     _check_bench_file(ours)
     with pytest.raises(ConfigurationError, match="no log of an emulator"):
-        LoggedPlant(VirtualPlant(bench_with()), users("notes.log"))
+        OutputLog(users("notes.log"))
     log = tmp_path / "log"
     for _ in range(2):
-        LoggedPlant(VirtualPlant(bench_with()), log)
-        assert len(log.read_text().splitlines()) <= 1
+        plant = VirtualPlant(bench_with())
+        plant.log = OutputLog(log)
+        plant.reset()
+        assert len(log.read_text().splitlines()) == 1
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "on a disk that is not mounted")
     with pytest.raises(ConfigurationError, match="leads to"), named("/dev/pts/999", link):

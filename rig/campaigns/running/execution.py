@@ -36,11 +36,12 @@ from rig.campaigns.running.tripped_level import tripped_at
 from rig.daq import flag_names
 from rig.errors import RecordingError
 from rig.live.publisher import Live
-from rig.loop.loop import LoopStatistics, RunningLoop
+from rig.loop.loop import LoopStatistics
+from rig.loop.session import RunningLoop
 from rig.recording.stored import End, Event, Information, LoopTable, TrippedAtTable
 from rig.system.stop_signals import deferred, stopping_on_signals
 from rig.text.disorder import disorder_text
-from rig.tick.safety.layout import TEXT, EndReason, GuardMode
+from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
 from rig.tick.sequencer.layout import Outcome, SegmentKind
 from vibrolock.one_thread import one_thread
@@ -460,7 +461,7 @@ class Execution:
         """Return in one sentence why the output was brought down."""
         reason = EndReason(int(self.tick.guard["reason"][0]))
         if self.loop.failure is not None:
-            down = "" if reason.is_trip else f"{TEXT[reason]}, but the driver failed at the end: "
+            down = "" if reason.is_trip else f"{reason.text}, but the driver failed at the end: "
             return f"{down}{self.loop.failure}"
         if self.failure is not None and not self.loop.cause:
             return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"

@@ -33,8 +33,7 @@ from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.campaigns.running.watched import watched_facts
 from rig.errors import ConfigurationError, RigError
 from rig.live.publisher import Live, published
-from rig.loop.loop import RunningLoop
-from rig.loop.session import Session, open_session
+from rig.loop.session import RunningLoop, Session, open_session
 from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path

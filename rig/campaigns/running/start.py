@@ -8,7 +8,7 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.running.row_buffer import RowBuffer
 from rig.campaigns.running.start_judgement import PERIODS, StartJudgement
-from rig.loop.loop import RunningLoop
+from rig.loop.session import RunningLoop
 from rig.tick.sequencer.layout import SegmentKind
 
 UNDECIDED = (

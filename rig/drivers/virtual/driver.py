@@ -83,7 +83,10 @@ class VirtualDAQ(DAQ):
             raise ConfigurationError(
                 field="driver.options.at_zero_v", value=self._how, allowed="'attached' for a specimen that wears"
             )
-        self._released = self._released_arrays()
+        attached = self.rig.realised(seed)
+        released = attached if self._how == "attached" else attached.released(self._how)
+        self._released = released.build(seed)[0]
+        """Arrays of the rig while the output is 0 V; those of the rig itself if its exciter stays attached."""
         self._exchanged = self._converters(0, loopback_of(self.channels, 0.0), self._faults(bench.block))
         self._first = 0
         self._exchange_bound: Callable[..., None] | None = None
@@ -91,11 +94,6 @@ class VirtualDAQ(DAQ):
     def _faults(self, ahead: int) -> FaultArrays:
         outputs = Outputs(self.block or self._bench_block, ahead, self.continuation)
         return self._queue_options.faults.build(self._seed, self.sample_rate_hz, self._bench_block, outputs)
-
-    def _released_arrays(self) -> RigArrays:
-        """Arrays of the rig while the output is 0 V; those of the rig itself if its exciter stays attached."""
-        rig = self.rig.realised(self._seed)
-        return (rig if self._how == "attached" else rig.released(self._how)).build(self._seed)[0]
 
     def converters(self, counts: np.ndarray, loopback: Loopback) -> Converters:
         """Converters without a queue for a device around the rig that counts and loses samples in a way of its own."""
@@ -281,7 +279,6 @@ class VirtualDAQ(DAQ):
         self._rest()
 
     def _rest(self) -> None:
-        """Set the converter and the queue to 0 V."""
         self._exchanged.queue[:] = 0.0
         self._exchanged.loopback.past[:] = 0.0
         self._exchanged.faults.last_v[:] = 0.0

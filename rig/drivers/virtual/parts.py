@@ -65,7 +65,13 @@ def specimens() -> list[dict[str, str]]:
 
 def parts() -> list[Part]:
     """Every part: its group in the rig's table, its name, its first line, and the choices it offers."""
-    return [Part(group, name, _first_line(schema), _choices(name, schema)) for group, name, schema in _named_parts()]
+    out = []
+    for group, name, schema in _named_parts():
+        words = {key: _words(field) for key, field in schema["properties"].items()}
+        choices = {key: few for key, few in words.items() if 0 < len(few) <= _FEW and name not in few}
+        first_line = _plain(str(schema.get("description", "")).partition("\n\n")[0])
+        out.append(Part(group, name, first_line, choices))
+    return out
 
 
 def part_keys(name: str) -> PartKeys:
@@ -86,7 +92,6 @@ def _schema() -> Schema:
 
 
 def _named_parts() -> Iterator[tuple[str, str, Schema]]:
-    """Group, name and schema of every part, in the order of the rig's table."""
     for group, field in _schema()["properties"].items():
         several = field.get("items", field)
         kinds = several.get("discriminator", {}).get("mapping")
@@ -102,19 +107,8 @@ def _resolved(reference: str) -> Schema:
     return dict(_schema()["$defs"][reference.rpartition("/")[2]])
 
 
-def _first_line(schema: Schema) -> str:
-    """The first paragraph of a model's docstring in one line, without its marks."""
-    return _plain(str(schema.get("description", "")).partition("\n\n")[0])
-
-
 def _plain(text: str) -> str:
     return " ".join(text.replace("``", "").replace("`", "").split())
-
-
-def _choices(name: str, schema: Schema) -> dict[str, list[str]]:
-    """Keys that take one of a few words, other than the one that names the part."""
-    words = {key: _words(field) for key, field in schema["properties"].items()}
-    return {key: few for key, few in words.items() if 0 < len(few) <= _FEW and name not in few}
 
 
 def _words(field: Schema) -> list[str]:
@@ -133,7 +127,6 @@ def _keys(schema: Schema, path: str = "") -> Iterator[Key]:
 
 
 def _type(field: Schema) -> str:
-    """Type and range of a key in words."""
     if words := _words(field):
         return " | ".join(words)
     if "anyOf" in field:

@@ -7,11 +7,21 @@ from collections.abc import Callable
 import numpy as np
 
 from rig.bench import Bench
-from rig.drivers.wire.dialogue import ANSWER_S, STOPPED, Dialogue, latched_text, stopped, why_not
+from rig.drivers.wire.dialogue import ANSWER_S, Dialogue, latched_text, stopped, why_not
 from rig.drivers.wire.facts import DeviceFacts, compare, negotiate, read_facts
 from rig.errors import DaqError, DaqMismatch, DaqProtocol, DaqRefused, DaqTimeout
 from rig.wire.link import Link
-from rig.wire.messages import LOWEST_VERSION, VERSION, Command, DeviceFlag, DeviceState, Parameter, Status, Stream
+from rig.wire.messages import (
+    LOWEST_VERSION,
+    STOPPED,
+    VERSION,
+    Command,
+    DeviceFlag,
+    DeviceState,
+    Parameter,
+    Status,
+    Stream,
+)
 
 KEPT = 4096  # round trips that are kept; chosen: some minutes of pings
 
@@ -90,7 +100,6 @@ class Connection:
         self.latched = self._what_has_latched()
 
     def _agree(self, bench: Bench, latest: int) -> DeviceFacts:
-        """Agree on a version, and see whether this is the device that the bench describes."""
         negotiate(self.dialogue, latest)
         self.facts = facts = read_facts(self.dialogue)
         compare(facts, bench, self.link.name, self.link.layout_crc)

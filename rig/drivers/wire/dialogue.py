@@ -19,8 +19,6 @@ from rig.wire.messages import (
 )
 from rig.wire.parameter_words import NAME_WORDS, as_float, as_text
 
-STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
-
 
 def latched_text(latched: DeviceFlag) -> str:
     """What has latched, in words; empty if nothing has."""

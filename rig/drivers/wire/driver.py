@@ -20,6 +20,8 @@ from rig.wire.messages import EmergencyStop, Stream
 
 HOLD_SAMPLES = 0.5  # a held output is half a sample late on average
 BLOCKS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # of which the load of the wire is told
+COUNTED = ("lost_samples", "repeated_blocks", REORDERED_BLOCKS, LATE_BLOCKS, "misplaced_blocks", "missing_readbacks")
+"""Counters of `rig.drivers.wire.incoming.Incoming`."""
 LARGEST_UNKNOWN_BLOCK = 65536  # before the device has been asked
 
 
@@ -170,15 +172,7 @@ class WireDAQ(DAQ):
         """Samples by device flag, then what was lost, repeated or damaged on the way."""
         streaming, connection = self._streaming, self._connection
         out = dict(streaming.flag_counts) if streaming else dict.fromkeys(FLAG_NAMES, 0)
-        counted = (
-            "lost_samples",
-            "repeated_blocks",
-            REORDERED_BLOCKS,
-            LATE_BLOCKS,
-            "misplaced_blocks",
-            "missing_readbacks",
-        )
-        for name in counted:
+        for name in COUNTED:
             out[name] = getattr(streaming.incoming, name) if streaming else 0
         out["dropped_by_device"] = streaming.incoming.dropped if streaming else 0
         if connection is not None:

@@ -81,6 +81,9 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
     if simulated not in (0, 1, 2):
         raise DaqProtocol(f"{dialogue.link.name}: the device says SIMULATED = {simulated}: allowed is 0, 1 or 2")
     channels = range(count)
+    # the double-precision filter delay if the device has it and it agrees, else whole nanoseconds
+    delay_s = 1e-9 * get(Parameter.FILTER_DELAY_NS, default=0)
+    exact_s = as_double(*(get(Parameter.FILTER_DELAY_S, item, default=0) for item in (0, 1)))
     facts = DeviceFacts(
         model=dialogue.get_text(Parameter.MODEL),
         firmware=dialogue.get_text(Parameter.FIRMWARE),
@@ -100,28 +103,17 @@ def read_facts(dialogue: Dialogue) -> DeviceFacts:
         largest_block=get(Parameter.LARGEST_BLOCK),
         largest_queue=get(Parameter.LARGEST_QUEUE),
         watchdog_s=(1e-6 * get(Parameter.SHORTEST_WATCHDOG_US), 1e-6 * get(Parameter.LONGEST_WATCHDOG_US)),
-        filter_delay_s=_filter_delay_s(dialogue),
+        filter_delay_s=exact_s if abs(exact_s - delay_s) <= 1e-9 else delay_s,
         layout_crc=get(Parameter.LAYOUT_CRC, default=0),
         version=dialogue.link.version,
         longest_period=get(Parameter.LONGEST_PERIOD, default=0) if dialogue.link.version > LOWEST_VERSION else 0,
     )
-    _check_scales(dialogue.link.name, facts)
-    return facts
-
-
-def _filter_delay_s(dialogue: Dialogue) -> float:
-    """Filter delay from the double-precision parameter if the device has it and it agrees; else from whole nanoseconds."""
-    delay_s = 1e-9 * dialogue.get(Parameter.FILTER_DELAY_NS, default=0)
-    low, high = (dialogue.get(Parameter.FILTER_DELAY_S, item, default=0) for item in (0, 1))
-    exact_s = as_double(low, high)
-    return exact_s if abs(exact_s - delay_s) <= 1e-9 else delay_s
-
-
-def _check_scales(name: str, facts: DeviceFacts) -> None:
-    """Refuse ranges, volts per count or a largest block that are not positive numbers."""
     scales = np.array([*facts.v_per_count, *facts.range_v, facts.output_v_per_count, facts.output_range_v])
     if not (np.isfinite(scales).all() and (scales > 0.0).all() and facts.largest_block >= 1):
-        raise DaqProtocol(f"{name}: the device tells ranges, steps or blocks that are not positive numbers")
+        raise DaqProtocol(
+            f"{dialogue.link.name}: the device tells ranges, steps or blocks that are not positive numbers"
+        )
+    return facts
 
 
 def compare(facts: DeviceFacts, bench: Bench, name: str, layout_crc: int) -> None:

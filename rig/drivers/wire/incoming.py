@@ -7,15 +7,24 @@ import numpy as np
 
 from rig.drivers.wire.dialogue import Dialogue
 from rig.errors import DaqEmergencyStop, DaqProtocol, DaqReset, DaqTimeout, DaqWatchdog
-from rig.wire.messages import LOWEST_VERSION, Answer, DeviceFlag, DeviceState, Heartbeat, Message, Readback, Samples
+from rig.wire.messages import (
+    LOWEST_VERSION,
+    MISSED,
+    STOPPED,
+    Answer,
+    DeviceFlag,
+    DeviceState,
+    Heartbeat,
+    Message,
+    Readback,
+    Samples,
+)
 
 OLD_BLOCKS_IN_A_ROW = 3  # consecutive old blocks after which the device must have started to count anew
 UNARMED_BEATS = 2  # the first may have been sent before the device was armed
 UNARMED = {int(DeviceState.IDLE): "was stopped by another", int(DeviceState.RUNNING): "was disarmed by another"}
 REMEMBERED = 4  # blocks that were given up (one of them that comes after all is late, not repeated), and readbacks
 MOST_LOOKED_AT = 64  # messages that are looked through for a block that another has overtaken
-STOPPED = DeviceFlag.WATCHDOG | DeviceFlag.EMERGENCY_STOP
-MISSED = DeviceFlag.OUTPUT_HELD | DeviceFlag.OUTPUT_CONTINUED
 
 
 class Incoming:
@@ -119,7 +128,6 @@ class Incoming:
         return self._untold.pop(message.first, message)
 
     def _wait(self) -> Samples:
-        """Wait for a block that is not older than the expected one."""
         until = 0.0
         left_s = self._timeout_s
         while True:

@@ -10,41 +10,9 @@ from rig.continuation import period_steps, ramp_length
 from rig.daq import LOST
 from rig.drivers.wire.connection import Connection
 from rig.drivers.wire.dialogue import ANSWER_S
-from rig.drivers.wire.facts import DeviceFacts
 from rig.drivers.wire.incoming import Incoming
 from rig.drivers.wire.options import WireOptions, watchdog_s
 from rig.wire.messages import ARM_KEY, LOWEST_VERSION, Answer, Command, DeviceFlag, Output, Parameter, Stream
-
-
-class Scaling:
-    """Converts volts to a device's counts and back, for blocks of one size."""
-
-    def __init__(self, facts: DeviceFacts, block: int) -> None:
-        self._counts_per_v = np.full(block, 1.0 / facts.output_v_per_count)
-        self._v_per_count, self._output_v_per_count = facts.v_per_count.copy(), facts.output_v_per_count
-        beyond = 2.0 ** (facts.bits - 1)
-        self._lowest, self._highest = np.full(block, -beyond), np.full(block, beyond - 1.0)
-        self._dtype = np.dtype(f"<i{facts.bits // 8}")
-        self._scaled = np.empty(block)
-
-    def to_counts(self, voltages: np.ndarray) -> np.ndarray:
-        """The nearest counts [n] of the output converter."""
-        scaled = self._scaled
-        np.multiply(voltages, self._counts_per_v, out=scaled)
-        np.rint(scaled, out=scaled)
-        np.maximum(scaled, self._lowest, out=scaled)  # both in a third of the time of np.clip
-        np.minimum(scaled, self._highest, out=scaled)
-        return scaled.astype(self._dtype)
-
-    def to_volts(self, counts: np.ndarray, inputs: np.ndarray) -> None:
-        """Readings in volts, into ``inputs`` [n, n_channels]."""
-        np.multiply(counts, self._v_per_count, out=inputs)
-
-    def in_place_of(self, sent: np.ndarray, put_out: np.ndarray, volts: np.ndarray) -> None:
-        """What was put out in place of other counts, into ``volts`` [n]; NaN where the counts [n] are those that were sent."""
-        np.multiply(put_out, self._output_v_per_count, out=volts)
-        volts[put_out == sent] = np.nan
-
 
 PINGS_PER_S = 20.0  # pings per second while streaming; chosen: little beside the stream
 WAITED = 0.5  # of the time that the queue leaves once the next block has come, for one that this has overtaken
@@ -77,7 +45,12 @@ class Streaming:
         self.incoming.on_answer = self._take_answer
         self.flag_counts = dict.fromkeys(FLAG_NAMES, 0)
         """Samples by device flag."""
-        self._scaling = Scaling(facts, stream.block)
+        self._counts_per_v = np.full(stream.block, 1.0 / facts.output_v_per_count)
+        self._v_per_count, self._output_v_per_count = facts.v_per_count.copy(), facts.output_v_per_count
+        beyond = 2.0 ** (facts.bits - 1)
+        self._lowest, self._highest = np.full(stream.block, -beyond), np.full(stream.block, beyond - 1.0)
+        self._dtype = np.dtype(f"<i{facts.bits // 8}")
+        self._scaled = np.empty(stream.block)
         self._due = stream.queue * stream.block
         self._has_periods = connection.link.version > LOWEST_VERSION
         nothing = np.zeros(stream.block, int)  # before the first outputs are due
@@ -120,7 +93,7 @@ class Streaming:
         """
         if not self._began:
             self._begin()
-        link, counts = self._link, self._scaling.to_counts(voltages)
+        link, counts = self._link, self._to_counts(voltages)
         goes_on = (0, 0)
         if self._has_periods:
             period_samples, ramp_samples = continuation[0].item()
@@ -142,15 +115,25 @@ class Streaming:
             inputs.fill(np.nan)
             flags.fill(LOST)
             return
-        self._scaling.to_volts(samples.counts, inputs)
+        np.multiply(samples.counts, self._v_per_count, out=inputs)
         flags.fill(samples.flags)
         if self.incoming.put_out is not None:
-            self._scaling.in_place_of(self._sent[0], self.incoming.put_out, put_out)
+            np.multiply(self.incoming.put_out, self._output_v_per_count, out=put_out)
+            put_out[self.incoming.put_out == self._sent[0]] = np.nan  # only what was put out in place of what was sent
             self._has_put_out = True
         if samples.flags:
             for bit, name in enumerate(FLAG_NAMES):
                 if samples.flags & (1 << bit):
                     self.flag_counts[name] += self._block
+
+    def _to_counts(self, voltages: np.ndarray) -> np.ndarray:
+        """The nearest counts [n] of the output converter."""
+        scaled = self._scaled
+        np.multiply(voltages, self._counts_per_v, out=scaled)
+        np.rint(scaled, out=scaled)
+        np.maximum(scaled, self._lowest, out=scaled)  # both in a third of the time of np.clip
+        np.minimum(scaled, self._highest, out=scaled)
+        return scaled.astype(self._dtype)
 
     def _take_answer(self, answer: Answer) -> None:
         if self._ping is not None and answer.number == self._ping[0]:

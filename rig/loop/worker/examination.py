@@ -3,15 +3,19 @@
 import contextlib
 import math
 import time
-from typing import NamedTuple, cast
+from typing import TypeAlias, cast
 
 from rig.bench import Bench, DriverChoice
 from rig.daq import Adjustable
 from rig.drivers import make_daq
 from rig.errors import DaqRefused, DaqWatchdog, RigError
 from rig.loop.recommendation import BUSY, REACHED, Recommendation, Settings, complaints, recommend
+from rig.loop.worker.pace import pacing_of
 from rig.loop.worker.probe import Advice, DeviceReport, Settable, Tried, round_trips, timing_of
-from rig.loop.worker.queue_choice import covering_queue
+from rig.loop.worker.queue_choice import covering_queue, queue_of
+
+Asked: TypeAlias = tuple[Adjustable | None, Settings, bool]
+"""What a device lets one set, the settings of the bench, and whether the device has a clock of its own."""
 
 LATCHED = "the watchdog has latched while settings were tried; it is left so, and a run that is armed clears it"
 MEASURED_S, TRIED_S, AS_IS_S = 1.5, 1.0, 1.0  # a first measurement, a try, the settings of the bench; chosen
@@ -37,17 +41,28 @@ def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> Devi
     began = time.monotonic()
     opened, (allowed, now, by_device), refusal = _that_opens(bench, seed)
     if by_device:
-        opened = with_settings(opened, _patient(now, allowed), bench.sample_rate_hz)
+        patient = now
+        if allowed is not None:
+            longest_s = max(now.watchdog_s or 0.0, allowed.watchdog_range_s[1])
+            patient = Settings(now.block, allowed.largest_queue, longest_s)
+        opened = with_settings(opened, patient, bench.sample_rate_hz)
     facts = round_trips(opened, seed, seconds)
     if "latched" not in facts and "failure" not in facts:
         if by_device:
             now = now._replace(block=bench.block)
             if allowed is not None and allowed.automatic:
                 now = now._replace(queue_blocks=covering_queue(timing_of(facts), bench, allowed)[0])
-            examination = _Examination(bench, seed, now, allowed, facts)
-            facts = examination.report(refusal)
+            facts = _Examination(bench, seed, now, allowed, facts).report(refusal)
         else:
-            facts = _without_clock(facts)
+            why = "the device waits for the host: no output is late, and neither queue nor watchdog needs to be changed"
+            told: Advice = {
+                "settings": {},
+                "differs": {},
+                "reasons": {"queue_blocks": why},
+                "tried": [],
+                "bench_lines": [],
+            }
+            facts |= {"recommendation": told}
     return facts | {"examined_s": round(time.monotonic() - began, 1)}
 
 
@@ -60,16 +75,6 @@ def with_settings(bench: Bench, settings: Settings, rate_hz: float) -> Bench:
     return bench.model_copy(update={"driver": driver, "block": settings.block, "sample_rate_hz": rate_hz})
 
 
-class _Asked(NamedTuple):
-    """What a device lets one set."""
-
-    allowed: Adjustable | None
-    now: Settings
-    """Those of the bench."""
-    by_device: bool
-    """Whether the device has a clock of its own."""
-
-
 def bench_lines(differs: Settable) -> list[str]:
     """Return lines of a bench file with the settings that differ from those of the bench; empty if none do."""
     options = [f"{name} = {differs[name]:g}" for name in ("queue_blocks", "watchdog_s") if name in differs]
@@ -77,7 +82,7 @@ def bench_lines(differs: Settable) -> list[str]:
     return [*block, *([""] if block and options else []), *(["[driver.options]", *options] if options else [])]
 
 
-def _that_opens(bench: Bench, seed: int) -> tuple[Bench, _Asked, str]:
+def _that_opens(bench: Bench, seed: int) -> tuple[Bench, Asked, str]:
     """Return the bench, or, if the device or its wire refuses that, with the shortest block that is not; and the refusal."""
     try:
         return bench, _asked(bench, seed), ""
@@ -90,28 +95,11 @@ def _that_opens(bench: Bench, seed: int) -> tuple[Bench, _Asked, str]:
         raise
 
 
-def _asked(bench: Bench, seed: int) -> _Asked:
-    """Open a device, and return what it lets one set."""
+def _asked(bench: Bench, seed: int) -> Asked:
     with make_daq(bench, seed) as daq:
-        allowed, capabilities = daq.adjustable, daq.capabilities
-        queue = bench.driver.options.get("queue_blocks", 1)
+        allowed = daq.adjustable
         watchdog_s = allowed.watchdog_s if allowed else None
-        by_device = capabilities.paced and not capabilities.repeatable
-        return _Asked(allowed, Settings(bench.block, queue if isinstance(queue, int) else 1, watchdog_s), by_device)
-
-
-def _patient(now: Settings, allowed: Adjustable | None) -> Settings:
-    """Return the settings with the longest queue and watchdog."""
-    if allowed is None:
-        return now
-    return Settings(now.block, allowed.largest_queue, max(now.watchdog_s or 0.0, allowed.watchdog_range_s[1]))
-
-
-def _without_clock(facts: DeviceReport) -> DeviceReport:
-    """Return the report on a device that waits for the host: no output can be late."""
-    why = "the device waits for the host: no output is late, and neither queue nor watchdog needs to be changed"
-    told: Advice = {"settings": {}, "differs": {}, "reasons": {"queue_blocks": why}, "tried": [], "bench_lines": []}
-    return facts | {"recommendation": told}
+        return allowed, Settings(bench.block, queue_of(bench), watchdog_s), pacing_of(daq) == "device"
 
 
 class _Examination:
@@ -136,9 +124,8 @@ class _Examination:
         reasons = dict(advice.reasons)
         reasons["largest_rate_hz"] += "; tried" if rate_was_tried else ""
         now = self._now._asdict()
-        differs = cast(
-            Settable, {name: value for name, value in advice.settings._asdict().items() if value != now[name]}
-        )
+        changed = {name: value for name, value in advice.settings._asdict().items() if value != now[name]}
+        differs = cast(Settable, changed)
         if self._allowed is not None and self._allowed.automatic:
             if "block" in differs:
                 differs.pop("queue_blocks", None)
@@ -149,19 +136,14 @@ class _Examination:
             "differs": differs,
             "reasons": reasons,
             "measured": {name: round(value, 7) for name, value in self._timing._asdict().items()},
-            "delay_s": self._delay_s(advice.settings),
+            "delay_s": round((1 + advice.settings.queue_blocks) * advice.settings.block / self._rate_hz, 7),
             "holds": bool(self._tried and self._holds(advice.settings)),
             "tried": self._tried,
             "bench_lines": bench_lines(differs),
         }
         return facts | {"remarks": remarks, "recommendation": told}
 
-    def _delay_s(self, settings: Settings) -> float:
-        """Time from the middle of a block to that of the block of outputs that it leads to, s."""
-        return round((1 + settings.queue_blocks) * settings.block / self._rate_hz, 7)
-
     def _attempt(self, settings: Settings, rate_hz: float, seconds: float) -> DeviceReport:
-        """Try settings at 0 V; return the report, or what was refused."""
         try:
             facts = round_trips(with_settings(self._bench, settings, rate_hz), self._seed, seconds)
         except RigError as error:
@@ -186,7 +168,6 @@ class _Examination:
         return False
 
     def _try_settings(self, advice: Recommendation) -> Recommendation:
-        """Try the recommended settings, and longer queues while outputs are held."""
         for _ in range(TRIES):
             self._attempt(advice.settings, self._rate_hz, TRIED_S)
             told = self._tried[-1]
@@ -196,7 +177,9 @@ class _Examination:
             if longer is None:
                 break
             name = "queue_blocks" if longer.block == advice.settings.block else "block"
-            why = f"{advice.reasons[name]}; tried with {getattr(advice.settings, name)}: {_count(told)}"
+            count = f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
+            why = f"{advice.reasons[name]}; tried with {getattr(advice.settings, name)}: {count}, "
+            why += f"{told['reached_hz']:g} Hz reached"
             advice = advice._replace(settings=longer, reasons=advice.reasons | {name: why})
         return advice
 
@@ -241,7 +224,6 @@ class _Examination:
         return self._as_is or self._facts
 
     def _has_latched(self) -> bool:
-        """Whether the device's watchdog has tripped while settings were tried."""
         return any(told.get("failure", "").startswith(DaqWatchdog.__name__) for told in self._tried)
 
     def _would_trip(self) -> bool:
@@ -264,11 +246,6 @@ def _is_quick(told: Tried) -> bool:
 def _has_ended(told: Tried) -> bool:
     """Whether nothing more can be tried: the device has failed, or its watchdog has latched."""
     return "failure" in told or "latched" in told
-
-
-def _count(told: Tried) -> str:
-    held = f"{told['held_blocks']} of {told['blocks']} blocks held, {told['lost_blocks']} lost"
-    return f"{held}, {told['reached_hz']:g} Hz reached"
 
 
 def _said(facts: DeviceReport | None) -> list[str]:

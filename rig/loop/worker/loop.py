@@ -58,8 +58,9 @@ class WallClockLoop(DrivenLoop):
         self._pace = pace_of(daq)
         period_ns = 1e9 * daq.block / daq.sample_rate_hz
         queue = daq.queue_blocks if self._pace.by_device else 1
-        self._deadline_ns = int(period_ns * max(1, queue))
-        self.times = BlockTimes(self._pace, memory, self._deadline_ns)
+        self.deadline_ns = int(period_ns * max(1, queue))
+        """Longest allowed time from the release of a block to the output of its voltages, ns."""
+        self.times = BlockTimes(self._pace, memory, self.deadline_ns)
         self._stall_ns = int(max(1e9 * LONGEST_STALL_S, 10 * period_ns))
         self._unsaid = False
         self._began_ns = 0
@@ -83,11 +84,6 @@ class WallClockLoop(DrivenLoop):
         )
         self._samples = 0
         self.disturbances: dict[str, int] = {}
-
-    @property
-    def deadline_s(self) -> float:
-        """Longest allowed time from the release of a block to the output of its voltages (s)."""
-        return 1e-9 * self._deadline_ns
 
     def run(self) -> None:
         """Run until the output is off."""
@@ -180,7 +176,6 @@ class WallClockLoop(DrivenLoop):
                 time.sleep(0.001)
 
     def _account(self) -> None:
-        """Count the times of the previous block, whose outputs are sent now."""
         response = self.times.done()
         if response > self._stall_ns and not self._pace.by_device:
             self._end(f"the loop stood still for {1e-9 * response:.1f} s")
@@ -204,7 +199,6 @@ class WallClockLoop(DrivenLoop):
         self._unsaid = True
 
     def _announce(self) -> None:
-        """Announce a completed chunk to the campaign unless that was done."""
         if not self._unsaid:
             return
         self._unsaid = False
@@ -219,7 +213,6 @@ class WallClockLoop(DrivenLoop):
         self._announce()
 
     def _look_round(self) -> None:
-        """Check all conditions that may end the loop."""
         if os.getppid() != self._parent:
             self._alone = True
         if self._alone:

@@ -147,11 +147,6 @@ class SharedMemory:
         return self.words[PUBLISHED]
 
     @property
-    def taken(self) -> int:
-        """Chunks that the campaign has taken."""
-        return self.words[TAKEN]
-
-    @property
     def free(self) -> int:
         """Slots that the loop may still fill."""
         return self.layout.slots - (self.words[PUBLISHED] - self.words[TAKEN])
@@ -167,19 +162,3 @@ class SharedMemory:
     def to_take(self) -> Slot:
         """The next slot that the campaign takes."""
         return self._slots[self.words[TAKEN] % self.layout.slots]
-
-    def take(self) -> None:
-        """Release the slot `to_take`, so that it can be filled again."""
-        self.words[TAKEN] += 1
-
-    def request_stop(self) -> None:
-        """Request the ramp; the loop checks the request at every block."""
-        self.words[STOP] = 1
-
-    def release_start(self) -> None:
-        """Let the start segment end; the loop looks for it at every block."""
-        self.words[RELEASE_START] = 1
-
-    def continue_start(self, judgements: int) -> None:
-        """Let a loop in lockstep go on that waits for so many judgements of its start."""
-        self.words[START_JUDGED] = judgements

@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections.abc import Callable
 
 from rig.daq import DAQ
 
@@ -21,6 +20,8 @@ class Pace:
     """Whether the device paces the loop."""
     has_clock = False
     """Whether time goes on without the loop, so that it can be late."""
+    skipped = 0
+    """Number of whole periods skipped so far because the loop was late by more than a period."""
 
     def begin(self) -> None:
         """Start the clock."""
@@ -32,11 +33,6 @@ class Pace:
     def release(self, begun_ns: int) -> int:
         """Return when the block that began at ``begun_ns`` was due (monotonic clock, ns)."""
         return begun_ns
-
-    @property
-    def skipped(self) -> int:
-        """Number of whole periods skipped so far because the loop was late by more than a period."""
-        return 0
 
 
 class HostPace(Pace):
@@ -51,12 +47,6 @@ class HostPace(Pace):
     def __init__(self, period_s: float) -> None:
         self._period_ns = 1e9 * period_s
         self._began = self._due = self._number = 0
-        self._skipped = 0
-
-    @property
-    def skipped(self) -> int:
-        """Periods skipped so far."""
-        return self._skipped
 
     def begin(self) -> None:
         """Start the clock now."""
@@ -71,7 +61,7 @@ class HostPace(Pace):
             _sleep(1e-9 * early)
         elif -early > self._period_ns:
             missed = int(-early // self._period_ns)
-            self._skipped += missed
+            self.skipped += missed
             self._number += missed
             self._due = self._began + int(self._number * self._period_ns)
         return _now()
@@ -128,10 +118,5 @@ def pacing_of(daq: DAQ) -> str:
 
 def pace_of(daq: DAQ) -> Pace:
     """Return the pace of a started device."""
-    period_s = daq.block / daq.sample_rate_hz
-    paces: dict[str, Callable[[], Pace]] = {
-        "host": lambda: HostPace(period_s),
-        "device": lambda: DevicePace(period_s),
-        "lockstep": Pace,
-    }
-    return paces[pacing_of(daq)]()
+    pacing, period_s = pacing_of(daq), daq.block / daq.sample_rate_hz
+    return HostPace(period_s) if pacing == "host" else DevicePace(period_s) if pacing == "device" else Pace()

@@ -176,8 +176,6 @@ def measured_timing(daq: DAQ, block: int, seconds: float, asked: Callable[[], st
 
 
 class _Exchanged(NamedTuple):
-    """Blocks of 0 V that were exchanged with a running device."""
-
     arrivals_s: np.ndarray
     """float64[1 + n]: the beginning, and when each block was there, s."""
     busy_s: float
@@ -193,7 +191,6 @@ class _Exchanged(NamedTuple):
 
 
 def _exchanged(daq: DAQ, seconds: float, asked: Callable[[], str] = str) -> _Exchanged:
-    """Exchange blocks of 0 V for a time, or until ``asked`` returns why not."""
     block, names = daq.block, flag_names(daq.counters)
     held_flag = 1 << names.index(HELD) if HELD in names else 0
     zeros = np.zeros(block)

@@ -20,13 +20,18 @@ from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import Layout, SharedMemory, packed
 from rig.loop.worker.pace import pacing_of
 from rig.loop.worker.probe import probe, round_trips
-from rig.loop.worker.queue_choice import DelayBounds, QueueChoice, presumed_latency, settle_queue
+from rig.loop.worker.queue_choice import DelayBounds, QueueChoice, presumed_latency, queue_of, settle_queue
 from rig.system.privileges import ordinary_scheduling, prepare
-from rig.text.json_values import JsonObject
 from rig.tick.kernels import tick_block
 from rig.tick.tick import TickSettings
 
 SIGNALS = ("SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT")
+MEASUREMENTS: dict[str, Callable[..., object]] = {
+    "probe": probe,
+    "round trips": round_trips,
+    "examination": examine_device,
+}
+"""Orders that are answered once (`rig.loop.worker.spawn.ask`)."""
 
 
 def main() -> None:
@@ -36,14 +41,10 @@ def main() -> None:
     memory = int(sys.argv[3])
     try:
         name, *arguments = _told(commands)
-        if name == "probe":
-            facts.send(("probe", probe(*arguments)))
-        elif name == "round trips":
-            facts.send(("round trips", round_trips(*arguments)))
-        elif name == "examination":
-            facts.send(("examination", examine_device(*arguments)))
-        elif name == "open":
+        if name == "open":
             _serve(commands, facts, memory, *arguments)
+        else:
+            facts.send((name, MEASUREMENTS[name](*arguments)))
     except (EOFError, BrokenPipeError):
         return  # the campaign is gone, and the driver is closed
     except RigError as error:
@@ -77,24 +78,27 @@ def _serve(commands: Connection, facts: Connection, descriptor: int, bench: Benc
         choice = _queue_choice(daq, bench, commands, of_plan, privileged)
         facts.send(("queue", choice))
         _, settings, ring_s = _told(commands)
-        presumed = _presumed_latency(daq, bench, choice)
+        presumed = presumed_latency(daq, bench, queue_of(bench)) if choice is None else choice.latency_samples
         layout, memory = _shared(daq, settings, presumed, ring_s, descriptor)
         _load_kernels(daq, bench, settings)
         came, _ = _listen()
-        said = prepare(
-            privileged=privileged and pacing_of(daq) != "lockstep"
-        )  # lockstep: no deadlines, and it never sleeps
+        # lockstep: no deadlines, and it never sleeps
+        said = prepare(privileged=privileged and pacing_of(daq) != "lockstep")
         daq.start(bench.block)
         if daq.latency_samples > presumed:
             layout, memory = _shared(daq, settings, daq.latency_samples, ring_s, descriptor)
         released = _released(commands)
-        loop = _begin(daq, settings, memory, facts, lambda: _asked(came, released))
+        tick = settings.build(daq.latency_samples)
+        tick.arrays, state = packed(tick.arrays)
+        loop = WallClockLoop(daq, tick, state, memory, facts, lambda: _asked(came, released))
         facts.send(("started", daq.latency_samples, layout, daq.remarks))
         try:
             loop.run()
         finally:
             loop.stop()
-        statistics = _statistics(loop, said)
+        real_time = said | {"pacing": pacing_of(daq)}
+        real_time |= {name: str(value) for name, value in (loop.disturbances | loop.times.report()).items()}
+        statistics = {"deadline_us": round(1e-3 * loop.deadline_ns, 1), "real_time": real_time, **daq.statistics}
     failure = None if loop.failure is None else described(loop.failure)
     facts.send(("ended", failure, loop.cause, loop.counters, statistics))
 
@@ -121,14 +125,6 @@ def _queue_choice(
             restore()
 
 
-def _presumed_latency(daq: DAQ, bench: Bench, choice: QueueChoice | None = None) -> float:
-    """Return the latency in samples as far as known before the device is started."""
-    if choice is not None:
-        return choice.latency_samples
-    queue = bench.driver.options.get("queue_blocks", 1)
-    return presumed_latency(daq, bench, queue if isinstance(queue, int) else 1)
-
-
 def _shared(
     daq: DAQ, settings: TickSettings, latency_samples: float, ring_s: float, descriptor: int
 ) -> tuple[Layout, SharedMemory]:
@@ -136,14 +132,6 @@ def _shared(
     arrays = settings.build(latency_samples).arrays
     layout = Layout.of(settings.bench, arrays, len(daq.counters), ring_s)
     return layout, SharedMemory(descriptor, layout, create=True)
-
-
-def _begin(
-    daq: DAQ, settings: TickSettings, memory: SharedMemory, facts: Connection, asked: Callable[[], str]
-) -> WallClockLoop:
-    tick = settings.build(daq.latency_samples)
-    tick.arrays, state = packed(tick.arrays)
-    return WallClockLoop(daq, tick, state, memory, facts, asked)
 
 
 def _load_kernels(daq: DAQ, bench: Bench, settings: TickSettings) -> None:
@@ -188,10 +176,3 @@ def _asked(came: list[str], released: select.poll) -> str:
     if came:
         return f"the loop's process was asked to end ({came[0]})"
     return "the campaign has let go of the loop" if released.poll(0) else ""  # readable: it was closed
-
-
-def _statistics(loop: WallClockLoop, said: dict[str, str]) -> JsonObject:
-    """Return the statistics that only the loop process knows, as plain data for the recording."""
-    counted = {"pacing": pacing_of(loop.daq), **loop.disturbances, **loop.times.report()}
-    real_time = {**said, **{name: str(value) for name, value in counted.items()}}
-    return {"deadline_us": round(1e6 * loop.deadline_s, 1), "real_time": real_time, **loop.daq.statistics}

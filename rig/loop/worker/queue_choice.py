@@ -72,8 +72,7 @@ def settle_queue(
     if allowed is None:
         return None
     if not allowed.automatic:
-        given = bench.driver.options.get("queue_blocks", 1)
-        return _choice(daq, bench, "bench", given if isinstance(given, int) else 1, "")
+        return _choice(daq, bench, "bench", queue_of(bench), "")
     if daq.capabilities.repeatable:
         daq.adjust(1)
         return _choice(daq, bench, "lockstep", 1, "the device waits for the host")
@@ -88,6 +87,12 @@ def settle_queue(
     blocks, why = covering_queue(timing, bench, allowed, delay_s - daq.filter_delay_samples / bench.sample_rate_hz)
     daq.adjust(blocks)
     return _choice(daq, bench, "measured", blocks, why)
+
+
+def queue_of(bench: Bench) -> int:
+    """Return the number of blocks that a bench gives its driver's queue; 1 if it gives none."""
+    given = bench.driver.options.get("queue_blocks", 1)
+    return given if isinstance(given, int) else 1
 
 
 def presumed_latency(daq: DAQ, bench: Bench, queue_blocks: int) -> float:

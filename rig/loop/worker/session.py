@@ -14,9 +14,9 @@ from rig.bench import Bench
 from rig.daq import Capabilities
 from rig.errors import DaqError
 from rig.loop.driven_loop import end_by_driver
-from rig.loop.loop import LoopStatistics, RunningLoop
+from rig.loop.loop import LoopStatistics
 from rig.loop.worker.loop import CHUNK_DONE
-from rig.loop.worker.memory import TIMES, Layout, SharedMemory, packed
+from rig.loop.worker.memory import RELEASE_START, START_JUDGED, STOP, TAKEN, TIMES, Layout, SharedMemory, packed
 from rig.loop.worker.queue_choice import QueueChoice
 from rig.loop.worker.spawn import Worker, rebuilt
 from rig.text.json_values import JsonObject
@@ -60,9 +60,8 @@ class WorkerLoop:
         """Telemetry in chunks of about 20 ms, until the output is off or the loop's process is gone."""
         while not self.ended:
             end = self._wait()
-            while (
-                self._memory.published > self._memory.taken
-            ):  # a complete chunk counts, also if its announcement was lost
+            # a complete chunk counts, also if its announcement was lost
+            while self._memory.published > self._memory.words[TAKEN]:
                 rows = self._take()
                 if rows.size:
                     yield rows
@@ -77,15 +76,15 @@ class WorkerLoop:
     def request_stop(self, cause: str = "") -> None:
         """Request the ramp to 0 V; the loop checks the request at every block."""
         self.cause = self.cause or cause
-        self._memory.request_stop()
+        self._memory.words[STOP] = 1
 
     def release_start(self) -> None:
         """Let the start segment end at its time; the loop looks for it at every block."""
-        self._memory.release_start()
+        self._memory.words[RELEASE_START] = 1
 
     def continue_start(self, judgements: int) -> None:
         """Let the start segment go on after so many judgements; a loop in lockstep waits for this or for its release."""
-        self._memory.continue_start(judgements)
+        self._memory.words[START_JUDGED] = judgements
 
     def bring_down(self) -> None:
         """Ramp to 0 V if the loop still runs, and wait for its end; the rows are dropped."""
@@ -116,15 +115,13 @@ class WorkerLoop:
         try:
             if not facts.poll(self._silence_s):
                 left = self._worker.end(HUNG_S + self._ramp_down_s)
-                return partial(self._fail, DaqError(self._silent_text(left)))
+                how = left or "the loop's process was ended; the device's own watchdog brings its output to 0 V"
+                text = f"the loop's process has been silent for {self._silence_s:g} s: its driver hangs; {how}"
+                return partial(self._end, DaqError(text))
             said = facts.recv_bytes()
         except (EOFError, OSError):
-            return partial(self._fail, self._worker.ended())
+            return partial(self._end, self._worker.ended())
         return None if said == CHUNK_DONE else partial(self._finish, said)
-
-    def _silent_text(self, left: str) -> str:
-        how = left or "the loop's process was ended; the device's own watchdog brings its output to 0 V"
-        return f"the loop's process has been silent for {self._silence_s:g} s: its driver hangs; {how}"
 
     def _take(self) -> np.ndarray:
         slot = self._memory.to_take()
@@ -132,7 +129,7 @@ class WorkerLoop:
         rows = self.tick.joined(slot.readings[:count], slot.rows[:count])
         self._state[:] = slot.state
         self.counters = dict(zip(self.counters, (int(number) for number in slot.counters), strict=False))
-        self._memory.take()
+        self._memory.words[TAKEN] += 1
         statistics = self.statistics
         statistics.samples, statistics.overruns = samples, overruns
         statistics.busy_s, statistics.wall_s = 1e-9 * busy_ns, 1e-9 * wall_ns
@@ -143,22 +140,15 @@ class WorkerLoop:
         if name == "ended":
             failure, cause, self.counters, self._said = facts
             self.cause = self.cause or cause
-            self.failure = None if failure is None else _daq_error(failure)
         else:
-            self.failure = _daq_error(facts[0])
-        if self.failure is not None:
-            end_by_driver(self.tick, self.failure)
-        self.ended = True
+            failure = facts[0]
+        error = None if failure is None else rebuilt(*failure)
+        self._end(error if error is None or isinstance(error, DaqError) else DaqError(str(error)))
 
-    def _fail(self, error: DaqError) -> None:
-        self.failure = error
-        end_by_driver(self.tick, error)
-        self.ended = True
-
-
-def _daq_error(described: tuple[tuple[str, ...], str]) -> DaqError:
-    error = rebuilt(*described)
-    return error if isinstance(error, DaqError) else DaqError(str(error))
+    def _end(self, failure: DaqError | None) -> None:
+        self.failure, self.ended = failure, True
+        if failure is not None:
+            end_by_driver(self.tick, failure)
 
 
 class WorkerSession:
@@ -192,13 +182,13 @@ class WorkerSession:
         return self._worker.pid
 
     def settle_queue(self, *, feedback: bool = True, delay_s: float = math.inf) -> QueueChoice | None:
-        """Settle the queue of the device in its process, see `rig.loop.session.Session.settle_queue`."""
+        """Settle the queue of the device in its process, see `rig.loop.session.LocalSession.settle_queue`."""
         self._worker.send("queue", {"feedback": feedback, "delay_s": delay_s})
         choice: QueueChoice | None = self._worker.receive("queue")[0]
         self._settled = True
         return choice
 
-    def start(self, settings: TickSettings) -> RunningLoop:
+    def start(self, settings: TickSettings) -> WorkerLoop:
         """Start the device and the loop, which runs from now on; its rows wait in the ring until they are taken."""
         if not self._settled:
             self.settle_queue()

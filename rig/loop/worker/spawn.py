@@ -66,8 +66,7 @@ class Worker:
             raise self.ended() from None
         if name == "failed":
             raise rebuilt(*facts[0])
-        if name != expected:
-            raise DaqError(f"the loop's process says {name!r} where {expected!r} was expected")
+        DaqError.raise_if(name != expected, f"the loop's process says {name!r} where {expected!r} was expected")
         return tuple(facts)
 
     def ended(self) -> DaqError:

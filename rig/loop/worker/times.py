@@ -14,7 +14,14 @@ def disturbances() -> dict[str, int]:
 
     If the system counts them, involuntary context switches and major and minor page faults of this thread are included.
     """
-    system = _of_the_system()  # first, because it may import a module itself
+    system: dict[str, int] = {}
+    if importlib.util.find_spec("resource") is not None:
+        import resource  # before modules are counted
+
+        if hasattr(resource, "RUSAGE_THREAD"):
+            used = resource.getrusage(resource.RUSAGE_THREAD)
+            system = {"involuntary_switches": used.ru_nivcsw, "major_faults": used.ru_majflt}
+            system["minor_faults"] = used.ru_minflt
     collections = sum(int(generation["collections"]) for generation in gc.get_stats())
     return {"imports": len(sys.modules), "collections": collections, **system}
 
@@ -23,17 +30,6 @@ def since(before: dict[str, int]) -> dict[str, int]:
     """Return the increase of the counts since ``before``."""
     now = disturbances()
     return {name: now[name] - count for name, count in before.items()}
-
-
-def _of_the_system() -> dict[str, int]:
-    if importlib.util.find_spec("resource") is None:
-        return {}
-    import resource
-
-    if not hasattr(resource, "RUSAGE_THREAD"):
-        return {}
-    used = resource.getrusage(resource.RUSAGE_THREAD)
-    return {"involuntary_switches": used.ru_nivcsw, "major_faults": used.ru_majflt, "minor_faults": used.ru_minflt}
 
 
 STALL_NS = 1_000_000

@@ -1,6 +1,7 @@
 """Codes and records of the safety functions, shared by kernels and Python code."""
 
 from enum import IntEnum
+from typing import Self
 
 from vibrolock.arrays import record
 
@@ -21,67 +22,49 @@ class GuardMode(IntEnum):
 class EndReason(IntEnum):
     """Why the output was brought down. Everything from FORCE_LIMIT on is a trip and latches."""
 
-    NONE = 0
-    COMPLETED = 1
-    STOP_REQUESTED = 2
-    PLAN_STOPPED = 3
-    NO_LOCK_IN_WINDOW = 4
-    NO_LOCK = 5
-    START_REFUSED = 6
-    FORCE_LIMIT = 10
-    RESPONSE_LIMIT = 11
-    DISPLACEMENT_LIMIT = 12
-    OVERTRAVEL = 13
-    FREQUENCY_LIMIT = 14
-    SENSOR_OVERLOAD = 15
-    SENSOR_STUCK = 16
-    NON_FINITE_INPUT = 17
-    NON_FINITE_OUTPUT = 18
-    LOST_LOCK = 19
-    DRIVER_FAILED = 20
-    SAMPLES_LOST = 21
-    EMERGENCY_STOP = 22
-    LEVEL_NOT_FOLLOWED = 23
-    PLANT_CONTRADICTED = 24
-    OVER_LEVEL = 25
-    GAIN_CHANGED = 26
+    text: str
+    """The reason in one line."""
+
+    def __new__(cls, value: int, text: str = "") -> Self:
+        """Make a member; one that exists is found by its value alone."""
+        member = int.__new__(cls, value)
+        member._value_, member.text = value, text
+        return member
+
+    NONE = 0, "running"
+    COMPLETED = 1, "the plan was carried out"
+    STOP_REQUESTED = 2, "stopped by request"
+    PLAN_STOPPED = 3, "stopped by the plan's rule after a point failed"
+    NO_LOCK_IN_WINDOW = 4, "no lock at the start voltage: the frequency stands at an end of its window"
+    NO_LOCK = (
+        5,
+        "no lock at the start voltage: the phase error stays large, or force or drive is too small to be read "
+        "(start_periods may be too short)",
+    )
+    START_REFUSED = 6, "what was measured at the start does not fit the bench"
+    FORCE_LIMIT = 10, "force above its limit"
+    RESPONSE_LIMIT = 11, "response above its limit"
+    DISPLACEMENT_LIMIT = 12, "displacement above its limit"
+    OVERTRAVEL = 13, "displacement far above its limit"
+    FREQUENCY_LIMIT = 14, "frequency outside its limits"
+    SENSOR_OVERLOAD = 15, "sensor at the end of its range"
+    SENSOR_STUCK = 16, "sensor dead, stuck or below one bit (its reading does not change while the rig is driven)"
+    NON_FINITE_INPUT = 17, "input is not a number"
+    NON_FINITE_OUTPUT = 18, "the law's output is not a number"
+    LOST_LOCK = 19, "phase lock lost"
+    DRIVER_FAILED = 20, "the driver failed"
+    SAMPLES_LOST = 21, "samples were lost for longer than is allowed"
+    EMERGENCY_STOP = 22, "emergency stop"
+    LEVEL_NOT_FOLLOWED = 23, "the output rose and what it should hold did not follow"
+    PLANT_CONTRADICTED = 24, "force and motion are not those that the known plant gives for this output"
+    OVER_LEVEL = 25, "force or motion far above its level"
+    GAIN_CHANGED = 26, "the output that the level takes has changed by more than the rig explains"
 
     @property
     def is_trip(self) -> bool:
         """Whether a person has to look before the rig is armed again."""
         return self >= EndReason.FORCE_LIMIT
 
-
-TEXT = {
-    EndReason.NONE: "running",
-    EndReason.COMPLETED: "the plan was carried out",
-    EndReason.STOP_REQUESTED: "stopped by request",
-    EndReason.PLAN_STOPPED: "stopped by the plan's rule after a point failed",
-    EndReason.NO_LOCK_IN_WINDOW: "no lock at the start voltage: the frequency stands at an end of its window",
-    EndReason.NO_LOCK: (
-        "no lock at the start voltage: the phase error stays large, or force or drive is too small to be read "
-        "(start_periods may be too short)"
-    ),
-    EndReason.START_REFUSED: "what was measured at the start does not fit the bench",
-    EndReason.FORCE_LIMIT: "force above its limit",
-    EndReason.RESPONSE_LIMIT: "response above its limit",
-    EndReason.DISPLACEMENT_LIMIT: "displacement above its limit",
-    EndReason.OVERTRAVEL: "displacement far above its limit",
-    EndReason.FREQUENCY_LIMIT: "frequency outside its limits",
-    EndReason.SENSOR_OVERLOAD: "sensor at the end of its range",
-    EndReason.SENSOR_STUCK: "sensor dead, stuck or below one bit (its reading does not change while the rig is driven)",
-    EndReason.NON_FINITE_INPUT: "input is not a number",
-    EndReason.NON_FINITE_OUTPUT: "the law's output is not a number",
-    EndReason.LOST_LOCK: "phase lock lost",
-    EndReason.DRIVER_FAILED: "the driver failed",
-    EndReason.SAMPLES_LOST: "samples were lost for longer than is allowed",
-    EndReason.EMERGENCY_STOP: "emergency stop",
-    EndReason.LEVEL_NOT_FOLLOWED: "the output rose and what it should hold did not follow",
-    EndReason.PLANT_CONTRADICTED: "force and motion are not those that the known plant gives for this output",
-    EndReason.OVER_LEVEL: "force or motion far above its level",
-    EndReason.GAIN_CHANGED: "the output that the level takes has changed by more than the rig explains",
-}
-"""One line for each reason."""
 
 POLARITY_HINT = "is a sensor's polarity reversed, or the resonance outside the frequency window?"
 """What to look for where a loop finds no lock."""

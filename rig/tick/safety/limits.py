@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from rig.bench import Bench
+from rig.bench.channels import Role
 from rig.errors import DaqEmergencyStop, DaqError
-from rig.tick.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, TEXT, EndReason, GuardMode
+from rig.tick.safety.layout import GUARD, INPUT, INPUT_WATCH, LIMITS, POLARITY_HINT, EndReason, GuardMode
 
 INTEGRATOR_CORNER = 0.2  # of the lowest frequency allowed: there a displacement reads 4 % low, at five times that 0.2 %
 
@@ -36,15 +37,10 @@ def input_records(bench: Bench) -> np.ndarray:
         accelerates = channel.role in ("drive", "response")
         record["unit_per_volt"] = 1.0 / channel.sensitivity_v_per_unit
         record["overload_v"] = bench.limits.overload_fraction * channel.range_v
-        record["limit"] = (
-            bench.limits.force_n
-            if channel.role == "force"
-            else bench.limits.acceleration_m_s2
-            if accelerates
-            else math.inf
-        )
+        limits = {"force": bench.limits.force_n, "monitor": math.inf}
+        record["limit"] = limits.get(channel.role, bench.limits.acceleration_m_s2)
         record["alarm_v"] = min(record["overload_v"], record["limit"] * abs(channel.sensitivity_v_per_unit))
-        record["role"] = channel.role_code
+        record["role"] = Role[channel.role.upper()]
         record["skew_samples"] = channel.skew_samples
         record["watch_displacement"] = accelerates
         stop = bench.emergency_stop
@@ -83,7 +79,7 @@ def describe_end(guard: np.ndarray, bench: Bench) -> str:
     measurement before the trip (`rig.campaigns.running.trip_advice`).
     """
     reason = EndReason(int(guard["reason"][0]))
-    text = TEXT[reason]
+    text = reason.text
     if not reason.is_trip:
         unlocked = reason in (EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK)
         return f"{text}; {POLARITY_HINT}" if unlocked else text

@@ -126,7 +126,13 @@ def segment_table(
         if segment.kind is SegmentKind.RELEASE:
             row["drive"], row["amplitude_law"], row["level"] = Drive.SILENT, AmplitudeLaw.VOLTAGE, 0.0
         elif segment.excitation is not None:
-            _fill_in(row, segment.excitation, sample_rate_hz)
+            excitation = segment.excitation
+            row["drive"] = Drive.TONE if excitation.waveform is None else Drive.WAVEFORM
+            row["waveform"] = excitation.waveform or 0
+            row["omega"] = 2.0 * math.pi * excitation.frequency_hz
+            row["logarithmic"] = excitation.logarithmic
+            unit = math.log(2.0) if excitation.logarithmic else 2.0 * math.pi
+            row["rate"] = unit * excitation.rate / sample_rate_hz
     outcomes = np.zeros(len(segments), OUTCOME)
     outcomes["mean_error_rad"] = np.nan
     outcomes["drift"] = np.nan
@@ -142,12 +148,3 @@ def _again(segments: Sequence[Segment], index: int) -> int:
             break
         index -= 1
     return index
-
-
-def _fill_in(row: np.void, excitation: Excitation, sample_rate_hz: float) -> None:
-    row["drive"] = Drive.TONE if excitation.waveform is None else Drive.WAVEFORM
-    row["waveform"] = excitation.waveform or 0
-    row["omega"] = 2.0 * math.pi * excitation.frequency_hz
-    row["logarithmic"] = excitation.logarithmic
-    unit = math.log(2.0) if excitation.logarithmic else 2.0 * math.pi
-    row["rate"] = unit * excitation.rate / sample_rate_hz

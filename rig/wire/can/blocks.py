@@ -7,17 +7,15 @@ import numpy as np
 from rig.errors import DaqMismatch, DaqRefused
 from rig.wire.can.frames import Frame, padded_length
 from rig.wire.can.protocol import FrameKind, Protocol, Shape
+from rig.wire.can.readbacks import COUNT
 from rig.wire.messages import Stream
-
-COUNT = np.dtype("<i2")
 
 
 def check_stream(shape: Shape, stream: Stream) -> None:
     """Raise `DaqRefused` for a block or a resolution that frames cannot carry, `DaqMismatch` for other channels."""
     if stream.n_channels != shape.n_channels:
         raise DaqMismatch(f"{stream.n_channels} channels, but the bus is defined for {shape.n_channels}")
-    if stream.bits != 16:
-        raise DaqRefused(f"counts of {stream.bits} bits: allowed over CAN is 16")
+    DaqRefused.raise_if(stream.bits != 16, f"counts of {stream.bits} bits: allowed over CAN is 16")
     if not 1 <= stream.block <= shape.largest_block:
         raise DaqRefused(
             f"allowed over {('CAN FD' if shape.fd else 'classical CAN')} with {shape.n_channels} channels is "
@@ -40,6 +38,25 @@ class Piece(NamedTuple):
     padding: bytes
 
 
+def pieces_of(shape: Shape, block: int, outputs: bool) -> tuple[tuple[Piece, ...], ...]:
+    """The frames of a block of samples or outputs, by group within the block and part."""
+    height, columns = shape.rows, [shape.columns(part) for part in range(shape.parts)]
+    if outputs:
+        height, columns = shape.output_rows, [slice(0, 1)]
+    out = []
+    for first in range(0, block, height):
+        rows = slice(first, min(first + height, block))
+        group = []
+        for column in columns:
+            size = (rows.stop - first) * (column.stop - column.start)
+            used = shape.header + 2 * size
+            n_bytes = padded_length(used) if shape.fd else used
+            counts = rows.stop - first, column.stop - column.start
+            group.append(Piece(rows, column, counts, size, n_bytes, bytes(n_bytes - used)))
+        out.append(tuple(group))
+    return tuple(out)
+
+
 class StreamFrames:
     """The frames of one direction, for blocks of one size: `rig.wire.can.protocol.Shape` worked out.
 
@@ -51,30 +68,17 @@ class StreamFrames:
         self.fd, self.header = shape.fd, shape.header
         self.block = block
         self.n_channels = 1 if outputs else shape.n_channels
-        self.rows = shape.output_rows if outputs else shape.rows
-        """Rows of a group; the last one of a block may have fewer."""
-        self.parts = 1 if outputs else shape.parts
+        self.pieces = pieces_of(shape, block, outputs)
+        """By group within the block, and part."""
+        self.parts = len(self.pieces[0])
         """Frames of a group."""
-        self.groups = -(-block // self.rows)
+        self.groups = len(self.pieces)
         """Groups of a block."""
         wrap = shape.output_wrap if outputs else shape.wrap
         self.wrap = wrap - wrap % self.groups
         """Sequence numbers."""
-        columns = (slice(0, 1),) if outputs else tuple(shape.columns(part) for part in range(self.parts))
-        self.pieces = tuple(
-            tuple(self._piece(group * self.rows, part) for part in columns) for group in range(self.groups)
-        )
-        """By group within the block, and part."""
         numbers = self.parts if self.fd else self.wrap * self.parts
         self._identifiers = tuple(protocol.identifiers[kind, number] for number in range(numbers))
-
-    def _piece(self, first: int, columns: slice) -> Piece:
-        rows = min(self.rows, self.block - first)
-        size = rows * (columns.stop - columns.start)
-        used = self.header + 2 * size
-        n_bytes = padded_length(used) if self.fd else used
-        shape = rows, columns.stop - columns.start
-        return Piece(slice(first, first + rows), columns, shape, size, n_bytes, bytes(n_bytes - used))
 
     def sequence_of(self, first: int) -> int:
         """The sequence number with which the block from sample ``first`` on begins."""
@@ -104,8 +108,6 @@ INDICES = 1 << 32  # a frame has 32 bits for the index of a sample
 
 
 class _Open:
-    """An incomplete block."""
-
     def __init__(self, shape: tuple[int, int], n_frames: int) -> None:
         self.counts = np.zeros(shape, np.int16)
         self.missing = n_frames
@@ -165,7 +167,7 @@ class Blocks:
     ) -> tuple[int, np.ndarray, int] | None:
         """Add the counts (int16, rows by columns) of a frame; return number, counts and flags of a block it completes."""
         if self._mark is not None and group == self._mark:
-            self._count("resynchronised")
+            self._counters["resynchronised"] += 1
             self._drop(group // self._per_block)
         self._mark = None
         block, place = divmod(group, self._per_block)
@@ -174,9 +176,9 @@ class Blocks:
             self._next = group + 1
             self._drop(block - OPEN_BLOCKS + 1)
         if block < self._oldest or block == self._early:
-            self._count("repeated_frames")
+            self._counters["repeated_frames"] += 1
             if is_out_of_order:
-                self._count("late_frames")
+                self._counters["late_frames"] += 1
             return None
         if self._per_block * self._parts == 1:
             self._finish(block)
@@ -194,7 +196,7 @@ class Blocks:
             return False
         if block <= self._newest // (self._per_block * self._parts) - OPEN_BLOCKS:
             return False
-        self._count("out_of_order_frames")
+        self._counters["out_of_order_frames"] += 1
         return True
 
     def _add(
@@ -205,7 +207,7 @@ class Blocks:
             held = self._open[block] = _Open(self._shape, self._per_block * self._parts)
         into = held.counts[piece.rows, piece.columns]
         if held.seen[frame]:
-            self._count("repeated_frames")
+            self._counters["repeated_frames"] += 1
             if not np.array_equal(into, counts):
                 held.missing = _NEVER  # the two differ and either may be wrong: the block is given up
             return None
@@ -228,11 +230,7 @@ class Blocks:
         self._drop(oldest)
 
     def _drop(self, oldest: int) -> None:
-        """Give up blocks before ``oldest``."""
         self._oldest = max(self._oldest, oldest)
         for block in [block for block in self._open if block < self._oldest]:
             del self._open[block]
-            self._count("incomplete_blocks")
-
-    def _count(self, name: str) -> None:
-        self._counters[name] += 1
+            self._counters["incomplete_blocks"] += 1

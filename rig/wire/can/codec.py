@@ -5,11 +5,11 @@ import struct
 import numpy as np
 
 from rig.errors import DaqRefused
-from rig.wire.can.blocks import COUNT, Blocks, StreamFrames, check_stream
+from rig.wire.can.blocks import Blocks, StreamFrames, check_stream
 from rig.wire.can.frames import Frame
 from rig.wire.can.periods import PeriodsHeard, PeriodsTold
 from rig.wire.can.protocol import FrameKind, Protocol
-from rig.wire.can.readbacks import Readbacks
+from rig.wire.can.readbacks import COUNT, Readbacks
 from rig.wire.messages import (
     LOWEST_VERSION,
     Answer,
@@ -89,7 +89,9 @@ class CanCodec:
         if isinstance(message, Output):
             return self._encode_output(message)
         if isinstance(message, Readback):
-            return self._encode_readback(message)
+            self._streaming()
+            DaqRefused.raise_if(not self._continues, "a readback is sent in version 2 of the protocol")
+            return self._readbacks.frames(message.first, message.counts)
         if isinstance(message, Request | Answer):
             kind = FrameKind.REQUEST if isinstance(message, Request) else FrameKind.ANSWER
             return [Frame(self._identifiers[kind, 0], self._command.pack(*message))]
@@ -123,12 +125,6 @@ class CanCodec:
             data = self._index.pack(message.first & 0xFFFFFFFF)
             return [Frame(self._identifiers[FrameKind.OUTPUT_INDEX, 0], data), *frames]
         return frames
-
-    def _encode_readback(self, message: Readback) -> list[Frame]:
-        self._streaming()
-        if not self._continues:
-            raise DaqRefused("a readback is sent in version 2 of the protocol")
-        return self._readbacks.frames(message.first, message.counts)
 
     def forget_told(self) -> None:
         """Note that frames of an output were not sent: what they told may not have arrived."""

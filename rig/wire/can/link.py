@@ -4,10 +4,10 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-from rig.wire.can.blocks import check_stream
+from rig.wire.can.blocks import check_stream, pieces_of
 from rig.wire.can.bus import FrameBus
 from rig.wire.can.codec import CanCodec
-from rig.wire.can.frames import BusTiming, frame_seconds, padded_length
+from rig.wire.can.frames import BusTiming, frame_seconds
 from rig.wire.can.periods import TOLD_EVERY_S
 from rig.wire.can.protocol import Shape, protocol
 from rig.wire.can.readbacks import Readbacks
@@ -24,19 +24,6 @@ class Traffic(NamedTuple):
     """Of the bus's time."""
 
 
-def frame_lengths(shape: Shape, block: int, outputs: bool) -> list[int]:
-    """Bytes of every frame that a block takes, samples or outputs."""
-    rows = shape.output_rows if outputs else shape.rows
-    out = []
-    for first in range(0, block, rows):
-        for part in range(1 if outputs else shape.parts):
-            columns = shape.columns(part)
-            width = 1 if outputs else columns.stop - columns.start
-            n_bytes = shape.header + 2 * width * min(rows, block - first)
-            out.append(padded_length(n_bytes) if shape.fd else n_bytes)
-    return out
-
-
 def traffic(
     shape: Shape, stream: Stream, bit_rate_hz: float, data_bit_rate_hz: float, version: int = VERSION
 ) -> list[Traffic]:
@@ -45,22 +32,24 @@ def traffic(
     Periods are told as often as they may be, and one block in twenty is counted as late, with its readback.
     """
     blocks_hz = stream.rate_hz / stream.block
-    out = []
-    for name, outputs in (("samples", False), ("outputs", True)):
-        lengths = frame_lengths(shape, stream.block, outputs)
-        seconds = sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
-        out.append(Traffic(name, blocks_hz * len(lengths), blocks_hz * seconds))
-    groups, wrap = len(frame_lengths(shape, stream.block, False)) // shape.parts, shape.wrap
-    beats_hz = HEARTBEATS_HZ + _marks_hz(blocks_hz, groups, wrap)
+
+    def seconds(lengths: list[int]) -> float:
+        return sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
+
+    out, marks_hz = [], []
+    for name, outputs, wrap in (("samples", False, shape.wrap), ("outputs", True, shape.output_wrap)):
+        pieces = pieces_of(shape, stream.block, outputs)
+        lengths = [piece.n_bytes for group in pieces for piece in group]
+        out.append(Traffic(name, blocks_hz * len(lengths), blocks_hz * seconds(lengths)))
+        marks_hz.append(_marks_hz(blocks_hz, len(pieces), wrap))
+    beats_hz = HEARTBEATS_HZ + marks_hz[0]
     out.append(Traffic("heartbeats", beats_hz, beats_hz * frame_seconds(8, False, bit_rate_hz)))
-    marks_hz = _marks_hz(blocks_hz, len(frame_lengths(shape, stream.block, True)), shape.output_wrap)
-    out.append(Traffic("indices", marks_hz, marks_hz * frame_seconds(4, False, bit_rate_hz)))
+    out.append(Traffic("indices", marks_hz[1], marks_hz[1] * frame_seconds(4, False, bit_rate_hz)))
     if version > LOWEST_VERSION:
         periods_hz = min(blocks_hz, 1.0 / TOLD_EVERY_S)
         out.append(Traffic("periods", periods_hz, periods_hz * frame_seconds(8, False, bit_rate_hz)))
         lengths, late_hz = Readbacks(0, stream.block, shape.fd).lengths(), LATE_SHARE * blocks_hz
-        seconds = sum(frame_seconds(length, shape.fd, bit_rate_hz, data_bit_rate_hz) for length in lengths)
-        out.append(Traffic("readbacks", late_hz * len(lengths), late_hz * seconds))
+        out.append(Traffic("readbacks", late_hz * len(lengths), late_hz * seconds(lengths)))
     return out
 
 

@@ -30,8 +30,7 @@ FD_WRAP = 256  # sequence numbers of CAN FD: one byte
 CLASSICAL_SAMPLES = 64  # identifiers of samples: 6 bits
 FD_PARTS = 8  # frames of a row, at most; chosen
 CLASSICAL_PARTS = 4  # frames of a row, at most; chosen: 16 sequence numbers are left
-CHANNELS_A_FRAME = {True: 31, False: 4}
-OUTPUTS_A_FRAME = {True: 31, False: 4}
+CHANNELS_A_FRAME = OUTPUTS_A_FRAME = {True: 31, False: 4}
 HEADER = {True: 2, False: 0}
 FD_ROWS = 31  # int16 in a frame of 64 bytes behind the header
 
@@ -115,8 +114,10 @@ def definition(n_channels: int, fd: bool, version: int = VERSION) -> str:
         messages.append(_message(0x100 + 16 * index, f"Output_{index:02d}", "Host", outputs, False))
     head = _unsigned(sequence=8, flags=8) if fd else []
     for index in range(shape.parts if fd else shape.wrap * shape.parts):
-        counts = _counts(shape, index % shape.parts)
-        messages.append(_message(0x300 + 16 * index, f"Samples_{index:02d}", "Device", head + counts, fd))
+        columns = range(n_channels)[shape.columns(index % shape.parts)]
+        names = (f"channel_{channel}" + f"_sample_{row}" * fd for row in range(shape.rows) for channel in columns)
+        signals = head + [(name, 16, True) for name in names]
+        messages.append(_message(0x300 + 16 * index, f"Samples_{index:02d}", "Device", signals, fd))
     return (
         _HEAD.format(version)
         + "\n".join(text for text, _ in messages)
@@ -136,12 +137,6 @@ _FORMATS = (
 
 def _unsigned(**bits: int) -> list[tuple[str, int, bool]]:
     return [(name, length, False) for name, length in bits.items()]
-
-
-def _counts(shape: Shape, part: int) -> list[tuple[str, int, bool]]:
-    columns = range(shape.n_channels)[shape.columns(part)]
-    names = (f"channel_{channel}" + f"_sample_{row}" * shape.fd for row in range(shape.rows) for channel in columns)
-    return [(name, 16, True) for name in names]
 
 
 def _message(frame_id: int, name: str, sender: str, signals: list[tuple[str, int, bool]], fd: bool) -> tuple[str, str]:
@@ -188,7 +183,8 @@ class Protocol:
         for name, message in self.layout.messages.items():
             base, _, number = name.partition("_")
             kind = FrameKind(base)
-            out[self._shifted(kind, message.frame_id)] = (kind, int(number or 0))
+            node = 0 if kind is FrameKind.EMERGENCY_STOP else self.node
+            out[message.frame_id + node] = (kind, int(number or 0))
         return out
 
     @cached_property
@@ -211,9 +207,6 @@ class Protocol:
     def packing(self, kind: FrameKind) -> Struct:
         """Packs the signals of a message without numbers."""
         return Struct(self.layout.messages[kind.value].format)
-
-    def _shifted(self, kind: FrameKind, frame_id: int) -> int:
-        return frame_id if kind is FrameKind.EMERGENCY_STOP else frame_id + self.node
 
 
 def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None) -> Protocol:
@@ -248,5 +241,4 @@ def protocol(n_channels: int, fd: bool, node: int, dbc: str | Path | None = None
 
 
 def _short(one: str, other: str) -> str:
-    """The words of one line that the other has not."""
     return " ".join(word for word in one.split() if word not in other.split()) or "in another order"

@@ -5,6 +5,7 @@ import numpy as np
 from rig.wire.can.frames import Frame, padded_length
 
 COUNT = np.dtype("<i2")
+"""A count in a frame."""
 INDEX_SIZE = 2  # bytes
 INDICES = 1 << 16  # a frame has 16 bits for the index of a count
 COUNTS_A_FRAME = {True: 31, False: 3}

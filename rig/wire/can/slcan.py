@@ -197,7 +197,6 @@ class SlcanBus(FrameBus):
                 return
 
     def _obey(self) -> None:
-        """As an adapter, carry out the commands of the other end."""
         while self._lines.commands:
             command = self._lines.commands.popleft()
             if not self._adapter:

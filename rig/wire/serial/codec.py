@@ -26,9 +26,8 @@ LARGEST_PAYLOAD = 65_536
 REQUEST, ANSWER, SAMPLES, OUTPUT, HEARTBEAT, EMERGENCY_STOP, READBACK = range(1, 8)  # second byte of a payload
 LASTING = (REQUEST, ANSWER, EMERGENCY_STOP)  # the same in every version, so that versions can be agreed on
 
-SPOKEN = range(
-    LOWEST_VERSION, VERSION + 1
-)  # their heartbeats are alike; a device that was reset begins with the lowest
+SPOKEN = range(LOWEST_VERSION, VERSION + 1)
+"""Versions whose heartbeats are alike; a device that was reset begins with the lowest."""
 
 HEADER_SIZE = 4  # version, type, sequence: the first three fields of each of these
 COMMAND = struct.Struct("<BBHBBBBI")  # number; command or status; parameter; item; value
@@ -84,8 +83,7 @@ class Codec:
 
         Raises `DaqRefused` for counts other than 16 or 32 bits and for blocks that no frame holds.
         """
-        if stream.bits not in (16, 32):
-            raise DaqRefused(f"counts of {stream.bits} bits: allowed is 16 or 32")
+        DaqRefused.raise_if(stream.bits not in (16, 32), f"counts of {stream.bits} bits: allowed is 16 or 32")
         samples_size, output_size, readback_size = self.sizes(stream, self.version)
         if samples_size > LARGEST_PAYLOAD:
             raise DaqRefused(
@@ -120,13 +118,19 @@ class Codec:
                 dropped = MOST_DROPPED
             head = SAMPLES_HEAD.pack(self.version, SAMPLES, sequence & 0xFFFF, first, clock_us, dropped, flags)
             return head + counts.tobytes()
-        if isinstance(message, Output | Readback):
-            return self._head(message) + self._fitted(message.counts, self._output_shape).tobytes()
         version = self.version
-        if isinstance(message, Request):
-            return COMMAND.pack(version, REQUEST, 0, *message)
-        if isinstance(message, Answer):
-            return COMMAND.pack(version, ANSWER, 0, *message)
+        if isinstance(message, Output | Readback):
+            kind, form = OUTPUT, OUTPUT_HEAD
+            rest: tuple[int, ...] = ()
+            if isinstance(message, Readback):
+                kind, form = READBACK, READBACK_HEAD
+                DaqRefused.raise_if(version == LOWEST_VERSION, "a readback is sent in version 2 of the protocol")
+            elif version > LOWEST_VERSION:
+                form, rest = PERIODIC_HEAD, (message.period, message.ramp)
+            data = form.pack(version, kind, message.sequence & 0xFFFF, message.first, *rest)
+            return data + self._fitted(message.counts, self._output_shape).tobytes()
+        if isinstance(message, Request | Answer):
+            return COMMAND.pack(version, REQUEST if isinstance(message, Request) else ANSWER, 0, *message)
         if isinstance(message, Heartbeat):
             state, flags, boot, samples, dropped = message
             dropped = min(dropped, MOST_DROPPED)
@@ -134,16 +138,6 @@ class Codec:
         if isinstance(message, EmergencyStop):
             return STOP.pack(version, EMERGENCY_STOP, 0, message.reason)
         raise TypeError(f"{message!r} is no message")
-
-    def _head(self, message: Output | Readback) -> bytes:
-        version, sequence = self.version, message.sequence & 0xFFFF
-        if isinstance(message, Output):
-            if version == LOWEST_VERSION:
-                return OUTPUT_HEAD.pack(version, OUTPUT, sequence, message.first)
-            return PERIODIC_HEAD.pack(version, OUTPUT, sequence, message.first, message.period, message.ramp)
-        if version == LOWEST_VERSION:
-            raise DaqRefused("a readback is sent in version 2 of the protocol")
-        return READBACK_HEAD.pack(version, READBACK, sequence, message.first)
 
     def decode(self, payload: bytes) -> Message:
         """Decode a payload into a message. Arrays of counts are views of the payload, not copies. Raises only `Malformed`."""
@@ -158,7 +152,9 @@ class Codec:
             counts = np.ndarray(self._shape, self._counts, payload, SAMPLES_HEAD.size)
             return Samples(first, counts, flags, dropped, clock_us, sequence)
         if kind == OUTPUT and size == self._output_size:
-            return self._output(payload)
+            head = PERIODIC_HEAD if self._readback_size else OUTPUT_HEAD  # of the version agreed on with the stream
+            _, _, sequence, first, *goes_on = head.unpack_from(payload)
+            return Output(first, np.ndarray(self._output_shape, self._counts, payload, head.size), sequence, *goes_on)
         if kind == READBACK and size == self._readback_size and size:
             _, _, sequence, first = READBACK_HEAD.unpack_from(payload)
             return Readback(first, np.ndarray(self._output_shape, self._counts, payload, READBACK_HEAD.size), sequence)
@@ -172,13 +168,6 @@ class Codec:
         if kind == EMERGENCY_STOP and size == STOP.size:
             return EmergencyStop(STOP.unpack(payload)[3])
         raise Malformed(f"type {kind} with {size} bytes")
-
-    def _output(self, payload: bytes) -> Output:
-        head = (
-            PERIODIC_HEAD if self._readback_size else OUTPUT_HEAD
-        )  # of the version that the stream was agreed on with
-        _, _, sequence, first, *goes_on = head.unpack_from(payload)
-        return Output(first, np.ndarray(self._output_shape, self._counts, payload, head.size), sequence, *goes_on)
 
     def _fitted(self, counts: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         if counts.shape == shape and counts.dtype is self._counts and self._samples_size:

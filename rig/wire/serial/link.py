@@ -15,7 +15,7 @@ from rig.wire.messages import HEARTBEATS_HZ, VERSION, Message, Output, Readback,
 from rig.wire.serial.codec import HEARTBEAT_BODY, Codec
 from rig.wire.serial.frames import FrameReader, frame, largest_frame
 from rig.wire.serial.port import is_pseudo_terminal
-from rig.wire.serial.reading import Input, NoInput, PolledInput, TimedInput
+from rig.wire.serial.reading import Input, PolledInput, TimedInput
 
 BITS_A_BYTE = 10  # 8N1: start, eight bits, stop
 
@@ -42,28 +42,28 @@ def line_load(stream: Stream, baud: int | None, version: int = VERSION) -> Load:
 
 
 STREAMED = (Samples, Output, Readback)
-PATIENCE_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
+WRITE_TIMEOUT_S = 0.1  # for a line that takes no more bytes; far beyond what a working one needs
 
 
 class SerialLink(Link):
     """One end of a serial line.
 
-    A write that the line does not take within ``patience_s`` raises `DaqTimeout`; what has been begun of a frame is finished
-    first, so that the other end sees whole frames. Not to be used from two threads at a time.
+    A write that the line does not take within ``write_timeout_s`` raises `DaqTimeout`; what has been begun of a frame is
+    finished first, so that the other end sees whole frames. Not to be used from two threads at a time.
 
     All that there is, is read at a time, and may be many frames. On Linux and macOS; Windows gives no descriptors, and `open`
     says so.
     """
 
     def __init__(
-        self, name: str, opener: Callable[[ExitStack], tuple[int, Input]], baud: int, patience_s: float
+        self, name: str, opener: Callable[[ExitStack], tuple[int, Input]], baud: int, write_timeout_s: float
     ) -> None:
         super().__init__(name)
         self._opener = opener
         self._baud = baud
-        self._patience_s = patience_s
+        self._write_timeout_s = write_timeout_s
         self._descriptor = -1
-        self._input: Input = NoInput()
+        self._input: Input = Input()
         self._held = ExitStack()
         self._codec = Codec()
         self._reader = FrameReader(self._codec, self.counters)
@@ -72,7 +72,7 @@ class SerialLink(Link):
         self.counters["unsent_frames"] = 0
 
     @classmethod
-    def port(cls, path: str, baud: int, patience_s: float = PATIENCE_S) -> Self:
+    def port(cls, path: str, baud: int, write_timeout_s: float = WRITE_TIMEOUT_S) -> Self:
         """The host's end: a serial port by its name, or the far end of a pseudo-terminal."""
 
         def opened(held: ExitStack) -> tuple[int, Input]:
@@ -84,10 +84,10 @@ class SerialLink(Link):
             held.callback(os.close, writer)
             return writer, TimedInput(port.fileno())
 
-        return cls(path, opened, baud, patience_s)
+        return cls(path, opened, baud, write_timeout_s)
 
     @classmethod
-    def on(cls, descriptor: int, name: str, baud: int = 0, patience_s: float = 0.0) -> Self:
+    def on(cls, descriptor: int, name: str, baud: int = 0, write_timeout_s: float = 0.0) -> Self:
         """A descriptor that is open already and stays the caller's, such as the near end of a pseudo-terminal."""
 
         def opened(held: ExitStack) -> tuple[int, Input]:
@@ -95,7 +95,7 @@ class SerialLink(Link):
             held.callback(waiting.close)
             return descriptor, waiting
 
-        return cls(name, opened, baud, patience_s)
+        return cls(name, opened, baud, write_timeout_s)
 
     def open(self) -> None:
         """Open the port and forget what it still held; nothing is sent."""
@@ -159,7 +159,7 @@ class SerialLink(Link):
 
     def close(self) -> None:
         """Close the port."""
-        self._descriptor, self._input = -1, NoInput()
+        self._descriptor, self._input = -1, Input()
         self._received.clear()
         self._unfinished = b""
         with suppress(Exception):  # errors of a vanished port differ by system, and the port is gone in any case
@@ -175,7 +175,7 @@ class SerialLink(Link):
 
     def _send_slowly(self, data: bytes, written: int) -> None:
         old = len(self._unfinished)
-        deadline = time.monotonic() + self._patience_s
+        deadline = time.monotonic() + self._write_timeout_s
         while written < len(data) and (left_s := deadline - time.monotonic()) > 0.0:
             try:
                 select((), (self._descriptor,), (), left_s)

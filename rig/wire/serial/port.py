@@ -86,11 +86,11 @@ def open_port(path: str, baud: int) -> serial.Serial:
     except (OSError, ValueError, OverflowError, termios.error) as error:
         raise _refusal(path, baud, error) from error
     try:
-        with suppress(
-            ValueError, OSError
-        ):  # some adapters otherwise hold bytes back for 16 ms; others have no such setting
+        # some adapters otherwise hold bytes back for 16 ms; others have no such setting
+        with suppress(ValueError, OSError):
             port.set_low_latency_mode(True)
-        _no_bytes_means_gone(port.fileno())
+        os.set_blocking(port.fileno(), False)
+        wait_of_a_read(port.fileno(), 1, 0)  # a read without input raises EAGAIN: 0 bytes mean that the port is gone
         port.reset_input_buffer()
     except (OSError, termios.error) as error:
         port.close()
@@ -106,14 +106,10 @@ def second_descriptor(path: str) -> int:
         raise _refusal(path, 0, error) from error
 
 
-def _no_bytes_means_gone(descriptor: int) -> None:
-    """Set VMIN = 1: a read without input raises EAGAIN, so a read of 0 bytes means that the port is gone."""
-    os.set_blocking(descriptor, False)
-    wait_of_a_read(descriptor, 1, 0)
-
-
 def _refusal(path: str, baud: int, error: Exception) -> DaqError:
-    number = _number_of(error)
+    cause = error.__context__  # pyserial drops the number of a termios error
+    is_of_termios = isinstance(cause, termios.error) and bool(cause.args)
+    number = int(cause.args[0]) if cause and is_of_termios else getattr(error, "errno", None)
     if number in BUSY:
         return DaqBusy(f"port {path!r}: somebody else holds it; close the other program")
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO):
@@ -130,11 +126,3 @@ def _refusal(path: str, baud: int, error: Exception) -> DaqError:
     if number is None:
         return DaqRefused(f"port {path!r} at {baud} baud: {error}")
     return DaqRefused(f"port {path!r}: it cannot be opened as a serial port: {error}")
-
-
-def _number_of(error: BaseException) -> int | None:
-    """The system's error number; pyserial drops that of a termios error, so it is taken from the cause."""
-    cause = error.__context__
-    if isinstance(cause, termios.error) and cause.args:
-        return int(cause.args[0])
-    return getattr(error, "errno", None)

@@ -7,7 +7,6 @@ An input's ``read(timeout_s)`` returns up to `CHUNK` bytes as soon as there are 
 import errno
 import os
 import select
-from typing import Protocol
 
 CHUNK = 4096
 """Most bytes of a read: a pseudo-terminal holds no more."""
@@ -33,22 +32,15 @@ def wait_of_a_read(descriptor: int, least_bytes: int, tenths_s: int) -> None:
     termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
 
 
-class Input(Protocol):
-    """What a link reads from."""
+class Input:
+    """What a link reads from; this one is a port that is not open."""
 
     def read(self, timeout_s: float) -> bytes:
-        """Bytes that have arrived within the time."""
-
-
-class NoInput:
-    """Input of a port that is not open: every read raises."""
-
-    def read(self, timeout_s: float) -> bytes:
-        """Raise `OSError`."""
+        """Bytes that have arrived within the time. Raise `OSError` once there are none to come."""
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
 
 
-class PolledInput:
+class PolledInput(Input):
     """Waits for any descriptor, then reads it; sets the descriptor to non-blocking.
 
     The wait is edge-triggered, which costs the system less. Every wait is followed by a read, so that no bytes that have
@@ -87,7 +79,7 @@ class PolledInput:
             epoll.close()
 
 
-class TimedInput:
+class TimedInput(Input):
     """A terminal whose reads wait in the system for up to 0.1 s (VMIN = 0, VTIME = 1): one call per block.
 
     A read of no bytes is either that time-out or a port that is gone; a further call tells which. The descriptor blocks, so

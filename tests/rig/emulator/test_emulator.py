@@ -21,7 +21,7 @@ from rig.drivers import make_daq
 from rig.drivers.can import CanOptions
 from rig.emulator import VirtualPlant, Wiring
 from rig.emulator.emulated import Emulator, emulated
-from rig.emulator.plant import LoggedPlant
+from rig.emulator.plant import OutputLog
 from rig.emulator.ports import device_end
 from rig.emulator.process import Ready
 from rig.emulator.settings import EmulatorSettings
@@ -265,7 +265,8 @@ def test_a_full_disk_is_one_line_and_a_log_that_ends_does_not_end_the_device(tmp
     with refused(ConfigurationError, "bench-file-dev-full-cannot-be"):
         _write_bench(Path("/dev/full"), "base")
     with refused(ConfigurationError, "cannot-be-written", field="log_output"):
-        LoggedPlant(VirtualPlant(bench_with()), tmp_path / "no" / "log")
-    plant = LoggedPlant(VirtualPlant(bench_with()), Path("/dev/full"))
+        OutputLog(tmp_path / "no" / "log")
+    plant = VirtualPlant(bench_with())
+    plant.log = OutputLog(Path("/dev/full"))
     for _ in range(3):
         assert plant.step(np.zeros(5))[0].shape == (5, 4)

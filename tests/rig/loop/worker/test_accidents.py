@@ -15,7 +15,8 @@ import rig.loop.worker.session
 from rig.errors import DaqError, RecordingError
 from rig.loop.worker.loop import WallClockLoop
 from rig.loop.worker.memory import PUBLISHED, Layout, SharedMemory, anonymous_file, packed
-from rig.loop.worker.process import _presumed_latency, _shared
+from rig.loop.worker.process import _shared
+from rig.loop.worker.queue_choice import presumed_latency, queue_of
 from rig.loop.worker.session import WorkerSession
 from rig.loop.worker.spawn import Worker
 from rig.tick.safety.layout import GuardMode
@@ -174,7 +175,7 @@ def test_the_ring_has_room_for_the_ramp_and_what_is_under_way_in_the_device():
     bench = slow_bench(queue_blocks=8)
     daq = NotingDAQ(bench)
     daq.open()
-    presumed = _presumed_latency(daq, bench)
+    presumed = presumed_latency(daq, bench, queue_of(bench))
     layout, _ = _shared(daq, tone(bench, 1.0), presumed, 1.0, anonymous_file())
     daq.start(bench.block)
     assert presumed >= daq.latency_samples > 80

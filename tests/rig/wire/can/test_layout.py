@@ -1,5 +1,6 @@
 """Compiled layouts against cantools, on the shipped definitions and on files of others."""
 
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -67,29 +68,19 @@ def test_random_frames_decode_to_the_values_of_cantools(n_channels: int, fd: boo
         assert wanted.is_fd == ours.messages[wanted.name].fd
         data = rng.bytes(wanted.length)
         decoded = wanted.decode(data)
-        record = ours.messages[wanted.name].decode(data)
-        assert {name: record[name] for name in ours.messages[wanted.name].signals} == decoded
-        np.testing.assert_array_equal(ours.messages[wanted.name].physical(data), list(decoded.values()))
-        frames = [rng.bytes(wanted.length) for _ in range(3)]
-        each = [list(wanted.decode(frame).values()) for frame in frames]
-        np.testing.assert_array_equal(ours.messages[wanted.name].physical_values(frames), each)
-        for wrong in (data[:-1], data + b"x"):
-            with pytest.raises(ValueError, match="different structures"):
-                ours.messages[wanted.name].physical(wrong)
+        message = ours.messages[wanted.name]
+        record = np.frombuffer(data, message.dtype)[0]
+        assert {name: record[name] for name in message.signals} == decoded
+        assert dict(zip(message.signals, struct.unpack(message.format, data), strict=True)) == decoded
 
 
-def test_other_files_with_scales_floats_and_big_endian_signals_decode_as_cantools_does() -> None:
+def test_other_files_with_floats_and_big_endian_signals_decode_as_cantools_does() -> None:
     ours, theirs = compile_text(FOREIGN).messages["Mixed"], cantools.database.load_string(FOREIGN, "dbc")
     rng = np.random.default_rng(4)
     for _ in range(50):
         data = rng.bytes(16) + np.float32(rng.normal()).tobytes() + bytes(4)
-        decoded = theirs.decode_message("Mixed", data)
-        values = [decoded[name] for name in ours.signals]
-        np.testing.assert_allclose(ours.physical(data), values, rtol=1e-15)
-        np.testing.assert_allclose(ours.physical_values([data, data]), [values, values], rtol=1e-15)
         raw = theirs.decode_message("Mixed", data, scaling=False)
-        values = [raw[name] for name in ours.signals]
-        assert ours.encode(*values)[: len(data) - 4] == data[:3] + b"\0" + data[4:-4]  # the byte of no signal is 0
+        assert np.frombuffer(data, ours.dtype)[0].tolist() == tuple(raw[name] for name in ours.signals)
 
 
 @pytest.mark.parametrize(

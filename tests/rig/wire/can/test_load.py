@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from rig.wire.can.blocks import pieces_of
 from rig.wire.can.codec import CanCodec
 from rig.wire.can.frames import frame_seconds
-from rig.wire.can.link import bus_load, frame_lengths, traffic
+from rig.wire.can.link import bus_load, traffic
 from rig.wire.can.protocol import protocol, shape_of
 from rig.wire.messages import Heartbeat, Output, Readback, Samples, Stream
 
@@ -50,10 +51,14 @@ def test_can_fd_at_five_kilohertz_loads_the_bus_as_documented(
 
 
 def test_the_frames_of_a_block_are_those_that_the_codec_sends() -> None:
-    assert frame_lengths(shape_of(4, True), 10, False) == [64, 32]
-    assert frame_lengths(shape_of(4, True), 10, True) == [24]
-    assert frame_lengths(shape_of(6, False), 2, False) == [6, 6, 6, 6]
-    assert frame_lengths(shape_of(4, False), 5, True) == [8, 2]
+    for n_channels, fd, block, outputs, lengths in (
+        (4, True, 10, False, [64, 32]),
+        (4, True, 10, True, [24]),
+        (6, False, 2, False, [6, 6, 6, 6]),
+        (4, False, 5, True, [8, 2]),
+    ):
+        pieces = pieces_of(shape_of(n_channels, fd), block, outputs)
+        assert [piece.n_bytes for group in pieces for piece in group] == lengths
 
 
 def test_the_sum_is_said() -> None:
