@@ -55,13 +55,10 @@ class Walk:
         units = self._units(v)
         along = np.zeros(v.size)
         along[-1] = np.copysign(1.0, direction)
-        tangent = self._tangent(v, units, along)
+        tangent = tangent_of(self._bordered(v, units, along)[1])
         if tangent is None:
             raise IdentificationError(f"the curve turns back just where it begins, at {v[-1]:g}", field="parameter")
         return Point(v, units, tangent)
-
-    def _tangent(self, v: Float, units: Float, along: Float) -> Float | None:
-        return tangent_of(self._bordered(v, units, along)[1])
 
     def corrected(self, point: Point, length: float) -> Point | None:
         """Correct the prediction ``length`` along the tangent of ``point``; return None if Newton's method fails."""
@@ -102,7 +99,8 @@ class Walk:
 
     def beyond_kink(self, last: Point) -> Point | None:
         """Return the same point with the tangent of the curve just ahead, which differs from its own at a kink."""
-        along = self._tangent(last.ahead(_AHEAD * self._steps.smallest), last.units, last.tangent)
+        ahead = last.ahead(_AHEAD * self._steps.smallest)
+        along = tangent_of(self._bordered(ahead, last.units, last.tangent)[1])
         return None if along is None else Point(last.v, last.units, along)
 
     def passes(self, first: Point, last: Point, step: float) -> bool:
@@ -127,7 +125,7 @@ class Walk:
         if z is None:
             return None
         v = np.append(z, value)
-        tangent = self._tangent(v, last.units, new.tangent)
+        tangent = tangent_of(self._bordered(v, last.units, new.tangent)[1])
         return None if tangent is None else Point(v, last.units, tangent)
 
     def turn(self, last: Point, step: float) -> Float | None:

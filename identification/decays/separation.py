@@ -111,7 +111,8 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
         new = _followed(data, rate_hz, float(peak), asked=False)
         if new is None or any(other.track.overlaps(new.track) for other in found):
             continue
-        of = next(((other, order) for other in found if (order := _harmonic(other.track, new.middle_hz))), None)
+        pairs = ((other, order) for other in found for order in range(2, _HIGHEST_HARMONIC + 1))
+        of = next((pair for pair in pairs if pair[0].track.holds(new.middle_hz, pair[1])), None)
         if of is None:
             found.append(new)
         else:
@@ -121,11 +122,6 @@ def _modes(data: Float, rate_hz: float, near_hz: Sequence[float] | None) -> tupl
                 "told from it"
             )
     return found, notes
-
-
-def _harmonic(track: Track, frequency_hz: float) -> int:
-    orders = range(2, _HIGHEST_HARMONIC + 1)
-    return next((order for order in orders if track.holds(frequency_hz, order)), 0)
 
 
 def _followed(data: Float, rate_hz: float, near_hz: float, *, asked: bool) -> _Found | None:

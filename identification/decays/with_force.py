@@ -80,7 +80,8 @@ def decay_with_force(
     residual_std_m_n
         Standard error of the slow flow's receptance of the other modes, m/N; likewise.
     """
-    quiet = _quiet(flow)
+    # variance of the noise of ``g X`` from the force alone, (m/s^2)^2, where the vibration is gone
+    quiet = float(np.median(flow.force_noise[-max(4, flow.time_s.size // 4) :])) / _MEDIAN
     decay = _decay(flow, start_s, stop_s, quiet)
     size = decay.amplitude_m
     levels = np.geomspace(size[0], size[-1], number + 2)[1:-1]
@@ -106,11 +107,6 @@ def decay_with_force(
     chosen = [found for n in keep if (found := tables[best[n]][n]) is not None]
     bounds = np.array([errors[best[n], n] for n in keep])
     return _mode(decay, chosen, bounds, drive_mode_shape_std, residual_std_m_n)
-
-
-def _quiet(flow: SlowFlow) -> float:
-    """Variance of the noise of ``g X`` from the force alone, (m/s^2)^2, where the vibration is gone."""
-    return float(np.median(flow.force_noise[-max(4, flow.time_s.size // 4) :])) / _MEDIAN
 
 
 def _decay(flow: SlowFlow, start_s: float, stop_s: float | None, quiet: float) -> SlowFlow:

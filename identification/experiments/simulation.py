@@ -7,10 +7,6 @@ import numpy as np
 from vibrolock.arrays import Float
 
 
-def _nothing() -> Float:
-    return np.zeros(0)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Simulation:
     """A simulated run of any model, alone or with an exciter.
@@ -39,9 +35,9 @@ class Simulation:
     outputs: Float
     states: Float
     state_use: Float
-    input_use: Float = field(default_factory=_nothing)
+    input_use: Float = field(default_factory=lambda: np.zeros(0))
     unbounded_at: int | None = None
-    force_n: Float = field(default_factory=_nothing)
+    force_n: Float = field(default_factory=lambda: np.zeros(0))
     passes: int = 0
     change: float = float("nan")
     notes: tuple[str, ...] = ()

@@ -1,6 +1,6 @@
 """Records over time that somebody else has measured: channels, samples, periods, levels."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -130,9 +130,4 @@ class TimeRecords(Result):
                 (level for level in found if level == record.level or np.isnan([level, record.level]).all()), None
             )
             found.setdefault(record.level if key is None else key, []).append(record)
-        return {level: self.with_records(tuple(some)) for level, some in found.items()}
-
-    def with_records(self, records: tuple[TimeRecord, ...]) -> "TimeRecords":
-        """Return it with other records."""
-        kept = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "records"}
-        return TimeRecords(records=records, **kept)
+        return {level: replace(self, records=tuple(some)) for level, some in found.items()}

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.channels import chosen_rows, find_role
 from identification.errors import IdentificationError
@@ -70,7 +69,10 @@ def time_spectra(records: TimeRecords) -> PeriodicSpectra:
     )
     check_periods(records)
     periods = min(record.samples.shape[1] for record in records.records) // size
-    lines = np.array([_lines(record.samples[:, -periods * size :], size) for record in records.records])
+    kept = [
+        record.samples[:, -periods * size :].reshape(len(record.samples), periods, size) for record in records.records
+    ]
+    lines = np.array([np.moveaxis(np.fft.rfft(one, axis=-1) * (2.0 / size), 0, 1) for one in kept])  # peak amplitudes
     frequency = np.arange(lines.shape[-1]) * records.sample_rate_hz / size
     names = [channel.name for channel in records.channels]
     row = names.index(records.instrument) if records.instrument else find_role(records.channels, "force")
@@ -89,9 +91,3 @@ def time_spectra(records: TimeRecords) -> PeriodicSpectra:
         spectra=lines[..., band],
         notes=records.notes,
     )
-
-
-def _lines(samples: NDArray[np.float64], size: int) -> NDArray[np.complex128]:
-    """complex[n_periods, n_channels, n_lines], peak amplitudes, of float[n_channels, n_periods * size]."""
-    periods = samples.reshape(len(samples), -1, size)
-    return np.asarray(np.moveaxis(np.fft.rfft(periods, axis=-1) * (2.0 / size), 0, 1))

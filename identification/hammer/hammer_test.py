@@ -81,7 +81,17 @@ def hammer_test(
     channels, rate = tuple(channels), positive("sample_rate_hz", sample_rate_hz, "Hz")
     force = find_role(channels, "force")
     full_scale = dict(full_scale or {})
-    _check(channels, full_scale, estimator, decay_rate_1_s, record_s, pretrigger_s, trigger_n, force_window_s)
+    _check(channels, full_scale, estimator)
+    for name, length, unit in (
+        ("record_s", record_s, "s"),
+        ("trigger_n", trigger_n, "N"),
+        ("force_window_s", force_window_s, "s"),
+    ):
+        if length is not None:
+            positive(name, length, unit)
+    for name, value in (("decay_rate_1_s", decay_rate_1_s), ("pretrigger_s", pretrigger_s)):
+        if value is not None and not 0.0 <= value < np.inf:
+            raise IdentificationError(field=name, value=value, allowed="finite, 0 or above")
     data = [finite_array(f"records[{i}]", record, np.float64, 2) for i, record in enumerate(records)]
     for i, record in enumerate(data):
         if record.shape[0] != len(channels) or record.shape[1] < 16:
@@ -112,16 +122,7 @@ def hammer_test(
     )
 
 
-def _check(
-    channels: tuple[Channel, ...],
-    full_scale: Mapping[str, float],
-    estimator: str,
-    decay_rate_1_s: float | None,
-    record_s: float | None,
-    pretrigger_s: float | None,
-    trigger_n: float | None,
-    force_window_s: float | None,
-) -> None:
+def _check(channels: tuple[Channel, ...], full_scale: Mapping[str, float], estimator: str) -> None:
     if estimator not in ("H1", "H2", "Hv"):
         raise IdentificationError(field="estimator", value=estimator, allowed="H1, H2, Hv")
     known = [channel.name for channel in channels]
@@ -129,13 +130,6 @@ def _check(
         if name not in known:
             raise IdentificationError(f"'{name}' is none of the channels {', '.join(known)}", field="full_scale")
         positive(f"full_scale of {name}", value)
-    lengths = {"record_s": record_s, "trigger_n": trigger_n, "force_window_s": force_window_s}
-    for name, length in lengths.items():
-        if length is not None:
-            positive(name, length, "N" if name == "trigger_n" else "s")
-    for name, rate in {"decay_rate_1_s": decay_rate_1_s, "pretrigger_s": pretrigger_s}.items():
-        if rate is not None and not 0.0 <= rate < np.inf:
-            raise IdentificationError(field=name, value=rate, allowed="finite, 0 or above")
 
 
 def _band(
@@ -183,20 +177,17 @@ def _evaluated(
     cross = np.abs(np.sum(motions * np.conj(force)[:, None], axis=0)) ** 2
     power = np.sum(np.abs(force) ** 2, axis=0) * np.sum(np.abs(motions) ** 2, axis=0)
     left_out = [f"hit {block.hit.label} left out: {block.hit.fault}" for block in blocks if block.hit.fault]
-    window = (
-        [
+    if decay_rate_1_s:
+        left_out.append(
             f"exponential window of {decay_rate_1_s:.4g} 1/s: the peaks are lower than those of the structure, modes are not"
-        ]
-        if decay_rate_1_s
-        else []
-    )
+        )
     notes = [note for note in found.notes if "covariance" not in note]
     return HammerTest(
         channels=channels,
         sample_rate_hz=rate,
         record_s=blocks[0].samples.shape[-1] / rate,
         hits=tuple(block.hit for block in blocks),
-        responses=replace(found, decay_rate_1_s=decay_rate_1_s, specimen=specimen, notes=(*left_out, *window, *notes)),
+        responses=replace(found, decay_rate_1_s=decay_rate_1_s, specimen=specimen, notes=(*left_out, *notes)),
         coherence=np.clip(cross / np.maximum(power, 1e-300), 0.0, 1.0).T,
         force_n_s=np.sqrt(np.mean(np.abs(force) ** 2, axis=0)),
     )

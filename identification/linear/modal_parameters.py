@@ -44,14 +44,6 @@ def _residues(poles: Float, terms: Float, normal: bool) -> Complex:
     return np.asarray(terms[:, :count] + terms[:, count : 2 * count] * omega * (-zeta + 1j * np.sqrt(1.0 - zeta**2)))
 
 
-def _modes(poles: Float, terms: Float, drive: int, normal: bool) -> Float:
-    """Return frequencies (Hz), damping ratios and shapes row by row, in one vector."""
-    omega, zeta = np.split(poles[:-1], 2)
-    residues = _residues(poles, terms, normal)
-    shapes = (residues / np.sqrt(residues[drive])).real
-    return np.concatenate([omega / (2.0 * np.pi), zeta, shapes.ravel()])
-
-
 def accepted(fit: ModalFit, data: WeightedResponses, drive: int, *, normal: bool) -> tuple[list[str], Float]:
     """Return why each pole is not a mode (empty if it is one), and its prominence.
 
@@ -94,7 +86,11 @@ def as_linear_modes(
     parameters = np.concatenate([fit.poles, fit.terms.ravel()])
 
     def modes(values: Float) -> Float:
-        return _modes(values[:nonlinear], values[nonlinear:].reshape(rows, terms), drive, normal)
+        """Frequencies (Hz), damping ratios and shapes row by row, in one vector."""
+        poles = values[:nonlinear]
+        residues = _residues(poles, values[nonlinear:].reshape(rows, terms), normal)
+        shapes = (residues / np.sqrt(residues[drive])).real
+        return np.concatenate([poles[:count] / (2.0 * np.pi), poles[count:-1], shapes.ravel()])
 
     std = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     steps = np.maximum(1e-3 * std, 1e-9 * np.abs(parameters) + 1e-300)
@@ -154,7 +150,8 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
     for f, width in zip(frequency, bandwidth, strict=True):
         lines = np.count_nonzero(np.abs(data.frequency_hz - f) <= 0.5 * width)
         windowed = width + data.decay_rate_1_s / np.pi  # the peak as an exponential window broadens it
-        if windowed / _spacing(data, f) < _LINES_PER_BANDWIDTH:
+        above = int(np.clip(np.searchsorted(data.frequency_hz, f), 1, data.frequency_hz.size - 1))
+        if windowed / float(data.frequency_hz[above] - data.frequency_hz[above - 1]) < _LINES_PER_BANDWIDTH:
             notes.append(
                 f"mode at {f:.5g} Hz: half-power bandwidth {width:.3g} Hz holds {lines} lines; record longer periods for "
                 "a damping ratio to rely on"
@@ -175,9 +172,3 @@ def modal_notes(modes: LinearModes, data: WeightedResponses, converged: bool) ->
             f"misfit is {modes.fit_residual:.2f} times what its errors let expect: modes missing, or not linear at this level"
         )
     return notes
-
-
-def _spacing(data: WeightedResponses, frequency_hz: float) -> float:
-    """Spacing of the lines around a frequency, Hz."""
-    index = int(np.clip(np.searchsorted(data.frequency_hz, frequency_hz), 1, data.frequency_hz.size - 1))
-    return float(data.frequency_hz[index] - data.frequency_hz[index - 1])

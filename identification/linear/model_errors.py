@@ -105,7 +105,10 @@ def with_model_error(
     The squared difference beyond what the random errors allow is added as systematic variance. The fit by relative weights is
     returned if ``free``, else the one that was asked for.
     """
-    if data.covariance is None or not _distorted(data, fit):
+    if data.covariance is None:
+        return fit, data, []
+    share = data.std[:, :, 0] * fit.misfit / np.maximum(np.abs(data.value[:, :, 0]), 1e-300)
+    if not any(np.any(near) and np.median(share[near]) > _DISTORTED for near in _near_modes(data, fit)):
         return fit, data, []
     relative = relative_weights(data)
     other = fit_modes(relative, fit.poles, normal=normal)
@@ -142,11 +145,6 @@ def with_common_distortion(fit: ModalFit) -> ModalFit:
 def _variance(fit: ModalFit) -> Float:
     """float[m]: random variance of the parameters, with a misfit above 1."""
     return np.diag(fit.covariance) * fit.misfit**2
-
-
-def _distorted(data: WeightedResponses, fit: ModalFit) -> bool:
-    share = data.std[:, :, 0] * fit.misfit / np.maximum(np.abs(data.value[:, :, 0]), 1e-300)
-    return any(np.any(near) and np.median(share[near]) > _DISTORTED for near in _near_modes(data, fit))
 
 
 def _near_modes(data: WeightedResponses, fit: ModalFit) -> NDArray[np.bool_]:

@@ -17,8 +17,7 @@ import numpy as np
 from identification.errors import IdentificationError
 from identification.linear.accelerance import WeightedResponses, Weighting, weighted_responses
 from identification.linear.response_matrix import FrequencyResponseMatrix
-from identification.linear.subspace import StateSpace
-from identification.validation import positive
+from identification.linear.subspace import StateSpace, points_of
 from vibrolock.arrays import Complex, Float
 
 _FLAT = 1e-11
@@ -86,7 +85,7 @@ def fit_state_space(
         Largest number of iterations.
     """
     data = weighted_responses(responses, weighting)
-    z = _points(responses, sample_rate_hz)
+    z = points_of(responses, sample_rate_hz)
     _check(data, start)
     whitening = data.whitening
     n = start.a.shape[0]
@@ -104,7 +103,8 @@ def fit_state_space(
         strong = singular[kept]
         while damping < _MOST:
             move = right[kept].T @ (gradient * strong / (strong**2 + (damping * strong[0]) ** 2))
-            trial = _moved(model, -move / size)
+            parts = np.split(-move / size, np.cumsum([part.size for part in model])[:-1])
+            trial = StateSpace(*(p + s.reshape(p.shape) for p, s in zip(model, parts, strict=True)))
             if spectral_radius(trial.a) < 1.0:
                 new = scale * _whitened(whitening, trial.response(z) - data.value)
                 if (cost := float(new @ new)) <= costs[-1]:
@@ -151,21 +151,6 @@ def spectral_radius(a: Float) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(a)), initial=0.0))
 
 
-def _points(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Complex:
-    if responses.decay_rate_1_s:
-        raise IdentificationError(
-            field="decay_rate_1_s",
-            value=responses.decay_rate_1_s,
-            allowed="0",
-            hint="`linear_modes` takes such responses",
-        )
-    if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
-        raise IdentificationError(
-            field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"
-        )
-    return np.asarray(np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz))
-
-
 def _check(data: WeightedResponses, start: StateSpace) -> None:
     lines, outputs, inputs = data.value.shape
     n = start.a.shape[0]
@@ -193,12 +178,6 @@ def _whitened(whitening: Complex, values: Complex) -> Float:
     product = whitening @ values.reshape(lines, paths, -1)
     stacked = np.concatenate([product.real, product.imag]).reshape(2 * lines * paths, -1)
     return stacked[:, 0] if values.ndim == 3 else stacked
-
-
-def _moved(model: StateSpace, step: Float) -> StateSpace:
-    """Return the model with ``step`` added to its entries, in the order of `response_jacobian`."""
-    edges = np.cumsum([part.size for part in model])[:-1]
-    return StateSpace(*(p + s.reshape(p.shape) for p, s in zip(model, np.split(step, edges), strict=True)))
 
 
 def _residual(data: WeightedResponses, cost: float, free: int) -> float:

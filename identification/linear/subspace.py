@@ -115,6 +115,22 @@ def _root(covariance: Float) -> Float:
     return np.asarray(size[:, None] * np.linalg.cholesky(floored))
 
 
+def points_of(responses: FrequencyResponseMatrix, sample_rate_hz: float) -> Complex:
+    """complex[n_lines]: ``exp(2 pi i f / sample_rate_hz)``; raises `IdentificationError` for responses without such points."""
+    if responses.decay_rate_1_s:
+        raise IdentificationError(
+            field="decay_rate_1_s",
+            value=responses.decay_rate_1_s,
+            allowed="0",
+            hint="`linear_modes` takes such responses",
+        )
+    if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
+        raise IdentificationError(
+            field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"
+        )
+    return np.asarray(np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz))
+
+
 def subspace(
     responses: FrequencyResponseMatrix,
     order: int,
@@ -143,24 +159,13 @@ def subspace(
         (``auto``).
     """
     IdentificationError.unless_at_least("order", order, 1)
-    if responses.decay_rate_1_s:
-        raise IdentificationError(
-            field="decay_rate_1_s",
-            value=responses.decay_rate_1_s,
-            allowed="0",
-            hint="`linear_modes` takes such responses",
-        )
-    if responses.frequency_hz[-1] >= 0.5 * positive("sample_rate_hz", sample_rate_hz, "Hz"):
-        raise IdentificationError(
-            field="sample_rate_hz", value=sample_rate_hz, allowed=f"more than twice {responses.frequency_hz[-1]:g} Hz"
-        )
+    z = points_of(responses, sample_rate_hz)
     rows = order + 2 if block_rows is None else block_rows
     if (rows - 1) * len(responses.outputs) < order:
         raise IdentificationError(
             f"too few for order {order} of {len(responses.outputs)} outputs", field="block_rows", value=rows
         )
     data = weighted_responses(responses, weighting)
-    z = np.exp(2j * np.pi * responses.frequency_hz / sample_rate_hz)
     a, c = observable_space(data, z, rows).state_matrices(order)
     return _with_inputs(data, z, a, c)
 

@@ -4,19 +4,26 @@ Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2n
 samples is ``u(n) = sum_k A_k cos(2 pi k n / N + phi_k)`` with ``phi_k`` uniformly distributed over the circle. Its RMS is
 ``sqrt(sum A_k^2 / 2)``. The zero-order hold of the converter attenuates line f by ``sinc(f / sample rate)``; the design does
 not compensate for that.
+
+Detection lines are not excited (section 4.3): under odd excitation an even nonlinearity appears only at even lines, an odd one
+only at odd lines. A random few odd lines are therefore left out.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import IdentificationError
-from identification.multisine.grids import Grid, check_grid, excited_lines
 from identification.validation import finite_array, positive
 from vibrolock.arrays import Float
 
+Grid = Literal["full", "odd", "odd-random"]
+
+_GRID_KEY = 2**32 - 1
+"""Key of the random stream that chooses detection lines; no realisation has it."""
 _ROUNDING = 1e-9
 """Relative distance of a limit from a line within which it counts as on the line. Chosen: above rounding."""
 _LONGEST_PERIOD = 1e8  # samples; nearly a gigabyte
@@ -65,7 +72,13 @@ class MultisineDesign:
             positive(name, getattr(self, name), "Hz")
         positive("rms", self.rms)
         IdentificationError.unless_at_least("period_samples", self.period_samples, 3)
-        check_grid(self.grid, self.detection_group, self.grid_seed)
+        IdentificationError.unless_one_of("grid", self.grid, get_args(Grid))
+        if self.detection_group < 2:
+            raise IdentificationError(
+                field="detection_group", value=self.detection_group, allowed="at least 2 odd lines"
+            )
+        if self.grid_seed < 0:
+            raise IdentificationError(field="grid_seed", value=self.grid_seed, allowed="zero or more")
         if self.highest_hz < self.lowest_hz:
             raise IdentificationError(
                 field="highest_hz", value=self.highest_hz, allowed=f"lowest_hz = {self.lowest_hz:g} Hz"
@@ -161,8 +174,18 @@ class MultisineDesign:
 
     @cached_property
     def lines(self) -> NDArray[np.int64]:
-        """int[n_lines]: the excited lines, as multiples of the resolution."""
-        return excited_lines(self.band_lines, self.grid, self.detection_group, self.grid_seed)
+        """int[n_lines]: the excited lines, as multiples of the resolution; an incomplete last group is fully excited."""
+        if self.grid == "full":
+            return self.band_lines
+        odd: NDArray[np.int64] = self.band_lines[self.band_lines % 2 == 1]
+        if self.grid == "odd":
+            return odd
+        groups = odd.size // self.detection_group
+        if not groups:
+            return odd[:0]
+        random = np.random.default_rng(np.random.SeedSequence(self.grid_seed, spawn_key=(_GRID_KEY,)))
+        silent = np.arange(groups) * self.detection_group + random.integers(0, self.detection_group, groups)
+        return np.asarray(np.delete(odd, silent))
 
     @property
     def detection_lines_odd(self) -> NDArray[np.int64]:

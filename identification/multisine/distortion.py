@@ -21,7 +21,7 @@ from identification.channels import Channel, find_name
 from identification.errors import IdentificationError
 from identification.multisine.best_linear_approximation import best_linear_approximation
 from identification.multisine.spectra import PeriodicSpectra
-from vibrolock.arrays import Bool, Complex, Float
+from vibrolock.arrays import Bool, Float
 from vibrolock.results import Result
 
 Lines = Literal["excited", "odd", "even"]
@@ -101,7 +101,7 @@ def distortion_levels(
     outputs = [channel.name for channel in spectra.channels if channel.name not in {input, *instruments}]
     rows = [spectra.index(name) for name in outputs]
     found = best_linear_approximation(spectra, outputs=outputs, inputs=(input,), instruments=instruments)
-    linear = _interpolated(spectra.frequency_hz, found.frequency_hz, found.value[:, :, 0].T)
+    linear = np.array([np.interp(spectra.frequency_hz, found.frequency_hz, row) for row in found.value[:, :, 0].T])
     error = spectra.spectra[:, :, rows] - linear * spectra.spectra[:, :, [spectra.index(input)]]
     means = error.mean(axis=1)
     noise = np.sum(np.abs(error - means[:, None]) ** 2, axis=(0, 1)) / (realisations * periods * (periods - 1))
@@ -130,9 +130,3 @@ def _check_silence(spectra: PeriodicSpectra, instruments: Sequence[str]) -> None
                 f"instrument '{name}': has {amplitude[at] / np.max(amplitude):.2g} of its largest amplitude at "
                 f"{spectra.frequency_hz[at]:g} Hz, a line that the design does not excite; is the design what was played?"
             )
-
-
-def _interpolated(at_hz: Float, frequency_hz: Float, values: Complex) -> Complex:
-    return np.array(
-        [np.interp(at_hz, frequency_hz, row.real) + 1j * np.interp(at_hz, frequency_hz, row.imag) for row in values]
-    )

@@ -67,7 +67,12 @@ def estimated_responses(
     )
     error = (y - np.einsum("koi,rpik->rpok", value, u))[:, :, :, None] * weights[:, None]
     error = error.reshape(*y.shape[:2], len(rows) * len(columns), -1)
-    noise, total = _noise_covariance(error), _total_covariance(error, len(columns))
+    periods, means = error.shape[1], error.mean(axis=1)
+    # The total covariance is that of blocks of as many realisations as inputs.
+    blocks = means.reshape(-1, len(columns), *means.shape[1:]).sum(axis=1)[:, None]
+    count = blocks.shape[0]
+    noise = _products(error - means[:, None]) / (periods * (periods - 1)) if periods > 1 else None
+    total = _products(blocks) * (count / (count - 1)) if count > 1 else None
     return FrequencyResponseMatrix(
         outputs=tuple(channels[row] for row in rows),
         inputs=tuple(channels[column] for column in columns),
@@ -75,7 +80,7 @@ def estimated_responses(
         value=value,
         noise_covariance=noise,
         total_covariance=total,
-        deviations=np.moveaxis(error.mean(axis=1), -1, 0) if keep_deviations else None,
+        deviations=np.moveaxis(means, -1, 0) if keep_deviations else None,
         estimator=estimator,
         notes=(*_mixed([channels[row] for row in rows]), *_notes(error, len(columns))),
     )
@@ -156,23 +161,6 @@ def _weights(u: Complex, z: Complex, frequency_hz: Float, label: str) -> Complex
         )
     scaled = np.einsum("rojk,okji->roik", scaled_z, np.linalg.inv(cross))
     return np.asarray(scaled / size_u)
-
-
-def _noise_covariance(error: Complex) -> Complex | None:
-    """complex[n_lines, m, m]: noise covariance of the sum over realisations.
-
-    ``error`` is complex[n_realisations, n_periods, m, n_lines].
-    """
-    periods = error.shape[1]
-    return _products(error - error.mean(axis=1, keepdims=True)) / (periods * (periods - 1)) if periods > 1 else None
-
-
-def _total_covariance(error: Complex, inputs: int) -> Complex | None:
-    """complex[n_lines, m, m]: total covariance of the sum, from the scatter of blocks of as many realisations as inputs."""
-    means = error.mean(axis=1)
-    blocks = means.reshape(-1, inputs, *means.shape[1:]).sum(axis=1)[:, None]
-    count = blocks.shape[0]
-    return _products(blocks) * (count / (count - 1)) if count > 1 else None
 
 
 def _products(samples: Complex) -> Complex:

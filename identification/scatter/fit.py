@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from identification.fitting.threads import threads
 from identification.models.pnlss.fitting.result import PnlssFit
 from identification.models.simulated_runs import run_of
 from identification.models.structured.fit import StructuredFit
-from identification.scatter.own_shifts import OwnShift, own_shift
+from identification.scatter.own_shifts import own_shift
 from identification.scatter.run_scatter import RunScatter
 from identification.scatter.shifts import Effect, Scattered, effects_of, shifted
 from identification.scatter.widths import width_of
@@ -86,12 +87,14 @@ def fit_with_scatter(
     IdentificationError.unless_at_least("rounds", rounds, 2)
     scale = _rms([one.counted_outputs for one in training])
     by_run = [[one for one, name in zip(everything, named, strict=True) if name == run] for run in names]
-    found = fit(_loudest(training, named, scale), validation=())
+    loudest = named[int(np.argmax([float(np.max(_rms([one.counted_outputs]) / scale)) for one in training]))]
+    found = fit([one for one, name in zip(training, named, strict=False) if name == loudest], validation=())
     effects = effects_of(found.model, everything, kinds)
     shifts, step, speed = np.zeros((len(names), len(effects))), np.zeros((0, 0)), np.ones(len(effects))
     data, settled, count = everything, False, 1
     while True:
-        own = _own_shifts(found.model, effects, by_run, scale, shifts)
+        with threads() as workers, ThreadPoolExecutor(workers) as pool:
+            own = [*pool.map(own_shift, repeat(found.model), repeat(effects), by_run, repeat(scale), shifts)]
         estimates, variances = np.array([one.shift for one in own]), np.array([one.variance for one in own])
         widths = tuple(width_of(*columns) for columns in zip(estimates.T, variances.T, strict=True))
         size, middle = np.array([width.width for width in widths]), np.array([width.mean for width in widths])
@@ -127,12 +130,6 @@ def _rms(parts: Sequence[Float]) -> Float:
     return np.asarray(np.sqrt(np.mean(np.concatenate(parts, axis=1) ** 2, axis=1)))
 
 
-def _loudest(training: Sequence[Experiment], named: Sequence[str], scale: Float) -> list[Experiment]:
-    sizes = [float(np.max(_rms([one.counted_outputs]) / scale)) for one in training]
-    run = named[int(np.argmax(sizes))]
-    return [one for one, name in zip(training, named, strict=False) if name == run]
-
-
 def _speed(step: Float, before: Float, speed: Float) -> Float:
     """float[n_effects]: factor on a step of the fixed-point iteration, from the step before and its factor.
 
@@ -143,13 +140,6 @@ def _speed(step: Float, before: Float, speed: Float) -> Float:
     change = step - before
     found = -speed * np.sum(before * change, axis=0) / np.maximum(np.sum(change**2, axis=0), 1e-300)
     return np.asarray(np.clip(found, 1.0, _FASTEST))
-
-
-def _own_shifts(
-    model: Scattered, effects: Sequence[Effect], runs: Sequence[Sequence[Experiment]], scale: Float, begins: Float
-) -> list[OwnShift]:
-    with threads() as count, ThreadPoolExecutor(count) as pool:
-        return list(pool.map(lambda run, begin: own_shift(model, effects, run, scale, begin), runs, begins))
 
 
 def _without_shifts(

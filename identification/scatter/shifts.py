@@ -77,18 +77,18 @@ def shifted(model: Scattered, effects: Sequence[Effect], shift: Float) -> Scatte
             gain += float(size)
         else:
             moves[KINDS.index(effect.kind), effect.mode] += size
-    moved: Scattered = model
-    if np.any(moves):
-        moved = _structured(model, *moves) if isinstance(model, StructuredModel) else _pnlss(model, *moves)
-    return _amplified(moved, np.exp(gain)) if gain else moved
-
-
-def _structured(model: StructuredModel, frequency: Float, damping: Float) -> StructuredModel:
-    return replace(
-        model,
-        frequency_hz=model.frequency_hz * np.exp(frequency),
-        damping_ratio=model.damping_ratio * np.exp(damping),
-    )
+    factor = np.exp(gain)
+    if isinstance(model, StructuredModel):
+        frequency, damping = np.exp(moves)
+        return replace(
+            model,
+            frequency_hz=model.frequency_hz * frequency,
+            damping_ratio=model.damping_ratio * damping,
+            output_shapes=factor * model.output_shapes,
+            direct=factor * model.direct,
+        )
+    moved = _pnlss(model, *moves) if np.any(moves) else model
+    return replace(moved, c=factor * moved.c, d=factor * moved.d, f=factor * moved.f)
 
 
 def _pnlss(model: PnlssModel, frequency: Float, damping: Float) -> PnlssModel:
@@ -105,9 +105,3 @@ def _pnlss(model: PnlssModel, frequency: Float, damping: Float) -> PnlssModel:
         new[int(np.argmin(np.abs(poles - own.conjugate())))] = new[at].conjugate()
     a = np.linalg.solve(vectors.T, (vectors * new).T).T
     return replace(model, a=np.ascontiguousarray(a.real))
-
-
-def _amplified(model: Scattered, gain: float) -> Scattered:
-    if isinstance(model, StructuredModel):
-        return replace(model, output_shapes=gain * model.output_shapes, direct=gain * model.direct)
-    return replace(model, c=gain * model.c, d=gain * model.d, f=gain * model.f)
