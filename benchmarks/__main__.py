@@ -30,6 +30,7 @@ from benchmarks.frame import in_turn
 from studies.matrix.measuring import machine
 
 ROUNDS = 5
+"""Measurements of each command, of which the median counts; chosen."""
 
 
 class Ratio(NamedTuple):

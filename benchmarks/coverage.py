@@ -25,6 +25,7 @@ import typer
 from scipy.stats import binomtest
 
 import rig
+from benchmarks.frame import show
 from identification import Channel, nonlinear_mode, periodic_vibration
 from rig.bench import Bench
 from rig.bench.configuration import validated
@@ -42,7 +43,9 @@ PLANS = ("magnet-beam/backbone", "magnet-beam-symmetric/backbone", "friction-bea
 MODAL = ("modal_frequency_hz", "damping_ratio")
 QUANTITIES = (*MODAL, "force_n", "amplitude_m")
 WANTED = 0.93
+"""Coverage that the test of significance asks for, of 95 % stated; chosen."""
 HARMONICS, SAMPLES = 15, 1024
+"""Of the harmonic balance."""
 FINER = 8
 """Least number of steps of a replay in a sample."""
 PIECE = 20000
@@ -183,9 +186,9 @@ def add_modal_truth(exact: VirtualRig, points: Sequence[Measured], at: str) -> N
 
 def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
     """Return coverage, half-width and bias of a quantity over the points of all seeds, and the same level by level."""
-    levels = sorted({point.level for point in points})
-    rows, within, covered, widths = [], [], [], []
-    for level in levels:
+    rows: dict[str, dict[str, float]] = {}
+    within, covered, widths = [], [], []
+    for level in sorted({point.level for point in points}):
         some = [point for point in points if point.level == level]
         truth = np.array([point.truth[name] for point in some])
         error = np.array([point.estimate[name] for point in some]) / truth - 1.0
@@ -198,17 +201,14 @@ def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
         within += inside.tolist()
         covered += near.tolist() if len(some) > 1 else []
         widths += half.tolist()
-        rows.append(
-            {
-                "level": level,
-                "covered": float(inside.mean()),
-                "random_covered": float(near.mean()),
-                "bias": float(error.mean()),
-                "scatter": float(error.std(ddof=1)) if len(some) > 1 else float("nan"),
-                "half_width": float(np.median(half)),
-                "random_half_width": float(1.96 * np.median(random)),
-            }
-        )
+        rows[f"point {level + 1}"] = {
+            "covered": float(inside.mean()),
+            "random_covered": float(near.mean()),
+            "bias": float(error.mean()),
+            "scatter": float(error.std(ddof=1)) if len(some) > 1 else float("nan"),
+            "half_width": float(np.median(half)),
+            "random_half_width": float(1.96 * np.median(random)),
+        }
     test = binomtest(int(np.sum(within)), len(within), WANTED, alternative="less")
     return {
         "outcomes": len(within),
@@ -216,7 +216,7 @@ def summary(points: Sequence[Measured], name: str) -> dict[str, Any]:
         "p_of_93": float(test.pvalue),
         "random_covered": float(np.mean(covered)) if covered else float("nan"),
         "half_width": float(np.median(widths)),
-        "largest_bias_over_half_width": float(max(abs(row["bias"]) / row["half_width"] for row in rows)),
+        "largest_bias_over_half_width": float(max(abs(row["bias"]) / row["half_width"] for row in rows.values())),
         "levels": rows,
     }
 
@@ -236,28 +236,6 @@ def study(name: str, seeds: Sequence[int], factor: float, at: str = "amplitude")
     return {"planned": planned, **{quantity: summary(points, quantity) for quantity in QUANTITIES}}
 
 
-HEAD = (
-    "plan                            noise  quantity             n  covered %  p(93 %)  random %  half-width %  "
-    "bias/half-width"
-)
-
-
-def lines(name: str, factor: float, found: dict[str, Any], levels: bool) -> list[str]:
-    """Rows of the table."""
-    out = []
-    for quantity in QUANTITIES:
-        of = found[quantity]
-        shares = f"{100 * of['covered']:>9.1f}  {of['p_of_93']:>7.3f}  {100 * of['random_covered']:>8.1f}"
-        widths = f"{100 * of['half_width']:>12.5f}  {of['largest_bias_over_half_width']:>15.2f}"
-        out.append(f"{name:<30}  {factor:>5g}  {quantity:<18} {of['outcomes']:>4}  {shares}  {widths}")
-        for row in of["levels"] if levels else ():
-            held = f"covered {100 * row['covered']:>5.1f} %, random {100 * row['random_covered']:>5.1f} %"
-            moved = f"bias {1e6 * row['bias']:>9.2f}, 1.96 scatter {1.96e6 * row['scatter']:>9.2f}"
-            wide = f"half-width {1e6 * row['half_width']:>9.2f}, random {1e6 * row['random_half_width']:>9.2f} ppm"
-            out.append(f"    point {row['level'] + 1:>3}: {held}, {moved}, {wide}")
-    return out
-
-
 def main(
     plans: Annotated[list[str] | None, typer.Argument()] = None,
     seeds: int = 18,
@@ -267,14 +245,18 @@ def main(
     levels: bool = False,
     output: Path | None = None,
 ) -> None:
-    """Run plans: those above, files or ``own``. Print a table, with ``levels`` of every point too, and write all numbers."""
-    print(HEAD, flush=True)
+    """Run plans: those above, files or ``own``. Print what they come to, with ``levels`` of every point; write all numbers."""
     everything: dict[str, Any] = {}
     for name in plans or PLANS:
         for factor in noise or (1.0, 10.0):
             found = study(name, range(first_seed, first_seed + seeds), factor, at)
             everything[f"{name}, noise {factor:g}"] = found
-            print("\n".join(lines(name, factor, found, levels)), flush=True)
+            left_out = () if levels else ("levels",)
+            shown = {
+                quantity: {key: value for key, value in found[quantity].items() if key not in left_out}
+                for quantity in QUANTITIES
+            }
+            show({f"{name}, noise {factor:g}": shown})
             if output is not None:
                 output.write_text(json.dumps(everything, indent=1), encoding="utf-8")
 

@@ -18,6 +18,7 @@ from tests.rig.rigs import bench_with
 SHARES = (1e-4, 1e-3, 1e-2)
 """Parts of all blocks that are late; the runs are spread over them."""
 BLOCK = 10
+"""Samples a block."""
 
 
 def run_once(share: float, blocks: int, seed: int, kind: str) -> dict[str, Any]:
@@ -32,7 +33,7 @@ def run_once(share: float, blocks: int, seed: int, kind: str) -> dict[str, Any]:
 def main(runs: int = 100, blocks: int = 5, held: bool = False) -> None:
     """Carry out so many runs in all, with interruptions of ``blocks``; print a row for each share."""
     rows = []
-    for number, share in enumerate(SHARES):
+    for number, share in enumerate(SHARES[:runs]):
         seeds = range(number, runs, len(SHARES))
         found = [run_once(share, blocks, seed, "held" if held else "late") for seed in seeds]
         late = np.mean([(one["held"] + one["continued"]) / one["samples"] for one in found])

@@ -29,10 +29,13 @@ from rig.tick.tick import Tick, TickSettings
 from simulators.kernels import run_open_loop
 
 ROUNDS = 9
+"""Measurements of each kind, of which the median counts; chosen."""
 SAMPLES = 40_000
+"""Samples of a measurement, 8 s at 5 kHz."""
 SUBSTEPS = 8
 """Runge-Kutta steps in a sample."""
 BLOCKS = (1, 8, 64)
+"""Samples a block of the exchange."""
 DRIVE = {"magnet-beam": (0.5, 24.4), "friction-beam": (0.5, 149.0)}
 """Voltage (V) and frequency (Hz) of the open-loop measurements."""
 NO_FILTER = "magnet-beam, 2 sub-steps, no filter"

@@ -23,7 +23,9 @@ from identification import FitSettings, identify_many, identify_pnlss, realisati
 from rig.measurements.experiments import experiments
 
 ITERATIONS = 30
+"""Of every fit."""
 WORKERS = 2
+"""Processes at the same time."""
 
 
 def jobs(count: int) -> tuple[Any, ...]:

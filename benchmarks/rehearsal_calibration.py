@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import typer
 
+from benchmarks.frame import show
 from rig.arming.run_options import RunOptions
 from rig.bench import load_bench
 from rig.bench.configuration import merged
@@ -154,15 +155,11 @@ def summary(found: list[dict[str, Any]]) -> dict[str, Any]:
             "happened": float(y.mean()),
             "brier": float(np.mean((p - y) ** 2)),
             "brier of the mean": float(y.mean() * (1.0 - y.mean())),
-            "reliability": [
-                {
-                    "predicted": float(p[bins == b].mean()),
-                    "happened": float(y[bins == b].mean()),
-                    "n": int((bins == b).sum()),
-                }
+            "reliability": {
+                f"{p[bins == b].mean():.2f} predicted, of {(bins == b).sum()}": float(y[bins == b].mean())
                 for b in range(5)
                 if (bins == b).any()
-            ],
+            },
         }
     for name in ("margins inside", "points inside"):
         values = [value for one in found for value in one[name]]
@@ -183,7 +180,7 @@ def main(pairs: int = 100, draws: int = 50, seed: int = 1, jobs: int = 2, output
             print(f"{len(found):3} {name:36} {one['end']:20}", *(f"{k} {p[k]:.2f}/{int(y[k])}" for k in p), flush=True)
             if output is not None:
                 output.write_text(json.dumps(found), encoding="utf-8")
-    print(json.dumps(summary(found), indent=1))
+    show(summary(found))
 
 
 if __name__ == "__main__":

@@ -47,9 +47,13 @@ plan = load_plan("magnet-beam/backbone").model_copy(update={"levels_v": (0.6,), 
 rig.run(plan, bench=bench, output=sys.argv[2]).close()
 """
 DRIVEN_V = 0.1
+"""Output above which the rig counts as driven, V: a sixth of the level."""
 TAIL_BYTES = 4000
+"""Bytes at the end of the log that are read while the run goes on."""
 LONGEST_S = 60.0
+"""Longest wait for a level, and for the end of a campaign, s; chosen."""
 TRIES = 5
+"""Runs that may end before their accident."""
 PRIORITY = 70  # of the cable: it is no program of the campaign's, and a real one takes no time
 
 

@@ -29,8 +29,11 @@ from rig.errors import RigError
 from rig.tick.layout import DEVICE_SHIFT
 
 RUN_S = 62.0
+"""Length of the run, s."""
 BEGIN_S = 6.0
+"""When the first stop may come, s."""
 PAST_THE_WATCHDOG_S = 0.3
+"""Length of the stop that the watchdog ends, s."""
 
 
 def workers() -> list[int]:

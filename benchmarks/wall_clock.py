@@ -42,9 +42,12 @@ from rig.tick.sequencer.segments import Excitation, Segment, SettleRule
 from rig.tick.tick import TickSettings
 
 TURN_S = 15.0
+"""Length of a turn of the loop and of cyclictest, s; chosen."""
 RATES_HZ = (1000.0, 2000.0, 5000.0)
 FREQUENCY_HZ = 24.4
+"""Frequency of the tone, Hz: near the resonance of the beam."""
 STALL_US = 1000.0
+"""Lateness above which a period counts as a stall, us."""
 DISTURBANCES = ("collections", "imports", "major_faults", "minor_faults", "involuntary_switches")
 COUNTED = (*DISTURBANCES, "stalls", "own_stalls", "skipped_periods")
 
