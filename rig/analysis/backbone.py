@@ -23,7 +23,6 @@ from simulators.analysis import (
 from simulators.parts import FrictionSite
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
 _MIN_NEGLECTED_PERCENT = 0.001  # smallest neglected part of the force that is given as a number, %; chosen
@@ -88,7 +87,31 @@ class Backbone(Study):
 
     def draw_on(self, page: "Figure") -> None:
         """Draw frequency, damping, amplitude and harmonics over the level, and the loops."""
-        draw_backbone(page, self.responses, self.loops, self.subject.rig.friction)
+        found, loops, joints = self.responses, self.loops, self.subject.rig.friction
+        upper, *below = areas(page, (4, len(loops) + 1) if loops else (4,), (2.0, 1.15) if loops else (1.0,))
+        axes = upper.subplots(4, 1) if is_narrow(page) else upper.subplots(2, 2)
+        frequency, damping, amplitude, harmonics = axes.ravel()
+        scale, unit = length_unit(float(np.max(found.amplitude_m)))
+        x = scale * found.amplitude_m
+        frequency.plot(x, found.modal_frequency_hz, "o-", color=MAIN)
+        frequency.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
+        damping.plot(x, 100 * found.damping_ratio, "o-", color=MAIN, label="from the fundamental's power")
+        total = 100 * found.damping_ratio_total_power
+        damping.plot(x, total, "s--", color=SECOND, label="from the power of all harmonics")
+        damping.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
+        set_min_span(damping, np.concatenate([100 * found.damping_ratio, total]), 0.2)
+        damping.legend(loc="best")
+        amplitude.plot(found.force_n, x, "o-", color=MAIN)
+        amplitude.set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement, {unit}")
+        for harmonic, marker, colour in ((2, "^", MAIN), (3, "v", SECOND)):
+            if harmonic < found.force_harmonics_n.shape[1]:
+                ratio = found.force_harmonic_ratio(harmonic)
+                harmonics.plot(found.force_n, ratio, marker + "-", color=colour, label=f"|F{harmonic}|/|F1|")
+        harmonics.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of force")
+        harmonics.set_ylim(bottom=0.0)
+        harmonics.legend()
+        for lower in below:
+            _draw_loops(lower, found, loops, joints)
 
 
 def backbone(
@@ -134,43 +157,6 @@ def neglected_force(found: PeriodicResponses) -> str:
     return (
         f"force above harmonic {highest} is left out: {text} of the fundamental; balance more harmonics to include it"
     )
-
-
-def draw_backbone(
-    page: "Figure",
-    found: PeriodicResponses,
-    loops: dict[int, tuple[HysteresisLoop, ...]],
-    joints: Sequence[FrictionSite],
-) -> None:
-    """Draw four panels over the level, and one more panel per level that has loops."""
-    upper, *below = areas(page, (4, len(loops) + 1) if loops else (4,), (2.0, 1.15) if loops else (1.0,))
-    axes = upper.subplots(4, 1) if is_narrow(page) else upper.subplots(2, 2)
-    frequency, damping, amplitude, harmonics = axes.ravel()
-    scale, unit = length_unit(float(np.max(found.amplitude_m)))
-    x = scale * found.amplitude_m
-    frequency.plot(x, found.modal_frequency_hz, "o-", color=MAIN)
-    frequency.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
-    damping.plot(x, 100 * found.damping_ratio, "o-", color=MAIN, label="from the fundamental's power")
-    total = 100 * found.damping_ratio_total_power
-    damping.plot(x, total, "s--", color=SECOND, label="from the power of all harmonics")
-    damping.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
-    set_min_span(damping, np.concatenate([100 * found.damping_ratio, total]), 0.2)
-    damping.legend(loc="best")
-    amplitude.plot(found.force_n, x, "o-", color=MAIN)
-    amplitude.set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement, {unit}")
-    _draw_harmonics(harmonics, found)
-    for lower in below:
-        _draw_loops(lower, found, loops, joints)
-
-
-def _draw_harmonics(axis: "Axes", found: PeriodicResponses) -> None:
-    for harmonic, marker, colour in ((2, "^", MAIN), (3, "v", SECOND)):
-        if harmonic < found.force_harmonics_n.shape[1]:
-            ratio = found.force_harmonic_ratio(harmonic)
-            axis.plot(found.force_n, ratio, marker + "-", color=colour, label=f"|F{harmonic}|/|F1|")
-    axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of force")
-    axis.set_ylim(bottom=0.0)
-    axis.legend()
 
 
 def _draw_loops(

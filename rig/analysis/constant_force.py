@@ -74,7 +74,26 @@ class ConstantForce(Study):
 
     def draw_on(self, page: "Figure") -> None:
         """Draw amplitude and phase over frequency."""
-        draw_curves(page, self.curves, self.resonances)
+        from matplotlib.lines import Line2D
+
+        curves, resonances = self.curves, self.resonances
+        top, bottom = grid(page, 2, 1, sharex=True, height_ratios=(2.0, 1.0))[:, 0]
+        scale, unit = length_unit(max(float(np.max(curve.amplitude_m)) for curve in curves.values()))
+        handles = []
+        for place, (force, curve) in enumerate(curves.items()):
+            colour = shade(place, len(curves))
+            _branches(top, curve, scale * curve.amplitude_m, colour)
+            _branches(bottom, curve, curve.phase_lag_deg, colour)
+            handles.append(Line2D([], [], color=colour, label=f"{force:.4g} N"))
+        if any(folds_of(curve) for curve in curves.values()):
+            handles.append(Line2D([], [], color=REJECTED, ls=UNSTABLE, label="unstable"))
+        top.plot(resonances.frequency_hz, scale * resonances.amplitude_m, "o-", lw=0.9, color=SECOND)
+        handles.append(Line2D([], [], color=SECOND, marker="o", lw=0.9, label="phase resonance"))
+        top.set_ylabel(f"displacement, {unit}")
+        top.set_ylim(bottom=0.0)
+        bottom.axhline(-90.0, color=SECOND, lw=0.9)
+        bottom.set(xlabel="frequency, Hz", ylabel="acceleration lag, deg", yticks=(-180, -90, 0), ylim=(-185, 5))
+        legend_below(page, handles=handles)
 
 
 def constant_force(
@@ -118,29 +137,6 @@ def folds_of(curve: PeriodicResponses) -> list[float]:
         return []
     unstable = curve.frequency_hz[~curve.stable]
     return [float(np.min(unstable)), float(np.max(unstable))]
-
-
-def draw_curves(page: "Figure", curves: dict[float, PeriodicResponses], resonances: PeriodicResponses) -> None:
-    """Draw amplitude above phase lag, over the frequency."""
-    from matplotlib.lines import Line2D
-
-    top, bottom = grid(page, 2, 1, sharex=True, height_ratios=(2.0, 1.0))[:, 0]
-    scale, unit = length_unit(max(float(np.max(curve.amplitude_m)) for curve in curves.values()))
-    handles = []
-    for place, (force, curve) in enumerate(curves.items()):
-        colour = shade(place, len(curves))
-        _branches(top, curve, scale * curve.amplitude_m, colour)
-        _branches(bottom, curve, curve.phase_lag_deg, colour)
-        handles.append(Line2D([], [], color=colour, label=f"{force:.4g} N"))
-    if any(curve.stable is not None and not np.all(curve.stable) for curve in curves.values()):
-        handles.append(Line2D([], [], color=REJECTED, ls=UNSTABLE, label="unstable"))
-    top.plot(resonances.frequency_hz, scale * resonances.amplitude_m, "o-", lw=0.9, color=SECOND)
-    handles.append(Line2D([], [], color=SECOND, marker="o", lw=0.9, label="phase resonance"))
-    top.set_ylabel(f"displacement, {unit}")
-    top.set_ylim(bottom=0.0)
-    bottom.axhline(-90.0, color=SECOND, lw=0.9)
-    bottom.set(xlabel="frequency, Hz", ylabel="acceleration lag, deg", yticks=(-180, -90, 0), ylim=(-185, 5))
-    legend_below(page, handles=handles)
 
 
 def _branches(axis: "Axes", curve: PeriodicResponses, values: Float, colour: object) -> None:

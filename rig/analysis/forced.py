@@ -119,8 +119,25 @@ class Forced(Study):
             print("up and down agree everywhere")
 
     def draw_on(self, page: "Figure") -> None:
-        """Draw force, response and lag over frequency."""
-        draw_forced(page, self.up, self.down if self.differ_hz.size or not self.complete else None)
+        """Draw force, response and lag over frequency; the falling direction is drawn only if it differs."""
+        down = self.down if self.differ_hz.size or not self.complete else None
+        force, response, lag = grid(page, 3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.4))[:, 0]
+        scale, unit = length_unit(float(np.max(self.up.amplitude_m)))
+        label = "frequency rising" if down is not None else "either direction"
+        branches: list[tuple[PeriodicResponses, LineStyle, str, str]] = [(self.up, "-", MAIN, label)]
+        if down is not None:
+            branches.append((down, _DASHED, SECOND, "frequency falling"))
+        for branch, style, colour, label in branches:
+            force.plot(branch.frequency_hz, branch.force_n, ls=style, color=colour, label=label)
+            response.plot(branch.frequency_hz, scale * branch.amplitude_m, ls=style, color=colour)
+            lag.plot(branch.frequency_hz, branch.phase_lag_deg, ls=style, color=colour)
+        force.set_ylabel("force, N")
+        response.set_ylabel(f"displacement, {unit}")
+        for axis in (force, response):
+            axis.set_ylim(bottom=0.0)
+        lag.axhline(-90.0, color=REJECTED, lw=0.8)
+        lag.set(xlabel="frequency, Hz", ylabel="accel. lag, deg", yticks=(-180, -90, 0), ylim=(-190, 10))
+        legend_below(page, force)
 
 
 def forced(
@@ -149,7 +166,7 @@ def forced(
     grid = _grid(low, high, checked_points(points, 4), _resonance(balance, voltage))
     up, up_ends = _followed(balance, voltage, grid)
     down, down_ends = _followed(balance, voltage, grid[::-1])
-    up, down, notes = _completed(up, select_points(down, slice(None, None, -1)), up_ends, down_ends)
+    up, down, notes = _completed(up, _points(down, slice(None, None, -1)), up_ends, down_ends)
     violations = dict.fromkeys(line for branch in (up, down) for line in subject.limit_violations(branch))
     return Forced(
         subject=subject,
@@ -181,13 +198,11 @@ def _completed(
         both = (("rising", up.frequency_hz[-1], up_ends), ("falling", down.frequency_hz[0], down_ends))
         return up, down, [f"{name} frequency ends at {ends_hz:.4f} Hz: {why}" for name, ends_hz, why in both]
     if up_ends:
-        return joined(up, select_points(down, slice(n_up, None))), down, [jump.format("rising", up.frequency_hz[-1])]
+        joined = _map_columns(np.concatenate, up, _points(down, slice(n_up, None)))
+        return joined, down, [jump.format("rising", up.frequency_hz[-1])]
     if down_ends:
-        return (
-            up,
-            joined(select_points(up, slice(0, n_up - n_down)), down),
-            [jump.format("falling", down.frequency_hz[0])],
-        )
+        joined = _map_columns(np.concatenate, _points(up, slice(0, n_up - n_down)), down)
+        return up, joined, [jump.format("falling", down.frequency_hz[0])]
     return up, down, []
 
 
@@ -212,35 +227,8 @@ def _grid(low: float, high: float, points: int, resonance: tuple[float, float, f
     return np.unique(np.concatenate([np.linspace(low, high, points - dense.size), dense]))
 
 
-def draw_forced(page: "Figure", up: PeriodicResponses, down: PeriodicResponses | None) -> None:
-    """Draw three panels over the frequency; the falling direction is drawn only if it differs."""
-    force, response, lag = grid(page, 3, 1, sharex=True, height_ratios=(2.0, 2.0, 1.4))[:, 0]
-    scale, unit = length_unit(float(np.max(up.amplitude_m)))
-    label = "frequency rising" if down is not None else "either direction"
-    branches: list[tuple[PeriodicResponses, LineStyle, str, str]] = [(up, "-", MAIN, label)]
-    if down is not None:
-        branches.append((down, _DASHED, SECOND, "frequency falling"))
-    for branch, style, colour, label in branches:
-        force.plot(branch.frequency_hz, branch.force_n, ls=style, color=colour, label=label)
-        response.plot(branch.frequency_hz, scale * branch.amplitude_m, ls=style, color=colour)
-        lag.plot(branch.frequency_hz, branch.phase_lag_deg, ls=style, color=colour)
-    force.set_ylabel("force, N")
-    response.set_ylabel(f"displacement, {unit}")
-    for axis in (force, response):
-        axis.set_ylim(bottom=0.0)
-    lag.axhline(-90.0, color=REJECTED, lw=0.8)
-    lag.set(xlabel="frequency, Hz", ylabel="accel. lag, deg", yticks=(-180, -90, 0), ylim=(-190, 10))
-    legend_below(page, force)
-
-
-def select_points(branch: PeriodicResponses, rows: "slice[int | None, int | None, int | None]") -> PeriodicResponses:
-    """Return some of the points of a branch."""
+def _points(branch: PeriodicResponses, rows: "slice[int | None, int | None, int | None]") -> PeriodicResponses:
     return _map_columns(lambda column: column[0][rows], branch)
-
-
-def joined(first: PeriodicResponses, then: PeriodicResponses) -> PeriodicResponses:
-    """Return the points of one branch followed by those of another."""
-    return _map_columns(np.concatenate, first, then)
 
 
 def _map_columns(make: Callable[[list[Float]], Float], *branches: PeriodicResponses) -> PeriodicResponses:

@@ -59,7 +59,6 @@ def highest_resonance(balance: Balance) -> tuple[PeriodicResponses, int]:
 
 
 def _over_voltages(balance: Balance, volts: Float) -> PeriodicResponses:
-    """Return the backbone over voltages, as far as it is found; raise `ConfigurationError` if nothing is."""
     try:
         return balance.backbone(voltages_v=volts)
     except NotConvergedError as failure:

@@ -14,7 +14,7 @@ from rig.drawing.style import COLOURS, MAIN
 from rig.errors import ConfigurationError
 from rig.text.console import number, print_table
 from simulators.analysis import FrequencyResponses, frequency_response
-from vibrolock.arrays import Complex, Float
+from vibrolock.arrays import Complex
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,10 +83,25 @@ class Responses(Study):
         )
 
     def draw_on(self, page: "Figure") -> None:
-        """Draw magnitudes and phases."""
-        draw_responses(
-            page, self.found.frequency_hz, self.force_n_per_v, self.acceleration_per_v, self.accelerance_per_kg
+        """Draw magnitudes and phases; each channel has the same colour in all columns."""
+        from matplotlib.ticker import MultipleLocator
+
+        axes = grid(page, 2, 3, sharex=True, down_columns=True)
+        columns = (
+            ("force, N/V", {"force": self.force_n_per_v}),
+            ("acceleration, (m/s²)/V", self.acceleration_per_v),
+            ("acceleration, (m/s²)/N", self.accelerance_per_kg),
         )
+        for (magnitude, phase), (title, curves) in zip(axes.T, columns, strict=True):
+            for place, (name, curve) in enumerate(curves.items()):
+                colour = MAIN if len(curves) == 1 and name == "force" else COLOURS[place % len(COLOURS)]
+                magnitude.plot(self.found.frequency_hz, np.abs(curve), color=colour, lw=1.0, label=name)
+                phase.plot(self.found.frequency_hz, np.degrees(np.unwrap(np.angle(curve))), color=colour, lw=1.0)
+            magnitude.set(xscale="log", yscale="log", ylabel=title)
+            phase.set(xlabel="frequency, Hz", ylabel=f"phase of {title.split(', ')[1]}, deg")
+            low, high = phase.get_ylim()
+            phase.yaxis.set_major_locator(MultipleLocator(90.0 if high - low < 900.0 else 360.0))
+        legend_below(page, axes[0, 1])
 
 
 def responses(
@@ -120,29 +135,3 @@ def responses(
         acceleration_per_v={name: found.sensor_per_v[name] for name in where},
         accelerance_per_kg={name: accelerances[at] for name, at in where.items()},
     )
-
-
-def draw_responses(
-    page: "Figure", frequency_hz: Float, force: Complex, per_v: dict[str, Complex], per_n: dict[str, Complex]
-) -> None:
-    """Draw three columns; each channel has the same colour in all of them."""
-    from matplotlib.ticker import MultipleLocator
-
-    axes = grid(page, 2, 3, sharex=True, down_columns=True)
-    columns = (
-        ("force, N/V", {"force": force}),
-        ("acceleration, (m/s²)/V", per_v),
-        ("acceleration, (m/s²)/N", per_n),
-    )
-    for (magnitude, phase), (title, curves) in zip(axes.T, columns, strict=True):
-        for place, (name, curve) in enumerate(curves.items()):
-            colour = MAIN if len(curves) == 1 and name == "force" else COLOURS[place % len(COLOURS)]
-            magnitude.plot(frequency_hz, np.abs(curve), color=colour, lw=1.0, label=name)
-            phase.plot(frequency_hz, np.degrees(np.unwrap(np.angle(curve))), color=colour, lw=1.0)
-        magnitude.set(xscale="log", yscale="log")
-        magnitude.set_ylabel(title)
-        phase.set_ylabel(f"phase of {title.split(', ')[1]}, deg")
-        phase.set_xlabel("frequency, Hz")
-        low, high = phase.get_ylim()
-        phase.yaxis.set_major_locator(MultipleLocator(90.0 if high - low < 900.0 else 360.0))
-    legend_below(page, axes[0, 1])

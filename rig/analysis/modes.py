@@ -83,8 +83,33 @@ class Modes(Study):
         )
 
     def draw_on(self, page: "Figure") -> None:
-        """Draw the mode shapes; along the beam if the structure is a beam."""
-        draw_modes(page, self.subject.rig, self.structure)
+        """Draw a panel for each of the lowest eight modes; along the beam if the structure is a beam."""
+        rig, modes = self.subject.rig, self.structure
+        count = min(_MAX_MODES, modes.frequency_hz.size)
+        panels = grid(page, (count + 1) // 2, min(2, count), sharex=True).ravel()
+        for k, axis in enumerate(panels):
+            if k >= count:
+                axis.set_axis_off()
+                continue
+            axis.axhline(0.0, color=REJECTED, lw=0.8)
+            if isinstance(rig.structure, MeshedBeam):
+                _along_the_beam(axis, rig, rig.structure, modes, k)
+            else:
+                names = rig.structure.points
+                heights = [modes.at(rig.shape(at))[k] for at in names]
+                axis.bar(names, heights, width=0.5, color=MAIN, label="named points")
+                axis.tick_params(axis="x", labelrotation=30)
+            axis.set_title(f"mode {k + 1}: {modes.frequency_hz[k]:.5g} Hz, {100 * modes.damping_ratio[k]:.3g} %")
+            if k % 2 == 0:
+                axis.set_ylabel("shape, kg$^{-1/2}$")
+        if isinstance(rig.structure, MeshedBeam):
+            for axis in panels[max(0, count - 2) : count]:
+                axis.set_xlabel("position along the beam, m")
+                axis.tick_params(labelbottom=True)
+        legend_below(page, panels[0])
+        if count < modes.frequency_hz.size:
+            text = f"the lowest {count} of {modes.frequency_hz.size} modes"
+            page.text(0.99, 0.01, text, ha="right", color=REJECTED)
 
 
 def modes(subject: Subject) -> Modes:
@@ -107,34 +132,6 @@ _STATIONS = 401  # positions along the beam at which a shape is drawn; chosen
 _MARKERS = "osD^vPX*<>ph"  # markers of what is attached
 
 
-def draw_modes(page: "Figure", rig: VirtualRig, modes: LinearModes) -> None:
-    """Draw one panel per mode, for the lowest eight modes at most."""
-    count = min(_MAX_MODES, modes.frequency_hz.size)
-    rows = (count + 1) // 2
-    axes = grid(page, rows, min(2, count), sharex=True)
-    panels = axes.ravel()
-    for k, axis in enumerate(panels):
-        if k >= count:
-            axis.set_axis_off()
-            continue
-        axis.axhline(0.0, color=REJECTED, lw=0.8)
-        if isinstance(rig.structure, MeshedBeam):
-            _along_the_beam(axis, rig, rig.structure, modes, k)
-        else:
-            _at_the_points(axis, rig, modes, k)
-        text = f"mode {k + 1}: {modes.frequency_hz[k]:.5g} Hz, {100 * modes.damping_ratio[k]:.3g} %"
-        axis.set_title(text)
-        if k % 2 == 0:
-            axis.set_ylabel("shape, kg$^{-1/2}$")
-    if isinstance(rig.structure, MeshedBeam):
-        for axis in panels[max(0, count - 2) : count]:
-            axis.set_xlabel("position along the beam, m")
-            axis.tick_params(labelbottom=True)
-    legend_below(page, panels[0])
-    if count < modes.frequency_hz.size:
-        page.text(0.99, 0.01, f"the lowest {count} of {modes.frequency_hz.size} modes", ha="right", color=REJECTED)
-
-
 def _along_the_beam(axis: "Axes", rig: VirtualRig, beam: MeshedBeam, modes: LinearModes, k: int) -> None:
     x = np.linspace(0.0, beam.length_m, _STATIONS)
     shapes = np.array([beam.modes.shape(float(position)) for position in x])
@@ -146,14 +143,7 @@ def _along_the_beam(axis: "Axes", rig: VirtualRig, beam: MeshedBeam, modes: Line
             axis.plot(beam.points_m[at], height, marker, color=colour, label=label)
 
 
-def _at_the_points(axis: "Axes", rig: VirtualRig, modes: LinearModes, k: int) -> None:
-    names = rig.structure.points
-    axis.bar(names, [modes.at(rig.shape(at))[k] for at in names], width=0.5, color=MAIN, label="named points")
-    axis.tick_params(axis="x", labelrotation=30)
-
-
 def _attached(rig: VirtualRig) -> dict[str, str]:
-    """Describe what is attached to each point of the structure."""
     there: dict[str, list[str]] = {rig.stinger.at: ["stinger"]}
     for sensor in rig.sensors:
         if sensor.at is not None:

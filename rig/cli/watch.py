@@ -1,6 +1,5 @@
 """``rig watch``: a run in a terminal, while it goes on."""
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -12,7 +11,6 @@ if TYPE_CHECKING:
     from rig.live.reader import LiveRun
 
 POLL_S = 0.2  # s between two looks for a run; chosen: shorter than a person notices
-NICE = 5  # niceness of the view (0 to 19); chosen: the loop goes first
 
 
 def watch_(
@@ -23,10 +21,10 @@ def watch_(
     """Watch a run in a terminal until it is over; wait for one if there is none. Ctrl-C leaves the run alone."""
     from rig.live.place import base_folder
     from rig.monitor.watching import watch
+    from rig.system.privileges import lower_priority
 
     base_folder()  # says what is wrong with it
-    if hasattr(os, "nice"):
-        os.nice(NICE)  # what drives the rig goes first
+    lower_priority()
     try:
         with _found(file) as run:
             told = watch(run)

@@ -57,8 +57,6 @@ class TooMuchData(RigError):  # noqa: N818 (says what happened)
 
 
 class _Encoder:
-    """Encodes values as a tree and numbers, as long as they are not too large."""
-
     def __init__(self, numbers: BinaryIO, most: int) -> None:
         self._numbers, self._most, self._left = numbers, most, most
 

@@ -47,20 +47,26 @@ def write_csv(items: Sequence[Contents], path: Path) -> None:
 
 def _others(item: Contents) -> dict[str, object]:
     """Return everything that is not in the table, and how its columns form arrays."""
-    loose = {}
-    for name, values in item.arrays.items():
-        if name not in item.rows:
-            pairs = np.stack([np.real(values), np.imag(values)], -1) if np.iscomplexobj(values) else np.asarray(values)
-            loose[name] = {"complex": bool(np.iscomplexobj(values)), "values": pairs.tolist()}
+    loose = {
+        name: {"complex": bool(np.iscomplexobj(values)), "values": _pairs(values).tolist()}
+        for name, values in item.arrays.items()
+        if name not in item.rows
+    }
     table = {
         name: {
-            "axis": axis,
-            "shape": list(np.shape(item.arrays[name])),
-            "complex": bool(np.iscomplexobj(item.arrays[name])),
+            "axis": item.rows[name],
+            "shape": list(np.shape(values)),
+            "complex": bool(np.iscomplexobj(values)),
         }
-        for name, axis in ((name, item.rows[name]) for name in item.arrays if name in item.rows)
+        for name, values in item.arrays.items()
+        if name in item.rows
     }
     return {"attributes": dict(item.attributes), "table": table, "arrays": loose}
+
+
+def _pairs(values: Array) -> Array:
+    """Return real values as they are, complex ones with real and imaginary parts along a further axis."""
+    return np.stack([np.real(values), np.imag(values)], -1) if np.iscomplexobj(values) else np.asarray(values)
 
 
 def columns_in(path: Path, layout: Mapping[str, object] | None = None) -> FileData:
@@ -150,22 +156,23 @@ def read_csv(path: Path, layout: "CsvLayout | None" = None) -> dict[str, Float]:
     ``#`` are skipped, and so are lines of units right after the names (texts, or a 1). Raises `ImportFailed`, with the line,
     for anything that is not a number, for rows of unequal length, and for decimal commas unless the layout has them.
     """
-    lines = islice(table_lines(path), 0 if layout is None else layout.skip_lines, None)
-    names_given = None if layout is None else layout.names
-    first = list(islice(lines, 2 if names_given is None else 1))
-    if len(first) < (2 if names_given is None else 1):
+    from identification.mapping import CsvLayout
+
+    layout = layout or CsvLayout()
+    lines = islice(table_lines(path), layout.skip_lines, None)
+    first = list(islice(lines, 2 if layout.names is None else 1))
+    if len(first) < (2 if layout.names is None else 1):
         raise ImportFailed(f"{path}: holds no table; wanted is a line of names, then rows of numbers")
     comma = _separator(first, layout)
-    names = [name.strip() for name in (_cells(first[0][1], comma) if names_given is None else names_given)]
-    if names_given is None and (len(set(names)) < len(names) or any(_number(name) is not None for name in names)):
+    names = [name.strip() for name in (_cells(first[0][1], comma) if layout.names is None else layout.names)]
+    if layout.names is None and (len(set(names)) < len(names) or any(_number(name) is not None for name in names)):
         raise ImportFailed(
             f"{path}: the first line must name every column, each differently; it is '{first[0][1][:60]}'"
         )
-    point = "." if layout is None else layout.decimal
     rows = array("d")
-    for number, line in chain(first[1 if names_given is None else 0 :], lines):
+    for number, line in chain(first[1 if layout.names is None else 0 :], lines):
         cells = _cells(line, comma)
-        values = [_number(cell if point == "." else cell.replace(",", ".")) for cell in cells]
+        values = [_number(cell if layout.decimal == "." else cell.replace(",", ".")) for cell in cells]
         if not rows and _is_units(cells, values):
             continue
         if len(cells) != len(names) or None in values:
@@ -184,7 +191,7 @@ def units_of_csv(path: Path) -> dict[str, str]:
     lines = list(islice(table_lines(path), 2))
     if len(lines) < 2:
         return {}
-    comma = _separator(lines, None)
+    comma = _separator(lines)
     names, cells = (_cells(line, comma) for _, line in lines[:2])
     if len(names) != len(cells) or not _is_units(cells, [_number(cell) for cell in cells]):
         return {}
@@ -196,7 +203,7 @@ def table_lines(path: Path) -> Iterator[tuple[int, str]]:
     return ((number, line) for number, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#"))
 
 
-def _separator(lines: Sequence[tuple[int, str]], layout: "CsvLayout | None") -> str:
+def _separator(lines: Sequence[tuple[int, str]], layout: "CsvLayout | None" = None) -> str:
     if layout is not None and layout.separator is not None:
         return layout.separator
     known = ";\t" if layout is not None and layout.decimal == "," else ",;\t"

@@ -1,10 +1,15 @@
 """Content of a file of another program: the one form in which every reader returns it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vibrolock.arrays import Float
+
+_EVEN = 1e-3
+"""Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
 
 Value = (
     None
@@ -92,6 +97,19 @@ def from_variables(values: dict[str, Value], units: Mapping[str, Value] | None =
         channels={name: ChannelFacts(unit=unit) for name, unit in given.items() if isinstance(unit, str) and unit},
         sample_rate_hz=rate if isinstance(rate, float) else None,
     )
+
+
+def even_step(instants: Float) -> float | None:
+    """Return the time between evenly spaced instants, s; None if they are uneven or do not increase."""
+    steps = np.diff(instants)
+    step = float(steps.mean())
+    return step if step > 0.0 and np.all(np.abs(steps - step) <= _EVEN * step) else None
+
+
+def side_by_side(records: Sequence[Float]) -> Float:
+    """Return records as float64[n, n_records], cut to the length of the shortest."""
+    shortest = min(map(len, records))
+    return np.column_stack([record[:shortest] for record in records])
 
 
 def in_full(group: Mapping[str, Value], before: str = "") -> Iterator[tuple[str, Value]]:

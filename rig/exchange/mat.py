@@ -30,7 +30,6 @@ def write_mat(items: Sequence[Contents], path: Path) -> None:
 
 
 def _variable(structures: Sequence[Mapping[str, object]]) -> object:
-    """Return a single structure unchanged, several as an array."""
     if len(structures) == 1:
         return structures[0]
     names = list(dict.fromkeys(key for structure in structures for key in structure))
@@ -44,7 +43,11 @@ def _structure(item: Contents) -> dict[str, object]:
     shapes = {name: list(np.shape(array)) for name, array in item.arrays.items()}
     out: dict[str, object] = {"title": item.title}
     out |= {name[:_MAX_NAME]: np.asarray(array) for name, array in item.arrays.items()}
-    out["units"] = {name[:_MAX_NAME]: _text(item.unit(name)) for name in item.arrays}
+    units = {name: item.unit(name) for name in item.arrays}  # several units become a cell array
+    out["units"] = {
+        name[:_MAX_NAME]: unit if isinstance(unit, str) else np.asarray(unit).astype(object)
+        for name, unit in units.items()
+    }
     for name in ("channels", "outputs", "inputs"):
         if name in item.attributes:
             out[name] = _table(item.attributes[name])
@@ -53,13 +56,7 @@ def _structure(item: Contents) -> dict[str, object]:
     return out
 
 
-def _text(unit: str | Array) -> str | Array:
-    """Return a unit as text, and several units as a cell array with the shape of their array."""
-    return unit if isinstance(unit, str) else np.asarray(unit).astype(object)
-
-
 def _table(channels: Sequence[Mapping[str, str]]) -> Array:
-    """Return channels as a structure array."""
     table = np.empty(len(channels), dtype=[(key, object) for key in ("name", "role", "unit")])
     for row, channel in enumerate(channels):
         table[row] = (channel["name"], channel["role"], channel["unit"])

@@ -14,9 +14,9 @@ from rig.system.child import confine
 _READERS = {
     "mat": "rig.exchange.mat:parsed_mat",
     "hdf5": "rig.exchange.foreign.hdf5:read_hdf5",
-    "wav": "rig.exchange.foreign.wav:read_wav",
-    "tdms": "rig.exchange.foreign.tdms:read_tdms",
-    "mdf4": "rig.exchange.foreign.mdf4:read_mdf4",
+    "wav": "rig.exchange.foreign.channels:read_wav",
+    "tdms": "rig.exchange.foreign.channels:read_tdms",
+    "mdf4": "rig.exchange.foreign.channels:read_mdf4",
     "csv": "rig.exchange.csv:columns_in",
     "table of ours": "rig.exchange.csv:stored_table",
     "uff": "rig.exchange.uff.reading:datasets_in",

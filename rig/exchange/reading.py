@@ -1,7 +1,6 @@
 """Read measurements and models from files of other programs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -44,15 +43,6 @@ _DEFAULT_KIND = "frequency-responses"  # kind of a mapping that names none
 T = TypeVar("T")  # one of several objects in a file
 
 
-@dataclass(frozen=True)
-class _Options:
-    """Choices on what to read from a file without a mapping."""
-
-    units: str
-    drive: str
-    item: int
-
-
 def import_file(
     path: Path, format_: str = "", mapping: Path | None = None, *, units: str = "", drive: str = "", item: int = 0
 ) -> "Measurement":
@@ -89,7 +79,7 @@ def import_file(
     try:
         if mapping is not None:
             return _read_with(mapping, path, form, units)
-        return _read_without(path, form, _Options(units, drive, item))
+        return _read_without(path, form, units, drive, item)
     except ImportFailed as error:
         if str(path) in str(error):
             raise
@@ -150,7 +140,6 @@ def read_mapping(path: str | Path) -> "AnyMapping":
 
 
 def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> "Measurement":
-    """Read a file, and the further files that the mapping names, and apply the mapping."""
     from identification import TimeDataMapping
 
     mapping = read_mapping(mapping_path)  # before the file, which may be large
@@ -230,17 +219,16 @@ def _chosen(found: Sequence[T], path: Path, item: int) -> T:
     return found[max(item - 1, 0)]
 
 
-def _read_without(path: Path, form: str, options: _Options) -> "Measurement":
-    """Read a file that needs no mapping."""
+def _read_without(path: Path, form: str, units: str, drive: str, item: int) -> "Measurement":
     from rig.exchange.conversion import put_together
 
     match form:
         case "uff":
-            return _from_uff(path, options)
+            return _from_uff(path, units, drive, item)
         case "mat":
             if not (ours := stored_objects(read_mat(path))):
                 raise ImportFailed(f"{path}: {NOT_OURS}")
-            one = _chosen(ours, path, options.item)
+            one = _chosen(ours, path, item)
         case "csv":
             one = read_in_child("table of ours", path, NAMES["csv"], StoredObject)
         case "hdf5":
@@ -252,7 +240,7 @@ def _read_without(path: Path, form: str, options: _Options) -> "Measurement":
     return found
 
 
-def _from_uff(path: Path, options: _Options) -> "Measurement":
+def _from_uff(path: Path, units: str, drive: str, item: int) -> "Measurement":
     from rig.exchange.uff.modes import modes_in
     from rig.exchange.uff.reading import read_uff
     from rig.exchange.uff.responses import responses_in
@@ -260,13 +248,13 @@ def _from_uff(path: Path, options: _Options) -> "Measurement":
 
     file = read_uff(path)
     modes, responses = file.has_shapes, bool(file.of_type(FREQUENCY_RESPONSE))
-    if modes and responses and not options.item:
+    if modes and responses and not item:
         raise ImportFailed(f"{path}: holds modes and frequency responses; choose by `item` 1 (modes) or 2 (responses)")
-    if modes and options.item in (0, 1):
-        return modes_in(file, options.units, options.drive)
+    if modes and item in (0, 1):
+        return modes_in(file, units, drive)
     if responses:
         found: list[Measurement | None] = [None] if modes else []  # the modes are item 1
-        chosen = _chosen([*found, *responses_in(file, options.units)], path, options.item)
+        chosen = _chosen([*found, *responses_in(file, units)], path, item)
         if chosen is not None:
             return chosen
     if modes:

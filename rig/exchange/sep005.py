@@ -9,15 +9,13 @@ import numpy as np
 from identification import IdentificationError
 from identification.mapping import si_of
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.file_data import ChannelFacts, FileData
+from rig.exchange.file_data import ChannelFacts, FileData, even_step, side_by_side
 from rig.system.text_files import read_text
 from vibrolock.arrays import Float
 
 _LARGEST_JSON_BYTES = 500_000_000  # largest file that is read, bytes; chosen
 _MAX_RATE_HZ = 1e100  # largest sample rate, Hz; chosen: any number with which one can still calculate
 _SAME_RATE = 1e-6  # relative difference of sample rates that count as one; chosen
-_EVEN = 1e-3
-"""Relative difference of a step from the mean up to which instants are even; chosen: that of time stamps in milliseconds."""
 
 
 def series_in(path: Path) -> FileData:
@@ -56,7 +54,7 @@ def data_of_series(series: Sequence[Mapping[str, object]]) -> FileData:
         if units.setdefault(name, unit) != unit:
             raise ImportFailed(f"{name} was in {units[name]!r} before", field=f"series[{number}].unit_str", value=given)
         records.setdefault(name, []).append(_data(one, number) * factor)
-    columns = {name: np.column_stack([r[: min(map(len, found))] for r in found]) for name, found in records.items()}
+    columns = {name: side_by_side(found) for name, found in records.items()}
     channels = {name: ChannelFacts(name=name, unit=unit, in_si=True) for name, unit in units.items() if unit}
     return FileData(values={**columns}, channels=channels, sample_rate_hz=rates[0])
 
@@ -78,7 +76,6 @@ def _data(one: Mapping[str, object], number: int) -> Float:
 
 
 def _rate(one: Mapping[str, object], number: int) -> float:
-    """Return the sample rate by ``fs``, or else by ``time``."""
     data, fs, time = _data(one, number), one.get("fs"), one.get("time")
     if fs is None and time is None:
         raise ImportFailed(f"series[{number}].fs: is missing, and so is time; wanted is one of them")
@@ -102,6 +99,4 @@ def _step(time: object, data: Float) -> float | None:
         return None
     if instants.shape != data.shape or not np.all(np.isfinite(instants)):
         return None
-    steps = np.diff(instants)
-    step = float(steps.mean())
-    return step if step > 0.0 and np.all(np.abs(steps - step) <= _EVEN * step) else None
+    return even_step(instants)

@@ -9,7 +9,7 @@ from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
-from rig.recording.stored import HistogramTable, LoopTable
+from rig.recording.stored import StoredTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +58,7 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")
 
 
-def together(histograms: Sequence[HistogramTable]) -> tuple[np.ndarray, np.ndarray]:
+def together(histograms: Sequence[StoredTable]) -> tuple[np.ndarray, np.ndarray]:
     """Add up several histograms; return the upper edges, us, in rising order, and the number of blocks of each bin."""
     edges = np.concatenate([np.asarray(one["upper_edge_us"], float) for one in histograms])
     counts = np.concatenate([np.asarray(one["count"], float) for one in histograms])
@@ -72,11 +72,11 @@ def exceedance(counts: np.ndarray) -> np.ndarray:
     return np.where(share > 0.5 / counts.sum(), share, np.nan)
 
 
-def _blocks(loop: LoopTable) -> int:
+def _blocks(loop: StoredTable) -> int:
     return int(sum(loop["histograms"]["execution"]["count"]))
 
 
-def _pacing(loops: Sequence[LoopTable]) -> str:
+def _pacing(loops: Sequence[StoredTable]) -> str:
     return " and ".join(
         sorted({PACED.get(pacing, pacing) for pacing in (loop["real_time"]["pacing"] for loop in loops)})
     )

@@ -5,17 +5,15 @@ import mmap
 import os
 import time
 import zlib
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import RecordingError
-from rig.live.facts import Line, RunFacts, facts_from
+from rig.live.facts import Line, facts_from
 from rig.live.layout import BINS, FRAME, HEAD, bin_dtype
 from rig.live.place import FACTS, FRAME_FILE, LINES, TRACES, base_folder, lives, runs
 from rig.live.stopping import request_stop
@@ -37,68 +35,6 @@ class Frame(NamedTuple):
     """Time since it was written, s."""
 
 
-@dataclass(frozen=True)
-class ReplayState:
-    """Where a replay stands."""
-
-    time_s: float
-    duration_s: float
-    playing: bool
-    speed: float
-    """How many times as fast as the clock."""
-
-
-class Player(Protocol):
-    """Controls of a replay."""
-
-    def replay_state(self) -> ReplayState:
-        """Return where the replay stands."""
-
-    def pause(self) -> None:
-        """Stop the replay where it stands."""
-
-    def play(self) -> None:
-        """Go on with the replay; at the end, begin again."""
-
-    def seek(self, time_s: float) -> None:
-        """Jump to a time, or to the nearest that was recorded."""
-
-    def control(self, action: str, value: float) -> None:
-        """Do what is asked on a page; `ValueError` for what is not known."""
-
-
-class View(Protocol):
-    """A run as it is watched: one that is under way, or a recording that is replayed."""
-
-    facts: RunFacts
-    """What does not change."""
-    generation: int
-    """Number of jumps of a replay so far: after each, lines and bins begin anew."""
-
-    @property
-    def player(self) -> Player | None:
-        """Controls of a replay; None for a run that is under way."""
-
-    def frame(self) -> Frame | None:
-        """Return the present state, or None if there is none yet."""
-
-    def bins(self, first: int) -> tuple[int, NDArray[np.void]]:
-        """Return the bins of the traces from number ``first`` on that are left, and the number of the first of them."""
-
-    def lines(self, first: int) -> Sequence[Line]:
-        """Return points, events and remarks from number ``first`` on, as they were told."""
-
-    @property
-    def connected(self) -> bool:
-        """Whether there still is something that publishes."""
-
-    def request_stop(self, cause: str) -> None:
-        """Ask for the ramp to 0 V; RecordingError if the request cannot be left."""
-
-    def close(self) -> None:
-        """Close what is open."""
-
-
 class LiveRun(Closing):
     """A run that is under way, or was when it was opened: what was published last can still be read.
 
@@ -107,7 +43,9 @@ class LiveRun(Closing):
     """
 
     generation = 0
+    """Number of jumps of a replay so far; none here."""
     player = None
+    """Controls of a replay; none here."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

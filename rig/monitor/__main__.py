@@ -11,7 +11,7 @@ import threading
 from collections.abc import Mapping
 from contextlib import suppress
 
-from rig.monitor.priority import lower_priority
+from rig.system.privileges import lower_priority
 
 
 def _main(process: int) -> None:

@@ -1,16 +1,19 @@
-"""Connections to the page's server: what is told of each to the door, and the time that one may hang, which is bounded."""
+"""Connections to the page's server: the door knows of each, and none may hang for long; and the server with that door."""
 
 import asyncio
+import socket
+import ssl
 from collections.abc import Callable
+from contextlib import suppress
 
 import h11
 from starlette.datastructures import Headers
-from uvicorn import Config
+from uvicorn import Config, Server
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
 
-from rig.monitor.first_message import with_token
+from rig.monitor.door import Door
 from rig.monitor.security import Keys
 from rig.monitor.visits import Visit
 
@@ -77,8 +80,7 @@ class WebConnection(H11Protocol):
             self._visit.becomes_feed()
 
     def _shows_key(self) -> bool:
-        """Return whether the last request has the cookie or the token of the address."""
-        return self._keys.known(Headers(raw=self.headers)) or with_token(self.scope["query_string"], self._keys)
+        return self._keys.known(Headers(raw=self.headers)) or self._keys.in_query(self.scope["query_string"])
 
     def pause_writing(self) -> None:
         """The client does not read."""
@@ -128,3 +130,30 @@ class FeedConnection(WebSocketsSansIOProtocol):
         if self.visit is not None:
             self.visit.gone()
         super().connection_lost(exc)
+
+
+class DoorServer(Server):
+    """Serves at one socket that listens, by TLS if there is a context for it."""
+
+    def __init__(self, config: Config, keys: Keys, tls: ssl.SSLContext | None) -> None:
+        super().__init__(config)
+        self._keys, self._tls = keys, tls
+        self.door: Door | None = None
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start the application, then accept."""
+        await super().startup(sockets=[])  # it listens nowhere itself
+        assert sockets is not None
+
+        def connection(visit: Visit) -> WebConnection:
+            return WebConnection(visit, self._keys, self.config, self.server_state, self.lifespan.state)
+
+        self.door = Door(sockets[0], self._tls, self._keys, connection)
+        self._accepting = asyncio.create_task(self.door.accept())
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Accept no more, then end what is under way."""
+        self._accepting.cancel()
+        with suppress(asyncio.CancelledError):
+            await self._accepting
+        await super().shutdown(sockets)

@@ -15,10 +15,8 @@ import ssl
 from collections.abc import Callable
 from contextlib import suppress
 
-from rig.monitor.descriptors import Capacity, capacity
-from rig.monitor.first_message import LARGEST, is_whole, shows_key
-from rig.monitor.security import Keys
-from rig.monitor.visits import Visit, Visits
+from rig.monitor.security import LARGEST, Keys, is_whole
+from rig.monitor.visits import Capacity, Visit, Visits, capacity
 
 BACKLOG = 1024
 """Connections that the system keeps until they are accepted."""
@@ -107,7 +105,7 @@ class Door:
         elif not is_whole(come, self._tls is not None):
             waited_s = loop.time() - self._unfinished[connection]
             loop.call_later(max(POLL_S, waited_s / 2.0), self._look, connection)  # a reader would be called without end
-        elif self._tls is None and shows_key(come, self._keys):
+        elif self._tls is None and self._keys.shown_by(come):
             del self._unfinished[connection]
             self._open(connection, self.visits.known_at_once())
         else:

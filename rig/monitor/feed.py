@@ -18,15 +18,17 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.live.facts import Line, RunFacts
 from rig.live.layout import bin_dtype
-from rig.live.reader import View
 from rig.monitor.shown import Shown, as_json, bins_json, shown_frame, shown_json, shown_line
 from vibrolock.printable import error_text
+
+if TYPE_CHECKING:
+    from rig.monitor.replay import View
 
 TICK_S = 1.0 / 15.0
 """Time between two looks at a run that is watched, s; chosen: motion looks smooth from some ten pictures a second on."""
@@ -35,7 +37,7 @@ STILL_S = 0.25
 UNWATCHED_S, WAITING_S = 1.0, 0.2
 """Time between two looks while nobody watches: at a run, and for a run to begin."""
 
-Look = Callable[[View | None], View | None]
+Look = Callable[["View | None"], "View | None"]
 """Given the view that is shown, returns the one to show."""
 
 
@@ -52,7 +54,7 @@ class Moment:
     """What was read in one tick."""
 
     place: Place
-    view: View | None
+    view: "View | None"
     lines: list[str]
     """JSON of all lines of the view; it may have grown since, `place` says how many there were."""
     facts: RunFacts | None
@@ -148,7 +150,6 @@ class Feed:
         return moment
 
     def _read(self) -> Moment:
-        """Return the present moment."""
         view = self.view
         try:
             view = self._look(view)
@@ -163,7 +164,7 @@ class Feed:
             facts = None if view is None else view.facts
             return self._moment_of(facts, shown, _text(shown_json(shown)), connected=False, changed=False)
 
-    def _read_view(self, view: View | None) -> Moment:
+    def _read_view(self, view: "View | None") -> Moment:
         if view is None:
             return self._moment_of(None, None, "null", connected=False, changed=self._moment is None)
         before = Place(self._number, len(self._lines), self._bins)
@@ -209,7 +210,6 @@ class Feed:
         )
 
     def _made(self, moment: Moment, since: Place) -> str:
-        """Return the message that brings a client from ``since`` to a moment."""
         bins = "null"
         if moment.view is not None and moment.facts is not None:
             first, found = since.bins, np.zeros(0, bin_dtype(len(moment.facts.channels)))

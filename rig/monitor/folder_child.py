@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rig.errors import RigError
 from rig.recording.journal import journal_path
-from rig.recording.journal_blocks import read_journal
+from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.layout import kind_in, open_unchecked, reading
 from rig.system.child import confine
 from vibrolock.printable import one_line, printable
@@ -29,7 +29,7 @@ def _kind(path: Path) -> dict[str, str]:
 
     try:
         if not path.exists():
-            header = read_journal(journal_path(path)).header
+            header = JournalBlocks(journal_path(path)).header
             return {
                 "kind": printable(header.kind),
                 "summary": f"recording of {printable(header.started)}, not finished",

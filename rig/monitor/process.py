@@ -12,24 +12,25 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import uvicorn
 
 from rig.errors import ConfigurationError
-from rig.live.reader import View
 from rig.monitor.certificate import from_files, self_signed
-from rig.monitor.connections import FeedConnection, WebConnection
+from rig.monitor.connections import DoorServer, FeedConnection, WebConnection
 from rig.monitor.door import BACKLOG
-from rig.monitor.door_server import DoorServer
 from rig.monitor.feed import Earlier, Feed, Look
-from rig.monitor.first_message import LARGEST_HEADERS
 from rig.monitor.opening import open_in_browser
-from rig.monitor.priority import lower_priority
-from rig.monitor.security import Keys
-from rig.monitor.server import Site, application
+from rig.monitor.security import LARGEST_HEADERS, Keys
+from rig.monitor.server import application
 from rig.monitor.sources import always, earlier_run
 from rig.monitor.stopping import Stopping
+from rig.system.privileges import lower_priority
 from rig.system.stop_signals import ended_in_order
+
+if TYPE_CHECKING:
+    from rig.monitor.replay import View
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 DEFAULT_PORTS = {"http": 80, "https": 443}
@@ -146,9 +147,8 @@ class PageServer:
             from rig.monitor.folder import Folder  # the page of a single run starts without it
 
             folder = Folder(self.folder)
-        site = Site(self.feed, self.keys, self.scheme, self.hosts, folder, self.stopping)
         config = uvicorn.Config(
-            application(site),
+            application(self.feed, self.keys, self.scheme, self.hosts, folder, self.stopping),
             http=WebConnection,
             ws=FeedConnection,
             loop="asyncio",
@@ -211,7 +211,7 @@ class Serving:
     open_browser: bool = False
 
 
-def serve(show: View | Look, serving: Serving | None = None, *, folder: Path | None = None) -> None:
+def serve(show: "View | Look", serving: Serving | None = None, *, folder: Path | None = None) -> None:
     """Serve the page of a view, or of what is chosen time and again, until Ctrl-C; say where it is.
 
     Raises:

@@ -5,7 +5,7 @@ import threading
 import time
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
@@ -19,10 +19,11 @@ from rig.campaigns.running.watched import watched_facts
 from rig.errors import RecordingError
 from rig.live.facts import Line
 from rig.live.layout import BINS, FRAME, bin_dtype, window_rows
-from rig.live.reader import Frame, ReplayState
+from rig.live.reader import Frame, LiveRun
 from rig.monitor.recorded_part import PlanOfPart, RecordedPart
 from rig.monitor.shown import fundamentals_of
 from rig.recording.reader import Recording
+from rig.system.closing import Closing
 from rig.tick.safety.layout import EndReason, GuardMode
 from vibrolock.errors import InputError
 
@@ -34,8 +35,19 @@ MEAN_S = 0.1
 """Time over which the phase error is averaged, s; chosen: about as long as the rows between two frames of a run."""
 
 
-class Replay:
-    """A `rig.live.reader.View` on a recording of any kind, with all its parts one after the other.
+@dataclass(frozen=True)
+class ReplayState:
+    """Where a replay stands."""
+
+    time_s: float
+    duration_s: float
+    playing: bool
+    speed: float
+    """How many times as fast as the clock."""
+
+
+class Replay(Closing):
+    """A recording of any kind as a run under way (`rig.live.reader.LiveRun`), with all its parts one after the other.
 
     It plays from the beginning, ``speed`` times as fast as the clock; with ``at_end`` it stands at the end. Rows are read when
     they are shown. What was not recorded is NaN: lateness, periods settled, and levels in newtons or metres while they are
@@ -48,13 +60,11 @@ class Replay:
     def __init__(self, path: Path, speed: float = 1.0, at_end: bool = False) -> None:
         self._recording = Recording(path)
         try:
-            if not 0.0 < speed <= FASTEST:
-                raise RecordingError(field="speed", value=speed, allowed=f"above 0, up to {FASTEST:g}")
+            self.speed = _checked(speed)
             self._prepare(path)
         except BaseException:
             self._recording.close()
             raise
-        self.speed = speed
         self.generation = 0
         """Number of jumps so far: after each, lines and bins begin anew."""
         self._lock = threading.Lock()
@@ -133,8 +143,7 @@ class Replay:
 
     def set_speed(self, speed: float) -> None:
         """Go on ``speed`` times as fast as the clock; RecordingError if that is not allowed."""
-        if not 0.0 < speed <= FASTEST:
-            raise RecordingError(field="speed", value=speed, allowed=f"above 0, up to {FASTEST:g}")
+        _checked(speed)
         with self._lock:
             self._at_s, self._since_s = self._now_s(), None if self._since_s is None else time.monotonic()
             self.speed = speed
@@ -199,18 +208,11 @@ class Replay:
         self._connected = False
         self._recording.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def _now_s(self) -> float:
         gone_s = 0.0 if self._since_s is None else self.speed * (time.monotonic() - self._since_s)
         return min(self._at_s + gone_s, self.duration_s)
 
     def _samples_over(self) -> int:
-        """Return how many samples of the recording are over."""
         return min(round(self.time_s * self._rate), int(self._begins[-1]))
 
     def _place(self) -> tuple[RecordedPart | None, int]:
@@ -276,6 +278,16 @@ class Replay:
         if end is not None and samples >= part.n_samples:
             state["overruns"] = (end.get("loop") or {}).get("overruns", 0)
         return state
+
+
+def _checked(speed: float) -> float:
+    if not 0.0 < speed <= FASTEST:
+        raise RecordingError(field="speed", value=speed, allowed=f"above 0, up to {FASTEST:g}")
+    return speed
+
+
+View = LiveRun | Replay
+"""A run as it is watched: one that is under way, or a recording that is replayed."""
 
 
 def _plan_of(recording: Recording, number: int) -> PlanOfPart:

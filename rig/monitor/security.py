@@ -5,8 +5,10 @@ nothing: forms and sockets need a second token, which only the page knows, and a
 ``Host`` of every request must be the server's own address: a name of somebody else's that was made to point here is refused.
 """
 
+import re
 import secrets
 from collections.abc import Callable
+from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -25,6 +27,12 @@ HEADERS = {
 }
 """Headers of every answer."""
 
+LARGEST_HEADERS = 16384  # bytes of the headers of a request; chosen
+RECORD_HEAD, LARGEST_RECORD = 5, 16384  # bytes of a record of TLS (RFC 8446, 5.1)
+HANDSHAKE = 22
+"""Type of a record of TLS (RFC 8446, 5.1): type, version, length, and what it holds."""
+LARGEST = RECORD_HEAD + LARGEST_RECORD
+HEADERS_END = re.compile(rb"\n\r?\n")
 TOKEN_BYTES = 32  # bytes of a secret: 256 bits, as for keys
 
 
@@ -60,9 +68,31 @@ class Keys:
         pairs = (one.strip().partition("=") for one in ";".join(headers.getlist("cookie")).split(";"))
         return any(name == self.cookie_name and same(value, self.cookie) for name, _, value in pairs)
 
+    def in_query(self, query: bytes) -> bool:
+        """Return whether a query has the token of the address."""
+        return self.opens(parse_qs(query.decode("latin-1")).get("token", [""])[0])
+
+    def shown_by(self, request: bytes) -> bool:
+        """Return whether a request has the cookie or the token of the address."""
+        first, *lines = request.splitlines()
+        pairs = (line.partition(b":") for line in lines)
+        headers = Headers(raw=[(name.strip().lower(), value.strip()) for name, _, value in pairs])
+        target = first.split(b" ")[1:2] or [b""]
+        return self.known(headers) or self.in_query(target[0].partition(b"?")[2])
+
     def acts(self, token: str | None) -> bool:
         """Return whether this is the token for forms and sockets."""
         return token is not None and same(token, self.action)
+
+
+def is_whole(come: bytes, tls: bool) -> bool:
+    """Return whether what has come on a connection is a message, or can no longer become one that is allowed."""
+    if not tls:
+        return len(come) >= LARGEST_HEADERS or HEADERS_END.search(come) is not None
+    if len(come) < RECORD_HEAD:
+        return False
+    length = int.from_bytes(come[3:RECORD_HEAD], "big")
+    return come[0] != HANDSHAKE or length > LARGEST_RECORD or len(come) >= RECORD_HEAD + length
 
 
 Refuse = Callable[[Scope, int, str], ASGIApp]

@@ -6,7 +6,6 @@ Paths of requests are looked up in tables; none is ever a path in the file syste
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator
-from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from string import Template
@@ -16,14 +15,14 @@ from urllib.parse import parse_qs
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
-from starlette.responses import JSONResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from rig.monitor.feed import Feed, Moment, Place
-from rig.monitor.plain_pages import HARDWARE, plain_page
 from rig.monitor.security import Guard, Keys
+from rig.monitor.shutdown_monitor import HARDWARE
 from rig.monitor.stopping import Stopping
 from rig.monitor.visits import MOST_SOCKETS
 from rig.system.child import ChildFailed
@@ -51,25 +50,15 @@ HOW_TO_ENTER = (
 )
 
 
-@dataclass(frozen=True)
-class Site:
-    """What is served."""
-
-    feed: Feed
-    keys: Keys
-    scheme: str
-    hosts: frozenset[str]
-    folder: "Folder | None" = None
-    stopping: Stopping = field(default_factory=Stopping)
-
-
-def application(site: Site) -> ASGIApp:
-    """Return the application."""
-    pages = _Pages(site)
+def application(
+    feed: Feed, keys: Keys, scheme: str, hosts: frozenset[str], folder: "Folder | None", stopping: Stopping
+) -> ASGIApp:
+    """Return the application that serves a feed, and a folder if there is one, to those who have the keys."""
+    pages = _Pages(feed, keys, scheme == "https", folder, stopping)
 
     @contextlib.asynccontextmanager
     async def reading(app: Starlette) -> AsyncIterator[None]:
-        task = asyncio.create_task(site.feed.run())
+        task = asyncio.create_task(feed.run())
         try:
             yield
         finally:
@@ -92,13 +81,14 @@ def application(site: Site) -> ASGIApp:
     app = Starlette(routes=routes, lifespan=reading)
     app.add_exception_handler(HTTPException, pages.refused)
     app.add_exception_handler(Exception, pages.refused)
-    return Guard(app, site.scheme, site.hosts, _refusal)
+    return Guard(app, scheme, hosts, _refusal)
 
 
 class _Pages:
-    def __init__(self, site: Site) -> None:
-        self._site, self._feed, self._keys = site, site.feed, site.keys
-        self._files = {path.name: (path.read_bytes(), TYPES[path.suffix]) for path in _files()}
+    def __init__(self, feed: Feed, keys: Keys, secure: bool, folder: "Folder | None", stopping: Stopping) -> None:
+        self._feed, self._keys, self._secure, self._folder, self._stopping = feed, keys, secure, folder, stopping
+        files = [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]
+        self._files = {path.name: (path.read_bytes(), TYPES[path.suffix]) for path in files}
         self._index = Template((PAGE / "index.html").read_text(encoding="utf-8"))
 
     async def index(self, request: Request) -> Response:
@@ -107,9 +97,13 @@ class _Pages:
         if token is not None and self._keys.admit(token):
             # Not a redirect: after one from elsewhere, such as from the file of --open, a strict cookie would be withheld.
             response = plain_page("Opening the page", onward="/", after_s=0)
-            secure = self._site.scheme == "https"
             response.set_cookie(
-                self._keys.cookie_name, self._keys.cookie, path="/", secure=secure, httponly=True, samesite="strict"
+                self._keys.cookie_name,
+                self._keys.cookie,
+                path="/",
+                secure=self._secure,
+                httponly=True,
+                samesite="strict",
             )
             return response
         self._must_be_known(request)
@@ -121,12 +115,11 @@ class _Pages:
             action_token=self._keys.action,
             title=escape(title),
             replay="yes" if moment.view is not None and moment.view.player is not None else "no",
-            folder="no" if self._site.folder is None else "yes",
+            folder="no" if self._folder is None else "yes",
         )
         return Response(text, media_type="text/html; charset=utf-8")
 
     async def file(self, request: Request) -> Response:
-        """A file of the page."""
         found = self._files.get(request.path_params["name"])
         if found is None:
             raise HTTPException(404)
@@ -153,11 +146,18 @@ class _Pages:
             await socket.close(1013, "too many pages are open")
             return
         self._feed.clients += 1
-        sending = asyncio.create_task(self._send(socket))
+
+        async def send() -> None:
+            place = Place()
+            while True:
+                text, place = await self._feed.following(place)
+                await socket.send_text(text)
+
+        sending = asyncio.create_task(send())
         try:
             while (said := await socket.receive())["type"] != "websocket.disconnect":
                 if said.get("text") == STOP:  # whatever else it says
-                    self._site.stopping.ask(self._feed.view)
+                    self._stopping.ask(self._feed.view)
         except (WebSocketDisconnect, RuntimeError):
             pass
         finally:
@@ -166,24 +166,16 @@ class _Pages:
             with contextlib.suppress(asyncio.CancelledError, WebSocketDisconnect, OSError, RuntimeError):
                 await sending
 
-    async def _send(self, socket: WebSocket) -> None:
-        place = Place()
-        while True:
-            text, place = await self._feed.following(place)
-            await socket.send_text(text)
-
     async def stop(self, request: Request) -> Response:
-        """Ask the run to ramp down, and say what comes of it."""
         await self._form(request)
         view = self._feed.view
-        self._site.stopping.ask(view)
+        self._stopping.ask(view)
         moment = await self._now()
         if moment is not None and moment.view is not view:  # another run has begun meanwhile
-            self._site.stopping.ask(moment.view)
+            self._stopping.ask(moment.view)
         return self._where_the_ramp_is(request, moment)
 
     async def stopping(self, request: Request) -> Response:
-        """Where the ramp is."""
         self._must_be_known(request)
         return self._where_the_ramp_is(request, await self._now())
 
@@ -194,14 +186,13 @@ class _Pages:
         return None
 
     def _where_the_ramp_is(self, request: Request, moment: Moment | None) -> Response:
-        word, heading, text = self._site.stopping.state(moment)
+        word, heading, text = self._stopping.state(moment)
         if "application/json" in request.headers.get("accept", ""):
             return JSONResponse({"state": word, "text": f"{heading}. {text}"})
         onward = "" if word in ("none", "off", "driven") else "/stopping"
         return plain_page(heading, text, "This is no emergency stop.", kind=word, onward=onward)
 
     async def replay(self, request: Request) -> Response:
-        """Pause, play, seek, or set the speed of a replay."""
         player = None if self._feed.view is None else self._feed.view.player
         form = await self._form(request)
         if player is None:
@@ -213,26 +204,23 @@ class _Pages:
         return JSONResponse({"replay": "ok"})
 
     async def folder(self, request: Request) -> Response:
-        """What lies in the folder."""
-        return JSONResponse({"entries": await self._folder(request).entries()})
+        return JSONResponse({"entries": await self._known_folder(request).entries()})
 
     async def figure(self, request: Request) -> Response:
-        """The figure of a file."""
         return Response(await self._of_file(request, "figure"), media_type="image/png")
 
     async def table(self, request: Request) -> Response:
-        """The table of a file."""
         return Response(await self._of_file(request, "table"), media_type="text/plain; charset=utf-8")
 
-    def _folder(self, request: Request) -> "Folder":
+    def _known_folder(self, request: Request) -> "Folder":
         self._must_be_known(request)
-        if self._site.folder is None:
+        if self._folder is None:
             raise HTTPException(404)
-        return self._site.folder
+        return self._folder
 
     async def _of_file(self, request: Request, what: str) -> bytes:
         try:
-            return await self._folder(request).made(what, request.path_params["n"])
+            return await self._known_folder(request).made(what, request.path_params["n"])
         except KeyError:
             raise HTTPException(404) from None
         except ChildFailed as error:
@@ -265,7 +253,6 @@ class _Pages:
             raise HTTPException(403)
 
     async def refused(self, request: Request, error: Exception) -> Response:
-        """Say in plain words what is wrong."""
         status = error.status_code if isinstance(error, HTTPException) else 500
         texts = {
             403: "This browser is not known here.",
@@ -290,5 +277,22 @@ def _refusal(scope: Scope, status: int, text: str) -> Response:
     )
 
 
-def _files() -> list[Path]:
-    return [path for path in PAGE.rglob("*") if path.suffix in TYPES and path.is_file()]
+def plain_page(
+    heading: str, *texts: str, status: int = 200, kind: str = "", onward: str = "", after_s: int = 1
+) -> HTMLResponse:
+    """Return a page without any script, with a heading in large letters: the way out when nothing else works, and refusals.
+
+    ``kind`` is its class for colours: ``asked``, ``ramping``, ``off`` or ``failed``. ``onward`` is a path that the browser
+    opens ``after_s`` seconds later.
+    """
+    refresh = f'<meta http-equiv="refresh" content="{after_s};url={escape(onward)}">' if onward else ""
+    paragraphs = "".join(f"<p>{escape(text)}</p>" for text in texts if text)
+    return HTMLResponse(
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f'{refresh}<title>{escape(heading)}</title><link rel="icon" href="/page/icon.svg">'
+        '<link rel="stylesheet" href="/page/plain.css"></head>'
+        f'<body class="{escape(kind)}"><main><h1 role="status">{escape(heading)}</h1>{paragraphs}'
+        '<p><a href="/">Back to the page</a></p></main></body></html>',
+        status,
+    )

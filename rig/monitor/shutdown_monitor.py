@@ -57,7 +57,8 @@ class ShutdownMonitor:
             self._open()
         frame = None if self._run is None else self._run.frame()
         guard = None if frame is None else GuardMode(int(frame.state["guard"]))
-        end = self._end()
+        lines = [] if self._run is None else self._run.lines(0)
+        end = text_in(lines[-1], "text") if lines and lines[-1]["is"] == "end" else None
         if guard is GuardMode.OFF:
             return Outcome(True, "output at 0 V" if alive else "output at 0 V, the run is over")
         if not alive:
@@ -66,7 +67,9 @@ class ShutdownMonitor:
             return Outcome(frame is None, f"the run is over: {end}" + ("" if frame is None else f": {HARDWARE}"))
         if self._refused:
             return Outcome(False, f"{self._refused}: {HARDWARE}")
-        if (waited_s := time.monotonic() - self._began_s) < self._longest_s():
+        ramp_s = math.nan if self._run is None else self._run.facts.limits.ramp_down_s
+        longest_s = REST_S + (ramp_s if math.isfinite(ramp_s) else 0.0) if self._timeout_s is None else self._timeout_s
+        if (waited_s := time.monotonic() - self._began_s) < longest_s:
             return None
         last = "it has not begun; the request stays, and nothing is known of its output"
         if frame is not None and guard is not None:
@@ -83,14 +86,3 @@ class ShutdownMonitor:
             self._run = LiveRun(self._folder)
         except RecordingError:  # about to begin, over, or of another version
             self._run = None
-
-    def _end(self) -> str | None:
-        """Return how the last part ended, if that was told."""
-        lines = [] if self._run is None else self._run.lines(0)
-        return text_in(lines[-1], "text") if lines and lines[-1]["is"] == "end" else None
-
-    def _longest_s(self) -> float:
-        if self._timeout_s is not None:
-            return self._timeout_s
-        ramp_s = math.nan if self._run is None else self._run.facts.limits.ramp_down_s
-        return REST_S + (ramp_s if math.isfinite(ramp_s) else 0.0)

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 from rig.errors import RecordingError
 from rig.live.facts import RunFacts
 from rig.live.place import runs
-from rig.live.reader import LiveRun, View, run_into
+from rig.live.reader import LiveRun, run_into
 from rig.monitor.feed import Earlier
 from rig.monitor.shown import shown_line
 
 if TYPE_CHECKING:
-    from rig.monitor.replay import Replay
+    from rig.monitor.replay import Replay, View
 
 POLL_S = 0.2
 """Shortest time between two looks for a run, s; chosen."""
 Wanted = Callable[[RunFacts], bool]
 
 
-def always(view: View) -> Callable[[View | None], View]:
+def always(view: "View") -> "Callable[[View | None], View]":
     """Return the choice of one view for good."""
     return lambda shown: view
 
@@ -36,14 +36,14 @@ class Latest:
     def __init__(
         self,
         wanted: Wanted = lambda facts: True,
-        instead: View | None = None,
-        on_found: Callable[[View], None] = lambda view: None,
+        instead: "View | None" = None,
+        on_found: "Callable[[View], None]" = lambda view: None,
     ) -> None:
         self._wanted, self._instead, self._on_found = wanted, instead, on_found
         self._looked_s = float("-inf")
         self._shown = instead
 
-    def __call__(self, shown: View | None) -> View | None:
+    def __call__(self, shown: "View | None") -> "View | None":
         """Return the view to show, given the one that is shown."""
         shown = shown or self._instead
         under_way = isinstance(shown, LiveRun) and shown.connected
@@ -63,7 +63,7 @@ class Latest:
             self._shown.close()
             self._shown = None
 
-    def _found(self, shown: View | None) -> LiveRun | None:
+    def _found(self, shown: "View | None") -> LiveRun | None:
         for folder in runs():
             if isinstance(shown, LiveRun) and folder == shown.folder:
                 continue

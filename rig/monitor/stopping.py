@@ -2,16 +2,17 @@
 
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from rig.live.reader import View
 from rig.monitor.feed import Moment
-from rig.monitor.plain_pages import HARDWARE
 from rig.monitor.shown import Shown
+from rig.monitor.shutdown_monitor import HARDWARE, REST_S
 from vibrolock.printable import error_text
 
+if TYPE_CHECKING:
+    from rig.monitor.replay import View
+
 SILENT_S = 2.0  # s without a frame after which a run counts as silent; chosen: sixty frames
-REST_S = 10.0
-"""Time beyond the ramp for what a run may be doing before it looks."""
 BY_PAGE = "stopped on the page"
 
 
@@ -27,7 +28,7 @@ class Stopping:
         self._asked_s = 0.0
         self._refused = ""
 
-    def ask(self, view: View | None) -> None:
+    def ask(self, view: "View | None") -> None:
         """Ask the run that is shown to ramp down."""
         if view is None:
             self._kept = self._expecting()
@@ -40,7 +41,7 @@ class Stopping:
         except Exception as error:  # whatever it is, it must be said
             self._refused = error_text(error)
 
-    def begun(self, view: View) -> None:
+    def begun(self, view: "View") -> None:
         """Leave a request that was kept for a run that has now begun."""
         if self._kept:
             self._kept = False

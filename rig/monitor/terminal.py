@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.align import Align
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
@@ -12,10 +13,12 @@ from rich.table import Table
 from rich.text import Text
 
 from rig.live.facts import Line, RunFacts
-from rig.live.reader import ReplayState
 from rig.monitor.shown import Details, Shown
 from rig.monitor.words import duration, event_text, figure, point_cells, point_headings, share_word
 from vibrolock.printable import printable
+
+if TYPE_CHECKING:
+    from rig.monitor.replay import ReplayState
 
 STALE_S = 0.7
 """Age from which on data counts as stale, s; chosen: with the time between two drawings, it is grey within one second."""
@@ -48,7 +51,7 @@ def draw(
     *,
     size: tuple[int, int],
     connected: bool = True,
-    replay: ReplayState | None = None,
+    replay: "ReplayState | None" = None,
 ) -> RenderableType:
     """Return the view of `rig.monitor.shown.shown_frame` for a terminal of ``size`` (columns, rows)."""
     width, height = size
@@ -87,7 +90,6 @@ def draw(
 
 
 def _rows(what: Sequence[RenderableType], width: int) -> int:
-    """Return how many rows of the terminal something takes."""
     return len(Console(width=width).render_lines(Group(*what))) if what else 0
 
 
@@ -131,7 +133,7 @@ def _banner(shown: Shown, *, stale: bool, lost: bool, tall: bool) -> RenderableT
     return Padding(Group(*rows), (1, 0) if tall or not shown.cause else (0, 0), style=style)
 
 
-def _replayed(replay: ReplayState, width: int) -> Text:
+def _replayed(replay: "ReplayState", width: int) -> Text:
     at, whole = replay.time_s, replay.duration_s
     bar = max(10, width - 62)
     filled = round(bar * (at / whole if whole > 0.0 else 1.0))
@@ -144,7 +146,9 @@ def _numbers(state: str, now: Details, facts: RunFacts, *, across: int) -> list[
     """Return numbers with their units, so many in a line, and a line on the loop where that is known."""
     unit = facts.level_unit
     to = f", to {now.target:.4g} {unit}" if math.isfinite(now.target) and now.guard == "armed" else ""
-    settled = now.settled if state == "settling" else None
+    good, needed = now.settled or (0, 0)
+    shown = state == "settling" and now.settled is not None
+    progress = f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 4)}"
     cells = [
         ("frequency", figure(now.frequency_hz, ".4f"), "Hz"),
         ("phase error", figure(now.phase_error_deg, ".2f"), "deg"),
@@ -153,7 +157,7 @@ def _numbers(state: str, now: Details, facts: RunFacts, *, across: int) -> list[
         ("voltage", figure(now.voltage_v, ".4f"), "V"),
         ("level", figure(now.level, ".4g"), unit + to),
         ("time", figure(now.time_s, ".1f"), f"s of part {now.part}"),
-        ("settled", "-" if settled is None else str(settled[0]), "" if settled is None else _progress(settled)),
+        ("settled", str(good) if shown else "-", progress if shown else ""),
     ]
     table = Table.grid(expand=True)
     for _ in range(across):
@@ -171,11 +175,6 @@ def _numbers(state: str, now: Details, facts: RunFacts, *, across: int) -> list[
         text += f", {now.lost} samples lost" if now.lost else ""
         told.append(Text(text, style="grey62", no_wrap=True, overflow="ellipsis"))
     return told
-
-
-def _progress(settled: tuple[int, int]) -> str:
-    good, needed = settled
-    return f"of {needed} periods {_bar(good / needed if needed > 0 else 0.0, 4)}"
 
 
 def _bar(part: float, length: int) -> str:

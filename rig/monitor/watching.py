@@ -4,12 +4,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rig.live.facts import Line, text_in
-from rig.live.reader import ReplayState, View
 from rig.monitor.shown import shown_frame
 from rig.monitor.words import event_text, point_text, state_text
 from vibrolock.printable import printable
+
+if TYPE_CHECKING:
+    from rig.monitor.replay import ReplayState, View
 
 POLL_S = 0.1
 """Time between two looks at a run that is printed as lines, s; chosen."""
@@ -21,7 +24,7 @@ DEAD = "its process has ended without a word: what the output does is not known,
 Keys = Callable[[], str]
 
 
-def watch(view: View, keys: Keys = lambda: "") -> bool:
+def watch(view: "View", keys: Keys = lambda: "") -> bool:
     """Show a view until its run is over; return whether it was told how it ended.
 
     ``keys`` returns the key that was pressed since, if any: they steer a replay (`_steer`), and ``q`` ends it.
@@ -36,47 +39,31 @@ def how_it_ended(lines: Sequence[Line]) -> str | None:
     return printable(text_in(lines[-1], "text")) if lines and lines[-1]["is"] == "end" else None
 
 
-class PlainLines:
-    """Prints what is new of a view: its points, events, remarks, ends, and a line for every state that it comes to."""
-
-    def __init__(self, view: View, say: Callable[[str], None]) -> None:
-        self._view, self._say = view, say
-        self._lines: list[Line] = []
-        self._state = ""
-
-    @property
-    def ended(self) -> str | None:
-        """How the run ended, if that was told."""
-        return how_it_ended(self._lines)
-
-    def look(self) -> None:
-        """Print what is new."""
-        facts = self._view.facts
-        new = self._view.lines(len(self._lines))
-        self._lines += new
-        for line in new:
-            if text := point_text(line, facts) if line["is"] == "point" else event_text(line, facts):
-                self._say(text)
-        shown = shown_frame(self._view.frame(), facts, self._lines)
-        if shown.state != self._state:
-            self._state = shown.state
-            self._say(state_text(shown, facts))
-
-
-def _printed(view: View) -> bool:
-    lines = PlainLines(view, _print)
-    while True:
+def _printed(view: "View") -> bool:
+    """Print points, events, remarks and ends as they come, and a line for every state that the run comes to."""
+    lines: list[Line] = []
+    state = ""
+    connected = True
+    while connected:
         connected = _goes_on(view)  # asked first: what was told last is read afterwards
-        lines.look()
-        if not connected:
-            break
-        time.sleep(POLL_S)
-    if lines.ended is None:
+        new = view.lines(len(lines))
+        lines += new
+        for line in new:
+            if text := point_text(line, view.facts) if line["is"] == "point" else event_text(line, view.facts):
+                _print(text)
+        shown = shown_frame(view.frame(), view.facts, lines)
+        if shown.state != state:
+            state = shown.state
+            _print(state_text(shown, view.facts))
+        if connected:
+            time.sleep(POLL_S)
+    ended = how_it_ended(lines)
+    if ended is None:
         _print(DEAD)
-    return lines.ended is not None
+    return ended is not None
 
 
-def _drawn(view: View, keys: Keys) -> bool:
+def _drawn(view: "View", keys: Keys) -> bool:
     from rich.console import Console
     from rich.live import Live
 
@@ -106,17 +93,17 @@ def _drawn(view: View, keys: Keys) -> bool:
     return ended is not None or _replay(view) is not None
 
 
-def _replay(view: View) -> ReplayState | None:
+def _replay(view: "View") -> "ReplayState | None":
     return None if view.player is None else view.player.replay_state()
 
 
-def _goes_on(view: View) -> bool:
-    """Return whether there is more to come: a replay is over at the end of its recording."""
+def _goes_on(view: "View") -> bool:
+    """Return whether there is more to come."""
     replay = _replay(view)
     return view.connected if replay is None else replay.time_s < replay.duration_s
 
 
-def _steer(view: View, key: str) -> None:
+def _steer(view: "View", key: str) -> None:
     """Pause or go on with the space bar; jump by a twentieth of a recording with the arrows."""
     player = view.player
     if player is None or not key:

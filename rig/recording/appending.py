@@ -77,14 +77,11 @@ class BlockFile:
                 rest = rest[os.write(self._descriptor, rest) :]
             self._end = (n_bytes + len(blocks), numbers.stop)
         except BaseException:
-            self._take_back()
+            try:
+                os.ftruncate(self._descriptor, self._end[0])
+            except OSError as error:
+                self._unsound = error
             raise
-
-    def _take_back(self) -> None:
-        try:
-            os.ftruncate(self._descriptor, self._end[0])
-        except OSError as error:
-            self._unsound = error
 
     def synchronise(self, *, if_due: bool = False) -> None:
         """Force what was written to the disk; ``if_due``: only if that was not done within ``SYNC_INTERVAL_S``.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rig.errors import RecordingError
 from rig.recording.journal import journal_path
-from rig.recording.journal_blocks import read_journal
+from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.layout import identify, kind_in, new_file, open_file, reading
 from rig.recording.tables import StoredTexts, write_object
 from vibrolock.printable import error_text
@@ -102,6 +102,6 @@ def kind_of(path: str | Path) -> str:
     """
     path = Path(path)
     if not path.exists() and journal_path(path).exists():
-        return read_journal(journal_path(path)).header.kind
+        return JournalBlocks(journal_path(path)).header.kind
     with open_file(path) as file, reading(path):
         return kind_in(file)

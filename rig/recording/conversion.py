@@ -17,7 +17,7 @@ from rig.recording.parts import Part
 from rig.system.locking import exclusive
 
 
-def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] | None = None) -> Path | None:
+def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] = lambda: None) -> Path | None:
     """Turn a journal into the HDF5 file ``output`` and remove the journal.
 
     Where ``output`` holds the earlier parts of the same recording, the new file holds them and the journal's. It is
@@ -51,17 +51,16 @@ def finalise(journal: str | Path, output: str | Path, check: Callable[[], None] 
             if not parts:
                 raise RecordingError(f"{journal}: nothing was recorded; remove it")
             with new_file(output, kept=f"the journal {journal} is kept") as (file, fits):
-                write_recording(file, header, parts, lambda: _each((fits, check)), unverified)
+
+                def fits_and_check() -> None:
+                    fits()
+                    check()
+
+                write_recording(file, header, parts, fits_and_check, unverified)
         if contents.damaged:
             return journal.rename(damaged_path(journal))
         journal.unlink()
         return None
-
-
-def _each(checks: Sequence[Callable[[], None] | None]) -> None:
-    for check in checks:
-        if check is not None:
-            check()
 
 
 def continue_recording(

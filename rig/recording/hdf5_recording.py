@@ -11,7 +11,7 @@ from rig.recording.header import Column, Header
 from rig.recording.integrity import VERIFIED
 from rig.recording.layout import file_integrity, identify, kind_in, open_unchecked, reading
 from rig.recording.parts import Part, rows_at_once
-from rig.recording.stored import ChannelTable, ColumnTable, Configuration, End, Event, Information, StoredPoint
+from rig.recording.stored import Configuration, End, Event, Information
 from rig.recording.tables import StoredTexts, write_object, write_table
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ class StoredPart(Part):
     def __init__(self, group: "h5py.Group", texts: StoredTexts, path: Path) -> None:
         self._group, self._path = group, path
         self.information = cast(Information, texts.object(group, "information"))
-        self.points = cast(list[StoredPoint], texts.table(group, "points"))
+        self.points = texts.table(group, "points")
         self.events = cast(list[Event], texts.table(group, "events"))
         self.end = cast(End, texts.object(group, "end")) if "end" in group else None
-        columns = cast(list[ColumnTable], texts.table(group, "columns"))
+        columns = texts.table(group, "columns")
         self.columns = tuple(Column(c["name"], c["unit"], c["description"]) for c in columns)
         self.row_dtype = np.dtype([(c["name"], c["dtype"], tuple(c["shape"])) for c in columns])
         self.n_rows = int(group.attrs["n_rows"])
@@ -61,13 +61,10 @@ def opened_recording(path: Path) -> "tuple[h5py.File, str]":
 
     A recording that took parts over from an unverified file is unverified for good.
     """
-    found = file_integrity(path)
-    file = open_unchecked(path)
-    return file, _integrity(file, found)
-
-
-def _integrity(file: "h5py.File", found: str) -> str:
-    return f"unverified: {file.attrs['unverified']}" if found == VERIFIED and "unverified" in file.attrs else found
+    found, file = file_integrity(path), open_unchecked(path)
+    if found == VERIFIED and "unverified" in file.attrs:
+        found = f"unverified: {file.attrs['unverified']}"
+    return file, found
 
 
 def taken_over(integrity: str, n_parts: int) -> str:
@@ -162,10 +159,7 @@ def _row_dataset(
 ) -> "h5py.Dataset":
     storage: dict[str, object] = {}
     if n_rows:
-        storage = {
-            "chunks": (min(step, n_rows), *field.shape),
-            **(_COMPRESSED if compressed else {}),
-        }
+        storage = {"chunks": (min(step, n_rows), *field.shape), **(_COMPRESSED if compressed else {})}
     dataset = group.create_dataset(f"rows/{column.name}", (n_rows, *field.shape), field.base, **storage)
     dataset.attrs["unit"], dataset.attrs["description"] = column.unit, column.description
     return dataset
@@ -188,7 +182,7 @@ def read_recording(file: "h5py.File", path: Path) -> tuple[Header, list[StoredPa
         header = Header(
             kind=kind_in(file),
             configuration=cast(Configuration, texts.object(file, "configuration")),
-            channels=cast(list[ChannelTable], texts.table(file, "channels")),
+            channels=texts.table(file, "channels"),
             row_dtype=parts[-1].row_dtype,
             columns=parts[-1].columns,
             software_version=str(file.attrs["software_version"]),

@@ -94,13 +94,7 @@ class Sink(io.RawIOBase):
         return size
 
     def readable(self) -> bool:
-        """Return True."""
+        """Return True: it can be read, written and moved in."""
         return True
 
-    def writable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seekable(self) -> bool:
-        """Return True."""
-        return True
+    writable = seekable = readable

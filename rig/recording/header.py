@@ -4,13 +4,12 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import cast
 
 import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording import jsontext
-from rig.recording.stored import ChannelTable, Configuration, HeaderTable
+from rig.recording.stored import Configuration, StoredTable
 
 FORMAT = "vibrolock"
 """Value of the attribute ``format`` of every file."""
@@ -18,6 +17,8 @@ FORMAT = "vibrolock"
 SCHEMA = 3
 """Version of the layout of journals and HDF5 files that this version writes; it reads all up to this one."""
 
+_FACTS = ("schema", "kind", "software_version", "started", "seed", "identity", "first_part")
+"""Fields of a header that are stored as they are."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _SCALARS = frozenset(np.dtype(code).newbyteorder("<") for code in ("?", *"bBhHiIqQ", *"efd", *"FD"))
 _LARGEST_ROW = 65536  # bytes; chosen: a thousand times a usual row
@@ -77,7 +78,7 @@ class Header:
     """Kind of recording, for example ``"backbone"``."""
     configuration: Configuration
     """The whole configuration as it was (bench, plan), JSON-able."""
-    channels: Sequence[ChannelTable]
+    channels: Sequence[StoredTable]
     """Channel table: one JSON-able mapping per input channel, in the order of the channel block of a row."""
     row_dtype: np.dtype
     """Structured dtype of one row; stored packed and little-endian."""
@@ -114,17 +115,10 @@ class Header:
     def encoded(self) -> bytes:
         """Return the header as JSON text."""
         row = self.row_dtype
-        fields = [row.fields[name][0] for name in row.names] if row.names and row.fields else []
         value = {
             "format": FORMAT,
-            "schema": self.schema,
-            "kind": self.kind,
-            "software_version": self.software_version,
-            "started": self.started,
-            "seed": self.seed,
-            "identity": self.identity,
-            "first_part": self.first_part,
-            "row_dtype": [[name, f.base.str, list(f.shape)] for name, f in zip(row.names or (), fields, strict=True)],
+            **{name: getattr(self, name) for name in _FACTS},
+            "row_dtype": [[name, row[name].base.str, list(row[name].shape)] for name in row.names or ()],
             "columns": [[column.name, column.unit, column.description] for column in self.columns],
             "channels": [dict(channel) for channel in self.channels],
             "configuration": dict(self.configuration),
@@ -139,23 +133,14 @@ class Header:
             RecordingError: another format, a later schema, or a damaged header; the message begins with ``path``.
         """
         try:
-            found = jsontext.decode(text)
-            if found.get("format") != FORMAT:
+            value = jsontext.decode(text)
+            if value.get("format") != FORMAT:
                 raise RecordingError(f"{path}: not a recording of vibrolock")
-            check_schema(found.get("schema"), path)
-            value = cast(HeaderTable, found)
+            check_schema(value.get("schema"), path)
             return cls(
+                **{name: value[name] for name in (*_FACTS, "configuration", "channels")},
                 row_dtype=np.dtype([(name, base, tuple(shape)) for name, base, shape in value["row_dtype"]]),
                 columns=tuple(Column(*texts) for texts in value["columns"]),
-                kind=value["kind"],
-                configuration=value["configuration"],
-                channels=value["channels"],
-                software_version=value["software_version"],
-                started=value["started"],
-                seed=value["seed"],
-                first_part=value["first_part"],
-                identity=value["identity"],
-                schema=value["schema"],
             )
         except (KeyError, TypeError, ValueError, MemoryError) as error:
             raise RecordingError(f"{path}: damaged: its header cannot be read ({error})") from error

@@ -1,5 +1,6 @@
 """The whole blocks of a journal in order, including those after damage."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,56 +25,53 @@ class Tail:
 
 
 class JournalBlocks:
-    """The blocks of a journal in order, read one at a time; ``tail`` says how it ended once they are exhausted."""
+    """The blocks of the journal at ``path``, read one at a time with bounded memory, also while it is still being written.
+
+    Iterate it for the whole blocks behind its ``header``: the ``gap`` of each says what cannot be read before it, and ``tail``
+    afterwards what cannot be read behind the last.
+
+    Raises:
+        RecordingError: on construction: no journal of ours, of a later schema, or not readable.
+    """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self._path = path
         self.tail = Tail(0, "", torn=True)
         try:
             with path.open("rb") as stream:
-                first = self._header_in(stream)
+                self.first = self._header_in(stream)
+                """Block of the header."""
         except OSError as error:
             raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
-        if first.kind is not BlockKind.HEADER:
+        if self.first.kind is not BlockKind.HEADER:
             raise RecordingError(f"{path}: not a readable journal; it does not begin with a header")
-        self.header = Header.decoded(first.payload, path)
-        self._first = first
+        self.header = Header.decoded(self.first.payload, path)
 
     def _header_in(self, stream: BinaryIO) -> Block:
         """The header, or its copy where it cannot be read."""
-        size = _size(stream)
+        size = stream.seek(0, os.SEEK_END)
         try:
             return read_block(stream, 0, size)
         except BadBlockError as error:
             second = following_block(stream, 1, size, 1)
             if second is None or second.kind is not BlockKind.HEADER:
                 if not size:
-                    raise RecordingError(f"{self.path}: {EMPTY}") from None
+                    raise RecordingError(f"{self._path}: {EMPTY}") from None
                 raise RecordingError.of(
-                    error, where=f"{self.path}: not a readable journal; at its beginning"
+                    error, where=f"{self._path}: not a readable journal; at its beginning"
                 ) from error
             return replace(second, gap=Gap(second.start, second.sequence, f"{error} (at byte 0)"))
-
-    @property
-    def header_stop(self) -> int:
-        """Position of the first byte behind the header's block."""
-        return self._first.stop
-
-    @property
-    def header_gap(self) -> Gap | None:
-        """What cannot be read before the header."""
-        return self._first.gap
 
     def __iter__(self) -> Iterator[Block]:
         """All whole blocks behind the header, also those behind damage; copies among them."""
         try:
-            with self.path.open("rb") as stream:
+            with self._path.open("rb") as stream:
                 yield from self._blocks(stream)
         except OSError as error:
-            raise RecordingError(f"{self.path}: cannot be read ({error.strerror})") from error
+            raise RecordingError(f"{self._path}: cannot be read ({error.strerror})") from error
 
     def _blocks(self, stream: BinaryIO) -> Iterator[Block]:
-        size, block = _size(stream), self._first
+        size, block = stream.seek(0, os.SEEK_END), self.first
         while block.stop < size:
             try:
                 following = self._in_order(read_block(stream, block.stop, size), block)
@@ -120,19 +118,3 @@ class JournalBlocks:
                 f"a block of part {block.part}, row {block.row}, where row {row} of part {part} belongs"
             )
         return block
-
-
-def _size(stream: BinaryIO) -> int:
-    return stream.seek(0, 2)
-
-
-def read_journal(path: str | Path) -> JournalBlocks:
-    """Open the journal at ``path`` for reading, block by block with bounded memory.
-
-    Iterate the result for the whole blocks behind its ``header``: the ``gap`` of each says what cannot be read before it, and
-    afterwards ``tail`` what cannot be read behind the last. A journal that is still being written may be read.
-
-    Raises:
-        RecordingError: no journal of ours, of a later schema, or not readable.
-    """
-    return JournalBlocks(Path(path))

@@ -11,9 +11,9 @@ import numpy as np
 from rig.errors import RecordingError
 from rig.recording.blocks import Block, BlockKind, Gap
 from rig.recording.header import Header
-from rig.recording.journal_blocks import Tail, read_journal
+from rig.recording.journal_blocks import JournalBlocks, Tail
 from rig.recording.parts import Part, missing_rows, rows_at_once
-from rig.recording.stored import End, Event, Information, StoredPoint
+from rig.recording.stored import End, Event, Information
 from rig.system.closing import Closing
 
 MISSING = -1
@@ -90,14 +90,15 @@ class JournalContents(Closing):
     read are not numbers, so that all behind them keep their place; the parts say what was lost.
 
     Raises:
-        RecordingError: on construction, as ``read_journal``; or none of its parts can be told apart.
+        RecordingError: on construction, as `JournalBlocks`; or none of its parts can be told apart.
     """
 
     def __init__(self, path: str | Path) -> None:
-        blocks = read_journal(path)
-        self.path, self.header = Path(path), blocks.header
+        self.path = Path(path)
+        blocks = JournalBlocks(self.path)
+        self.header = blocks.header
         self.parts: list[JournalPart] = []
-        self.n_blocks, self.size = 1, blocks.header_stop
+        self.n_blocks, self.size = 1, blocks.first.stop
         """Number of the block to come, and the bytes up to the last whole one."""
         self.damaged = False
         """Whether anything is lost apart from a write cut short at the end."""
@@ -108,8 +109,8 @@ class JournalContents(Closing):
         self._homeless: tuple[int, int, int] | None = None
         self._stream: BufferedReader = self.path.open("rb")
         try:
-            if blocks.header_gap is not None:
-                self._note(blocks.header_gap, "the header is there a second time")
+            if blocks.first.gap is not None:
+                self._note(blocks.first.gap, "the header is there a second time")
             for block in blocks:
                 self._add(block)
                 self.n_blocks, self.size, self.last_part = block.sequence + 1, block.stop, block.part
@@ -129,17 +130,24 @@ class JournalContents(Closing):
         here = block.part == self._part_number
         if block.gap is not None:
             self._note(block.gap, self._lost_before(block) if here else "the end of a part")
-        if block.kind is BlockKind.HEADER:
+        if block.kind is BlockKind.HEADER or (block.kind is BlockKind.PART and here):
             return
         if block.kind is BlockKind.PART:
-            if not here:
-                self._begin(block)
+            self._begin(block)
             return
         if not here:  # no part of that number has begun
             n_bytes, n_blocks, _ = self._homeless or (0, 0, 0)
             self._homeless = (n_bytes + block.stop - block.start, n_blocks + 1, block.part)
             return
-        self._add_to_part(block, self.parts[-1])
+        part = self.parts[-1]
+        if block.kind is BlockKind.ROWS:
+            part.add_rows(block.offset, len(block.payload) // self.header.row_dtype.itemsize)
+        elif block.kind is BlockKind.EVENT:
+            part.events.append(cast(Event, block.value))
+        elif block.kind is BlockKind.POINT:
+            part.points.append(block.value)
+        else:
+            part.end = cast(End, block.value)
 
     def _tell_homeless(self) -> None:
         """Note in one line the loss of a part whose beginning cannot be read."""
@@ -175,16 +183,6 @@ class JournalContents(Closing):
             self.parts[-1].add_gap(*told)
         else:
             self._before_parts.append(told)
-
-    def _add_to_part(self, block: Block, part: JournalPart) -> None:
-        if block.kind is BlockKind.ROWS:
-            part.add_rows(block.offset, len(block.payload) // self.header.row_dtype.itemsize)
-        elif block.kind is BlockKind.EVENT:
-            part.events.append(cast(Event, block.value))
-        elif block.kind is BlockKind.POINT:
-            part.points.append(cast(StoredPoint, block.value))
-        else:
-            part.end = cast(End, block.value)
 
     def close(self) -> None:
         """Close the file; may be called twice."""

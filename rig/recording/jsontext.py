@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.text.json_values import JsonValue
 
 
 def _plain(value: object) -> object:
@@ -33,7 +33,7 @@ def encode(value: Mapping[str, object], *, what: str, indent: int | None = None)
     return text.encode("utf-8", "backslashreplace")
 
 
-def decode(text: bytes | str) -> dict[str, JsonValue]:
+def decode(text: bytes | str) -> dict[str, Any]:
     """Read the JSON object in ``text``.
 
     Raises:

@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.errors import RecordingError
 from rig.recording.header import Column
-from rig.recording.stored import End, Event, Information, StoredPoint
+from rig.recording.stored import End, Event, Information, StoredTable
 
 
 def rows_at_once(row_dtype: np.dtype) -> int:
@@ -29,7 +29,7 @@ class Part(ABC):
 
     information: Information
     """Information given when the part began."""
-    points: list[StoredPoint]
+    points: list[StoredTable]
     """Results per point, in the order in which they were completed."""
     events: list[Event]
     """Events, in the order in which they happened."""

@@ -14,7 +14,7 @@ from rig.recording.journal import journal_path
 from rig.recording.journal_blocks import EMPTY
 from rig.recording.journal_contents import JournalContents
 from rig.recording.parts import Part
-from rig.recording.stored import ChannelTable, Configuration, PlanTable, StoredPoint
+from rig.recording.stored import Configuration, StoredTable
 from rig.recording.stored_value_checks import check_stored_values
 from rig.system.closing import Closing
 from vibrolock.results import Result
@@ -25,7 +25,7 @@ class RecordedPlan(NamedTuple):
 
     part: int
     """Number of that part."""
-    plan: PlanTable
+    plan: StoredTable
     """The plan as it was."""
     numbers: Sequence[int] | None
     """Numbers in this recording of the points that it asks for, in its order; ``None``: 0, 1, 2 and so on."""
@@ -50,6 +50,9 @@ class Recording(Result, Closing):
             for number, part in enumerate(self.parts, 1):
                 check_stored_values(part, f"{self.path}: part {number}")
             self._stack = stack.pop_all()
+        header = self._header
+        self.kind, self.channels, self.seed = header.kind, header.channels, header.seed
+        self.software_version, self.started = header.software_version, header.started
 
     def _open(self, stack: ExitStack, journal: Path | None) -> tuple[Header, Sequence[Part]]:
         if journal is None and not self.path.exists() and journal_path(self.path).exists():
@@ -71,6 +74,16 @@ class Recording(Result, Closing):
     """``"verified"``, or ``"unverified: WHY"`` where the HDF5 file has no digest; the blocks of a journal have check sums."""
     parts: Sequence[Part]
     """The parts in the order in which they were recorded."""
+    kind: str
+    """Kind of recording, for example ``"backbone"``."""
+    channels: Sequence[StoredTable]
+    """Channel table, one mapping per input channel."""
+    seed: int | None
+    """Seed of the noise of a virtual rig."""
+    software_version: str
+    """Version that began the recording."""
+    started: str
+    """Start time as it was given."""
 
     @property
     def configuration(self) -> Configuration:
@@ -86,55 +99,30 @@ class Recording(Result, Closing):
         return [first, *(RecordedPlan(n, said["plan"], said["numbers"]) for n, said in told if "plan" in said)]
 
     @property
-    def channels(self) -> Sequence[ChannelTable]:
-        """Channel table, one mapping per input channel."""
-        return self._header.channels
-
-    @property
-    def kind(self) -> str:
-        """Kind of recording, for example ``"backbone"``."""
-        return self._header.kind
-
-    @property
-    def seed(self) -> int | None:
-        """Seed of the noise of a virtual rig."""
-        return self._header.seed
-
-    @property
-    def software_version(self) -> str:
-        """Version that began the recording."""
-        return self._header.software_version
-
-    @property
-    def started(self) -> str:
-        """Start time as it was given."""
-        return self._header.started
-
-    @property
     def n_rows(self) -> int:
         """Rows of all parts together."""
         return sum(part.n_rows for part in self.parts)
 
     @property
-    def points(self) -> list[StoredPoint]:
+    def points(self) -> list[StoredTable]:
         """Results of all points, in the order in which they were completed, each with the number of its ``part``."""
         return [{**point, "part": number} for number, part in enumerate(self.parts) for point in part.points]
 
     @property
-    def latest(self) -> dict[int, StoredPoint]:
+    def latest(self) -> dict[int, StoredTable]:
         """The last result of each point of the current plan, keyed by the number of the point, in the order of the plan."""
         results = self._by_number()
         numbers = self.plans[-1].numbers
         return {n: results[n] for n in (sorted(results) if numbers is None else numbers) if n in results}
 
     @property
-    def former(self) -> dict[int, StoredPoint]:
+    def former(self) -> dict[int, StoredTable]:
         """The last result of each point that an earlier plan asked for and the plan in force does not, by number."""
         asked = self.latest
         results = self._by_number()
         return {n: results[n] for n in sorted(results) if n not in asked}
 
-    def _by_number(self) -> dict[int, StoredPoint]:
+    def _by_number(self) -> dict[int, StoredTable]:
         for point in self.points:
             if point.get("number") is None:
                 raise RecordingError(f"{self.path}: part {point['part'] + 1}: a point's number: is missing")

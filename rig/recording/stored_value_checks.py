@@ -4,10 +4,9 @@ What the fields of points mean is checked where points are read (`rig.campaigns.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Protocol
 
 from rig.errors import RecordingError
-from rig.recording.stored import End, Event, Information, StoredPoint
+from rig.recording.parts import Part
 
 LARGEST_NUMBER = 1e100
 """A finite number beyond it is no measurement; its square could be no number any more."""
@@ -18,25 +17,15 @@ _TEXTS = ("what", "text", "reason", "quality", "level_unit")
 _TRUTHS = ("accepted", "tripped", "completed")
 
 
-class _Told(Protocol):
-    """A part as far as it tells values (`rig.recording.parts.Part`)."""
-
-    information: Information
-    points: list[StoredPoint]
-    events: list[Event]
-    end: End | None
-
-
-def check_stored_values(part: _Told, where: str) -> None:
-    """Check points, events, information and end of a part (`rig.recording.parts.Part`).
+def check_stored_values(part: Part, where: str) -> None:
+    """Check points, events, information and end of a part.
 
     Raises:
         RecordingError: it names the value and what is allowed, after ``where``.
     """
-    ends: dict[str, Mapping[str, object]] = {} if part.end is None else {"end": part.end}
     tables: dict[str, Mapping[str, object]] = {
         "information": part.information,
-        **ends,
+        "end": part.end or {},
         **{f"points[{number}]": point for number, point in enumerate(part.points)},
         **{f"events[{number}]": event for number, event in enumerate(part.events)},
     }
@@ -44,9 +33,8 @@ def check_stored_values(part: _Told, where: str) -> None:
         for key, value, allowed in _faults(table, name):
             raise RecordingError(where=where, field=key, value=value, allowed=allowed)
     for number, event in enumerate(part.events):
-        if event.get("what") == "telemetry" and not all(
-            event.get(key) is not None for key in ("row", "sample", "stride")
-        ):
+        where_it_is = [event.get(key) for key in ("row", "sample", "stride")]
+        if event.get("what") == "telemetry" and None in where_it_is:
             raise RecordingError(
                 f"{where}: events[{number}]: allowed is an event telemetry with row, sample and stride"
             )

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,11 +66,11 @@ class StoredTexts:
         self._at_once = max(1, LARGEST_TEXTS_BYTES // max(size, 1))
         self._left = LARGEST_TEXTS_BYTES
 
-    def object(self, group: "h5py.Group", name: str) -> dict[str, JsonValue]:
+    def object(self, group: "h5py.Group", name: str) -> dict[str, Any]:
         """Read back what ``write_object`` wrote."""
         return jsontext.decode(self._allowed(group[name], self._texts(group[name])[()]))
 
-    def table(self, parent: "h5py.Group", name: str) -> list[dict[str, JsonValue]]:
+    def table(self, parent: "h5py.Group", name: str) -> list[dict[str, Any]]:
         """Read back what ``write_table`` wrote."""
         return [jsontext.decode(text) for text in self._read(parent[name]["json"])]
 

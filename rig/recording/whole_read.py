@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict
+from typing import TYPE_CHECKING
 
 from rig.errors import RecordingError
 from rig.recording.examination import objects_in
@@ -16,20 +16,14 @@ if TYPE_CHECKING:
 _AT_ONCE = 2**22  # bytes that are read at a time; chosen
 
 
-class Verdict(TypedDict):
-    """Result of reading a file."""
+def main(path: Path) -> dict[str, str | bool | int]:
+    """Read the whole file.
 
-    refused: str
-    """Why the file is refused; empty if it is not."""
-    memory: bool
-    """Whether it was refused because memory did not suffice."""
-    schema: int
-    """Schema of the file; 0 if it could not be read."""
-
-
-def main(path: Path) -> Verdict:
-    """Read the whole file and return the verdict."""
-    verdict: Verdict = {"refused": "", "memory": False, "schema": 0}
+    Returns:
+        ``refused``: why the file is refused, or an empty text; ``memory``: whether because memory did not suffice; ``schema``
+        of the file, 0 if it could not be read.
+    """
+    verdict: dict[str, str | bool | int] = {"refused": "", "memory": False, "schema": 0}
     try:
         with open_unchecked(path) as file, reading(path):
             verdict["schema"] = int(file.attrs["schema"])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rig.arming.run_facts import About
 from rig.recording.reader import Recording
-from rig.recording.stored import About as StoredAbout, ChannelTable
+from rig.recording.stored import About as StoredAbout, StoredTable
 from rig.report.document import Block, Facts, Section, Table, Text
 from rig.report.keys import key_rows, limit_rows
 from rig.text.console import number
@@ -77,12 +77,12 @@ def bench_section(recording: Recording) -> Section:
     return Section("Bench and sensors", blocks)
 
 
-def _calibrated(channel: ChannelTable) -> str:
+def _calibrated(channel: StoredTable) -> str:
     certificate = f" ({channel['certificate']})" if channel.get("certificate") else ""
     return (str(channel.get("calibrated") or "") + certificate).strip() or "-"
 
 
-def _sensitivity(channel: ChannelTable) -> str:
+def _sensitivity(channel: StoredTable) -> str:
     """Return the sensitivity as on the data sheet, or else in mV per unit."""
     if sheet := channel.get("sensitivity"):
         gain = f" x {channel['amplifier_gain']}" if channel.get("amplifier_gain") else ""
@@ -91,7 +91,7 @@ def _sensitivity(channel: ChannelTable) -> str:
     return f"{number(channel['sensitivity_v_per_unit'], '.6g', 1e3)} mV/{f'({unit})' if '/' in unit else unit}"
 
 
-def _overdue(channel: ChannelTable, day: str) -> bool:
+def _overdue(channel: StoredTable, day: str) -> bool:
     return bool(channel.get("calibration_due")) and str(channel["calibration_due"]) < day
 
 

@@ -20,7 +20,7 @@ from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.recording.stored import End, StoredPoint
+from rig.recording.stored import End, StoredTable
 from rig.rehearsal.comparison import compare, read_forecast
 from rig.results.files import load, understood
 from rig.results.kinds import KINDS
@@ -171,7 +171,7 @@ def _changes(recording: Recording) -> dict[int, list[str]]:
     return {said.part: changed_keys(before, after) for said, before, after in pairs}
 
 
-def _shown(point: StoredPoint, kind: str) -> dict[str, Any]:
+def _shown(point: StoredTable, kind: str) -> dict[str, Any]:
     """Return the stored form of a point without its harmonics. Keys that a failed point lacks are None."""
     expected = dict.fromkeys([*(column.key for column in CAMPAIGNS[kind].columns), *QUALITY])
     return {**expected, **{key: value for key, value in point.items() if key not in BULKY}}

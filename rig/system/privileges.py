@@ -4,6 +4,7 @@ import ctypes
 import gc
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 PRIORITY = 80
@@ -12,6 +13,7 @@ PRIORITY = 80
 CPU_VARIABLE = "VIBROLOCK_LOOP_CPU"
 """Environment variable with the number of the processor to which the loop is bound."""
 
+NICE = 5  # niceness (0 to 19) of what only watches; chosen: the loop goes first
 LOCK_CURRENT, LOCK_FUTURE = 1, 2
 SET_TIMER_SLACK = 29  # <sys/prctl.h>
 NO_SUCH = "not on this system"
@@ -38,6 +40,12 @@ def prepare(*, privileged: bool = True, priority: int = PRIORITY) -> dict[str, s
         except (OSError, ValueError) as error:
             out[name] = f"not available ({error})"
     return {"memory": "not asked for", "scheduling": "not asked for"} | out
+
+
+def lower_priority() -> None:
+    """Let this process, and what it starts, stand back behind those that drive a rig."""
+    with suppress(OSError, AttributeError):  # not on Windows
+        os.nice(NICE)
 
 
 def ordinary_scheduling() -> None:

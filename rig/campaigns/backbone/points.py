@@ -45,7 +45,7 @@ from rig.campaigns.evaluation.vibrations import (
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
-from rig.recording.stored import ChannelTable
+from rig.recording.stored import StoredTable
 from rig.text.column import Column
 
 NEAR = 0.1  # a point counts as reached within this distance of its final amplitude, as a logarithm
@@ -162,7 +162,7 @@ def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, no
 
 def backbone_of(
     points: Iterable[Point[object]],
-    channels: Sequence[ChannelTable],
+    channels: Sequence[StoredTable],
     shape: DriveShape,
     phase_lag_target_deg: float,
 ) -> Backbone:

@@ -40,7 +40,7 @@ from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
-from rig.recording.stored import ChannelTable
+from rig.recording.stored import StoredTable
 from rig.text.column import Column
 
 CONTINUOUS_BACKBONE_COLUMNS = (
@@ -234,7 +234,7 @@ def _one_way(found: ContinuousBackbone, way: int, index: int) -> OneWay:
 
 def continuous_backbones_of(
     points: Iterable[Point[ContinuousBackboneResult]],
-    channels: Sequence[ChannelTable],
+    channels: Sequence[StoredTable],
     shape: DriveShape,
 ) -> tuple[ContinuousBackbone, ...]:
     """Return the accepted points as one continuous backbone per repeat; raise `IdentificationError` if there are none."""

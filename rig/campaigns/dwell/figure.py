@@ -11,7 +11,7 @@ from rig.drawing.axes import widen
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
 from rig.recording.reader import Recording
-from rig.recording.stored import PlanTable
+from rig.recording.stored import StoredTable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ def draw(page: "Figure", recording: Recording) -> None:
     heading(page, recording)
 
 
-def _limits(axis: "Axes", values: np.ndarray, plan: PlanTable, watched: str) -> None:
+def _limits(axis: "Axes", values: np.ndarray, plan: StoredTable, watched: str) -> None:
     """Draw the alarm and abort limits on the side to which the quantity has changed."""
     if not watched or not np.isfinite(values[0]):
         return

@@ -10,7 +10,7 @@ from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
-from rig.recording.stored import ChannelTable
+from rig.recording.stored import StoredTable
 
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
 """The controlled quantity, by the unit of the levels."""
@@ -22,7 +22,7 @@ def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyRespons
 
 
 def frequency_responses_of(
-    points: Iterable[Point[object]], channels: Sequence[ChannelTable], specimen: str
+    points: Iterable[Point[object]], channels: Sequence[StoredTable], specimen: str
 ) -> tuple[FrequencyResponse, ...]:
     """Return the accepted points of a recording as one frequency response per level and pass.
 

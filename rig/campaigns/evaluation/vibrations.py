@@ -16,7 +16,7 @@ from rig.campaigns.evaluation.point import Modal, Point, Quality, planned_point,
 from rig.campaigns.evaluation.rows import Rows, phases
 from rig.campaigns.planning.drive_shape import DriveShape
 from rig.campaigns.planning.plan import OpenLoopPlan, Plan, Target
-from rig.recording.stored import ChannelTable
+from rig.recording.stored import StoredTable
 from rig.tick.safety.layout import POLARITY_HINT
 from rig.tick.sequencer.layout import Outcome
 from rig.tick.sequencer.repetition import LARGEST_CONTINUED, LARGEST_HELD, LARGEST_LOST
@@ -154,7 +154,7 @@ def measured_with(shape: DriveShape) -> dict[str, float | None]:
     return {"drive_mode_shape": shape.value, "drive_mode_shape_std": shape.std} if shape.measured else {}
 
 
-def channels_from(rows: Sequence[ChannelTable]) -> tuple[Channel, ...]:
+def channels_from(rows: Sequence[StoredTable]) -> tuple[Channel, ...]:
     """Convert a recording's table of channels to the channels of measurements."""
     return tuple(Channel(row["name"], row["role"], row["unit"]) for row in rows)
 

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
-from typing import cast
 
 from rig.bench import Bench
 from rig.bench.configuration import validated
@@ -20,7 +19,7 @@ from rig.campaigns.planning.plan import Plan, Target
 from rig.campaigns.plans import bench_of, plan_from
 from rig.errors import ConfigurationError
 from rig.recording.reader import Recording
-from rig.recording.stored import Information, PlanTable
+from rig.recording.stored import Information
 
 Identity = tuple[object, ...]
 
@@ -49,7 +48,7 @@ class Continuation:
         """Return the table that a part records about a new plan; an empty table if the plan is unchanged."""
         if not self.changed:
             return {}
-        return {"plan": cast(PlanTable, self.plan.model_dump(mode="json")), "numbers": list(self.numbers)}
+        return {"plan": self.plan.model_dump(mode="json"), "numbers": list(self.numbers)}
 
 
 def remaining(recording: Recording, change: Plan | None = None, source: str | Path = "") -> Continuation:

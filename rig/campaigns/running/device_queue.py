@@ -1,19 +1,17 @@
 """The queue of a run's device: settled before the run is armed, checked against the plan's gains, recorded."""
 
-from typing import cast
-
 from rig.arming.arming import armed
 from rig.arming.run_options import RunOptions
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.loop.session import Session
 from rig.loop.worker.queue_choice import QueueChoice, usual_delay_s
-from rig.recording.stored import About, ArmingTable
+from rig.recording.stored import About, StoredTable
 
 
 def armed_with_queue(
     plan: Plan, bench: Bench, session: Session, options: RunOptions
-) -> tuple[ArmingTable, QueueChoice | None]:
+) -> tuple[StoredTable, QueueChoice | None]:
     """Arm the bench and settle the queue of its device; return both.
 
     The queue is settled before, so that a person arms what will run; where the device has something latched, which only an
@@ -21,7 +19,7 @@ def armed_with_queue(
     """
     first = not session.latched
     choice = settled_queue(plan, bench, session, options) if first else None
-    arming = cast(ArmingTable, armed(bench, session, options.about.purpose or plan.kind, options.arm))
+    arming = armed(bench, session, options.about.purpose or plan.kind, options.arm)
     return arming, choice if first else settled_queue(plan, bench, session, options)
 
 

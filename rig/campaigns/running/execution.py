@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import ParamSpec, Protocol, TypeVar, cast
+from typing import ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from rig.errors import RecordingError
 from rig.live.publisher import Live
 from rig.loop.loop import LoopStatistics
 from rig.loop.session import RunningLoop
-from rig.recording.stored import End, Event, Information, LoopTable, TrippedAtTable
+from rig.recording.stored import End, Event, Information
 from rig.system.stop_signals import deferred, stopping_on_signals
 from rig.text.disorder import disorder_text
 from rig.tick.safety.layout import EndReason, GuardMode
@@ -438,7 +438,7 @@ class Execution:
             "tripped": reason.is_trip,
             **(self._trip(reason) if reason.is_trip else {}),
             "skipped": skipped_summary(self.reported.values(), len(self.targets) - self.done),
-            "loop": cast(LoopTable, self.loop.report),
+            "loop": dict(self.loop.report),
             "counters": self.loop.counters,
         }
 
@@ -452,7 +452,7 @@ class Execution:
         first = not points and (self.batched or len(self.reported) <= 1)
         advice = advice_on(trip, self.bench, self.plan, at, Before(points, self.locked, first))
         return {
-            "tripped_at": None if at is None else cast(TrippedAtTable, at._asdict()),
+            "tripped_at": None if at is None else at._asdict(),
             "likely_cause": advice.likely_cause,
             "what_to_do": advice.what_to_do,
         }
@@ -480,6 +480,6 @@ def end_without_measuring(bench: Bench) -> End:
         "text": "nothing was left to measure",
         "tripped": False,
         "skipped": "",
-        "loop": cast(LoopTable, LoopStatistics(bench.sample_rate_hz).report(0)),
+        "loop": dict(LoopStatistics(bench.sample_rate_hz).report(0)),
         "counters": {},
     }

@@ -38,7 +38,7 @@ from rig.recording.conversion import continue_recording, finalise
 from rig.recording.header import Column, Header
 from rig.recording.journal import JournalWriter, journal_path
 from rig.recording.reader import Recording
-from rig.recording.stored import About, BenchTable, ChannelTable, Information, PlanTable, RehearsalTable
+from rig.recording.stored import About, Information
 from rig.system.stop_signals import deferred, ended_in_order
 from rig.tick.layout import ROW_COLUMNS, recorded_row
 from rig.tick.safety.layout import EndReason
@@ -68,10 +68,10 @@ def run_plan(plan: Plan, bench: Bench, output: Path, options: RunOptions | None 
             header = Header(
                 kind=plan.kind,
                 configuration={
-                    "bench": cast(BenchTable, bench.model_dump(mode="json")),
-                    "plan": cast(PlanTable, plan.model_dump(mode="json")),
+                    "bench": bench.model_dump(mode="json"),
+                    "plan": plan.model_dump(mode="json"),
                 },
-                channels=[cast(ChannelTable, channel.model_dump(mode="json")) for channel in bench.channels],
+                channels=[channel.model_dump(mode="json") for channel in bench.channels],
                 row_dtype=recorded_row(len(bench.channels)),
                 columns=[Column(**column) for column in ROW_COLUMNS],
                 software_version=vibrolock.__version__,
@@ -278,7 +278,7 @@ def _facts(plan: Plan, bench: Bench, session: Session, options: RunOptions) -> A
     facts: About = {
         **cast(About, options.about.facts()),
         **({} if scale is None else {"checked": asdict(scale)}),
-        **({"rehearsal": cast(RehearsalTable, rehearsed)} if rehearsed else {}),
+        **({"rehearsal": rehearsed} if rehearsed else {}),
         "armed": arming,
         "device": session.identity,
         "remarks": remarks,

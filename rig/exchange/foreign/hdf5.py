@@ -54,7 +54,7 @@ def _group(group: "h5py.Group", budget: Budget, above: "tuple[h5py.h5g.GroupID, 
     found: dict[str, Value] = {}
     for name in group:
         budget.spend(0)
-        if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+        if is_link_out(group, name):
             found[name] = "<link to another file>"
             continue
         item = group.get(name)
@@ -64,7 +64,7 @@ def _group(group: "h5py.Group", budget: Budget, above: "tuple[h5py.h5g.GroupID, 
             inside = any(item.id == one for one in above) or len(above) >= MAX_DEPTH
             found[name] = "<group above>" if inside else _group(item, budget, (*above, item.id))
         elif isinstance(item, h5py.Dataset):
-            found[name] = plain_dataset(item, budget)
+            found[name] = _dataset(item, budget)
         else:
             found[name] = f"<{type(item).__name__}>"
             continue
@@ -72,7 +72,14 @@ def _group(group: "h5py.Group", budget: Budget, above: "tuple[h5py.h5g.GroupID, 
     return found
 
 
-def plain_dataset(item: "h5py.Dataset", budget: Budget) -> Value:
+def is_link_out(group: "h5py.Group", name: str) -> bool:
+    """Return whether a name in a group is a link to another file."""
+    import h5py
+
+    return isinstance(group.get(name, getlink=True), h5py.ExternalLink)
+
+
+def _dataset(item: "h5py.Dataset", budget: Budget) -> Value:
     """Return numbers, texts, or the columns of a table; the name of its type for what is none of these."""
     if item.is_virtual or item.external:
         return "<data in another file>"
@@ -121,7 +128,6 @@ def _attributes(item: "h5py.Group | h5py.Dataset", name: str) -> Iterator[tuple[
             value = item.attrs[key]
         except (OSError, TypeError, ValueError):
             continue  # of a type that h5py does not know
-        if isinstance(value, bytes):
-            value = value.decode("utf-8", "replace")
+        value = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
         if isinstance(value, str) or (isinstance(value, np.generic | np.ndarray) and value.dtype.kind in _PLAIN):
             yield f"{name}@{key}", value

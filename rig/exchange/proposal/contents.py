@@ -20,24 +20,16 @@ _MAX_VALUES = 2000  # values that are listed; chosen
 
 @dataclass(frozen=True, eq=False)
 class Leaf:
-    """An array of real numbers.
-
-    Parameters
-    ----------
-    path
-        Path as a mapping takes it; relative to the structures of a list if the file has one.
-    values
-        The array without dimensions of length 1.
-    unit
-        Unit that the file tells; empty if it tells none.
-    file
-        Name of the file, if it is a further one.
-    """
+    """An array of real numbers."""
 
     path: str
+    """Path as a mapping takes it; relative to the structures of a list if the file has one."""
     values: NDArray[np.generic]
+    """The array without dimensions of length 1."""
     unit: str = ""
+    """Unit that the file tells; empty if it tells none."""
     file: str = ""
+    """Name of the file, if it is a further one."""
 
     @property
     def name(self) -> str:
@@ -48,27 +40,18 @@ class Leaf:
 
 @dataclass(frozen=True, eq=False)
 class FileContents:
-    """Contents of a file.
-
-    Parameters
-    ----------
-    arrays
-        Arrays of two numbers and more.
-    single
-        Single numbers by path.
-    others
-        Paths of everything else, with what it is.
-    records
-        Path of the list of structures in which the arrays are; empty if there is none.
-    rate_hz
-        Sample rate that the file tells; None if it tells none.
-    """
+    """Contents of a file."""
 
     arrays: tuple[Leaf, ...]
+    """Arrays of two numbers and more."""
     single: Mapping[str, float]
+    """Single numbers by path."""
     others: Mapping[str, str]
+    """Paths of everything else, with what it is."""
     records: str = ""
+    """Path of the list of structures in which the arrays are; empty if there is none."""
     rate_hz: float | None = None
+    """Sample rate that the file tells; None if it tells none."""
 
 
 def contents_of(data: FileData, file: str = "") -> FileContents:
@@ -96,19 +79,15 @@ def contents_of(data: FileData, file: str = "") -> FileContents:
 def _list_of_structures(top: Mapping[str, Value]) -> tuple[str, Mapping[str, Value]]:
     """Return path and first entry of a list of structures that holds the only arrays of a file, or an empty path."""
     for key, value in top.items():
-        entries = list(value) if isinstance(value, list | np.ndarray) and not _is_numbers(value) else []
+        numbers = isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
+        entries = list(value) if isinstance(value, list | np.ndarray) and not numbers else []
         structures = [entry for entry in entries if isinstance(entry, dict)]
         if entries and len(structures) == len(entries):
             return key, structures[0]
     return "", {}
 
 
-def _is_numbers(value: Value) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype.kind in "biufc"
-
-
 def _leaves(structure: Mapping[str, Value], above: str, depth: int) -> Iterator[tuple[str, Value]]:
-    """Yield the values within a structure by their paths."""
     for key, value in structure.items():
         path = f"{above}.{key}" if above else str(key)
         if isinstance(value, dict) and depth + 1 < _MAX_DEPTH:

@@ -11,7 +11,10 @@ from rig.exchange.csv import table_lines
 
 _EXAMINED_LINES = 100  # lines that are examined; chosen
 _EQUAL_ROWS = 3  # rows of equally many numbers that make a table; chosen
-Separator = Literal[",", ";", "\t", " "]
+_TRIED: tuple[tuple[Literal[",", ";", "\t", " "], Literal[".", ","]], ...] = (
+    *((",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")),
+)
+"""Separators with decimal points or commas, in the order in which they are tried."""
 _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$"),
@@ -21,28 +24,21 @@ _NUMBER = {
 def guessed_layout(path: Path) -> CsvLayout | None:
     """Return the layout; None if the file begins with one line of names (and one of units), or no table is found."""
     lines = [line for _, line in islice(table_lines(path), _EXAMINED_LINES)]
-    for separator, decimal in ((",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")):
+    for separator, decimal in _TRIED:
         first = _first_row(lines, separator, decimal)
         if first is None:
             continue
         width = len(_cells(lines[first], separator))
         heading = next((at for at in (first - 1, first - 2) if at >= 0 and _names(lines[at], separator, width)), None)
-        if heading is not None and heading > 0 and _units(lines[heading], separator):
+        if heading is not None and heading > 0 and _has_unit(lines[heading], separator):
             heading -= 1 if _names(lines[heading - 1], separator, width) else 0
         plain = separator in (",", ";", "\t") and decimal == "."
         if plain and heading == 0:
             return None
         names = None if heading is not None else tuple(f"column{number}" for number in range(1, width + 1))
         skip = first if heading is None else heading
-        return CsvLayout(
-            skip_lines=skip, names=names, separator=_known(separator), decimal="," if decimal == "," else "."
-        )
+        return CsvLayout(skip_lines=skip, names=names, separator=separator, decimal=decimal)
     return None
-
-
-def _known(separator: str) -> Separator:
-    known: dict[str, Separator] = {",": ",", ";": ";", "\t": "\t", " ": " "}
-    return known[separator]
 
 
 def _cells(line: str, separator: str) -> list[str]:
@@ -66,8 +62,7 @@ def _first_row(lines: list[str], separator: str, decimal: str) -> int | None:
     return None
 
 
-def _units(line: str, separator: str) -> bool:
-    """Return whether one of the texts is a unit."""
+def _has_unit(line: str, separator: str) -> bool:
     return any(cell.strip("[]() ") in {*UNITS, "s", "Hz"} for cell in _cells(line, separator))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from identification import IdentificationError
 from identification.mapping import si_of
+from rig.exchange.file_data import even_step
 from vibrolock.arrays import Float
 
 _RATES = re.compile(
@@ -48,8 +49,7 @@ def is_time(name: str, values: NDArray[np.generic]) -> bool:
     """Return whether an array is a vector of evenly spaced instants, by name and values."""
     if values.ndim != 1 or values.size < 3 or not _TIMES.match(name):
         return False
-    steps = np.diff(values.astype(np.float64))
-    return bool(steps.mean() > 0.0 and np.all(np.abs(steps - steps.mean()) <= 1e-3 * steps.mean()))
+    return even_step(values.astype(np.float64)) is not None
 
 
 def role_of(name: str, unit: str) -> tuple[str, str]:
@@ -98,9 +98,8 @@ def _meaning(slices: Float, taken: Sequence[str]) -> str:
         found = "period"
     else:
         found = "level" if rms.max() > _LEVELS * max(rms.min(), 1e-300) else "realisation"
-    return (
-        found if found not in taken else next(name for name in ("realisation", "level", "channel") if name not in taken)
-    )
+    others = (name for name in ("realisation", "level", "channel") if name not in taken)
+    return found if found not in taken else next(others)
 
 
 def period_of(signal: Float) -> int:

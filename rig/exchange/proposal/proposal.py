@@ -50,18 +50,17 @@ def proposed(first: Path, others: Sequence[str], format_: str, units: str) -> Ma
     layout = None
     found: list[FileContents] = []
     paths = [first, *map(Path, others)]
-    for number, path in enumerate(paths):
+    forms = [format_of(first, format_, "`format`"), *(format_of(path, "", "`format`") for path in paths[1:])]
+    for number, (path, form) in enumerate(zip(paths, forms, strict=True)):
         if path.parent.resolve() != first.parent.resolve():
             raise ImportFailed(
                 f"{path}: is in another folder than {first}; a mapping names files beside the one imported"
             )
-        form = format_of(path, format_ if not number else "", "`format`")
         guessed = guessed_layout(path) if form == "csv" else None
         layout = layout or guessed
         found.append(contents_of(read_data(path, form, units=units, layout=guessed), path.name if number else ""))
     proposal = _proposal(found, first, layout)
-    forms = [format_of(path, format_ if not number else "", "`format`") for number, path in enumerate(paths)]
-    relative = {path.name if number else "" for number, path in enumerate(paths) if forms[number] == "wav"}
+    relative = {one.name if one != first else "" for one, form in zip(paths, forms, strict=True) if form == "wav"}
     return MappingText(text_of(proposal, found, [path.name for path in paths], relative), proposal.missing)
 
 
@@ -76,7 +75,6 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
     rate, rate_from, time = _rate(found, times)
     force = next((c for c in channels if c.role == "force"), channels[0])
     period, transient, band, at_rest = _periods(force, channels, rate, samples)
-    missing = [] if rate else ["sample_rate_hz"]
     return Proposal(
         channels=tuple(channels[:_MAX_CHANNELS]),
         left_out=len(channels) - len(channels[:_MAX_CHANNELS]),
@@ -89,12 +87,11 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
         band_hz=band,
         at_rest=at_rest,
         layout=layout,
-        missing=tuple(missing),
+        missing=() if rate else ("sample_rate_hz",),
     )
 
 
 def _sample_count(arrays: Sequence[Leaf], path: Path) -> int:
-    """Return the commonest largest dimension."""
     lengths = [max(leaf.values.shape) for leaf in arrays]
     long = [length for length in lengths if length >= _MIN_SAMPLES]
     if not long:
@@ -103,11 +100,11 @@ def _sample_count(arrays: Sequence[Leaf], path: Path) -> int:
 
 
 def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
-    """Return the channels in all signals, with their axes, roles and units."""
-    alone = len(signals) == 1
     plain = [leaf for leaf in signals if leaf.values.ndim == min(one.values.ndim for one in signals)]
     reference = next((leaf for leaf in plain if role_of(leaf.name, leaf.unit)[0] == "force"), plain[0])
-    of_reference = _axes(reference, samples, channels=alone)
+    of_reference = dimensions(reference.values, samples)
+    if len(signals) == 1 and reference.values.ndim == 2:  # the columns of the only array of a file are channels
+        of_reference = ("sample", "channel") if reference.values.shape.index(samples) == 0 else ("channel", "sample")
     known = dict(zip(of_reference, reference.values.shape, strict=True))
     found: list[ProposedChannel] = []
     for leaf in signals:
@@ -118,14 +115,6 @@ def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
             name = leaf.name if count == 1 else f"{leaf.name}{index}"
             found.append(ProposedChannel(leaf, name, role, unit, axes, index))
     return _with_roles(_with_unique_names(found))
-
-
-def _axes(leaf: Leaf, samples: int, *, channels: bool) -> tuple[str, ...]:
-    """Return the axes of an array; the columns of the only array of a file are channels."""
-    if channels and leaf.values.ndim == 2:
-        at = leaf.values.shape.index(samples)
-        return ("sample", "channel") if at == 0 else ("channel", "sample")
-    return dimensions(leaf.values, samples)
 
 
 def _like(leaf: Leaf, known: dict[str, int], samples: int) -> tuple[str, ...]:
@@ -190,8 +179,9 @@ def _periods(
     in_axes = "period" in force.axes
     size = samples if in_axes else period_of(signal) if force.role == "force" else 0
     if not size:
-        rest = all(_quiet(record) for record in records)
-        return 0, 0, None, rest
+        # At rest: the first hundredth of each record has less than a hundredth of its largest value.
+        rest = all(np.abs(x[: max(x.size // 100, 2)]).max() <= 0.01 * np.abs(x).max() for x in records)
+        return 0, 0, None, bool(rest)
     whole = signal.size // size
     longest = max(
         transient_periods(record[: whole * size].reshape(whole, size)) if whole > 1 else 0 for record in records
@@ -210,8 +200,3 @@ def _first_record(channel: ProposedChannel) -> NDArray[np.float64]:
     if "period" in names:
         values = np.moveaxis(values, names.index("period"), 0)
     return np.asarray(values.reshape(-1))
-
-
-def _quiet(record: NDArray[np.float64]) -> bool:
-    """Return whether a record begins at rest: the first hundredth has less than a hundredth of the largest value."""
-    return bool(np.abs(record[: max(record.size // 100, 2)]).max() <= 0.01 * np.abs(record).max())

@@ -95,7 +95,6 @@ def text_of(
 
 
 def _listed(found: Sequence[FileContents]) -> Iterator[str]:
-    """Yield one comment for each thing in the files."""
     listed: list[tuple[str, str]] = []
     for contents in found:
         before = f"{contents.records}[...]." if contents.records else ""

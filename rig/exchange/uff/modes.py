@@ -8,7 +8,7 @@ from identification import Channel, LinearModes
 from rig.exchange.child_reading import ImportFailed
 from rig.exchange.uff.codes import channels_in
 from rig.exchange.uff.units import file_units
-from rig.exchange.universal_file import ModeShape, UniversalFile
+from rig.exchange.universal_file import UniversalFile
 from vibrolock.arrays import Float
 
 
@@ -41,23 +41,9 @@ def modes_in(file: UniversalFile, assumed: str = "", drive: str = "") -> LinearM
         channels, shapes = _degrees(first.nodes, columns, drive)
     shapes = shapes / np.sqrt([mode.modal_mass * to_kg for mode in modes])
     row = next(index for index, channel in enumerate(channels) if channel.role == "drive")
-    return _linear_modes(modes, channels, shapes * np.where(shapes[row] < 0.0, -1.0, 1.0))
-
-
-def _degrees(nodes: Sequence[int], columns: Float, drive: str) -> tuple[tuple[Channel, ...], Float]:
-    """Return channels and shapes of all degrees of freedom that move in any mode."""
-    moving = [(k, j) for j in range(columns.shape[2]) for k in range(3) if np.any(columns[:, k, j])]
-    names = [f"{nodes[j]}+{'XYZ'[k]}" for k, j in moving]
-    if drive not in names:
-        raise ImportFailed("which says where the force acts", field="drive", value=drive, allowed=names)
-    channels = tuple(Channel(name, "drive" if name == drive else "response", "m") for name in names)
-    return channels, np.array([columns[:, k, j] for k, j in moving])
-
-
-def _linear_modes(modes: Sequence[ModeShape], channels: tuple[Channel, ...], shapes: Float) -> LinearModes:
+    shapes = shapes * np.where(shapes[row] < 0.0, -1.0, 1.0)
     unknown, nothing = np.full(len(modes), np.nan), np.zeros(len(channels), dtype=np.complex128)
     frequency_hz = np.array([mode.frequency_hz for mode in modes])
-    title = modes[0].lines[1]
     return LinearModes(
         channels=channels,
         frequency_hz=frequency_hz,
@@ -71,6 +57,16 @@ def _linear_modes(modes: Sequence[ModeShape], channels: tuple[Channel, ...], sha
         upper=nothing,
         lowest_hz=float(frequency_hz[0]),
         highest_hz=float(frequency_hz[-1]),
-        specimen="" if title == "NONE" else title,
+        specimen="" if first.lines[1] == "NONE" else first.lines[1],
         notes=("from a universal file: six digits, without residual terms and standard errors",),
     )
+
+
+def _degrees(nodes: Sequence[int], columns: Float, drive: str) -> tuple[tuple[Channel, ...], Float]:
+    """Return channels and shapes of all degrees of freedom that move in any mode."""
+    moving = [(k, j) for j in range(columns.shape[2]) for k in range(3) if np.any(columns[:, k, j])]
+    names = [f"{nodes[j]}+{'XYZ'[k]}" for k, j in moving]
+    if drive not in names:
+        raise ImportFailed("which says where the force acts", field="drive", value=drive, allowed=names)
+    channels = tuple(Channel(name, "drive" if name == drive else "response", "m") for name in names)
+    return channels, np.array([columns[:, k, j] for k, j in moving])

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification import IdentificationError
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
-from rig.exchange.file_data import ChannelFacts, FileData
+from rig.exchange.file_data import ChannelFacts, FileData, side_by_side
 from rig.exchange.uff.units import file_units
 from rig.exchange.universal_file import (
     TIME_RESPONSE,
@@ -170,16 +170,10 @@ def time_data_in(file: UniversalFile, assumed: str = "") -> FileData:
             )
         known[name] = unit
     return FileData(
-        values={**{name: _columns(several) for name, several in records.items()}, "sets": [*sets]},
+        values={**{name: side_by_side(several) for name, several in records.items()}, "sets": [*sets]},
         channels={name: ChannelFacts(unit=unit, in_si=True) for name, unit in known.items()},
         sample_rate_hz=rates[0],
     )
-
-
-def _columns(records: Sequence[Float]) -> Float:
-    """Put records side by side, cut to the length of the shortest."""
-    shortest = min(map(len, records))
-    return np.column_stack([record[:shortest] for record in records])
 
 
 def _rate(function: Function) -> float:

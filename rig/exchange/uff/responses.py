@@ -46,7 +46,6 @@ def responses_in(
 
 
 def _matrix(functions: Sequence[Function], units: FileUnits) -> FrequencyResponseMatrix:
-    """Return frequency responses of all outputs to all inputs; each is there once."""
     paths: dict[tuple[str, str], Complex] = {}
     outputs: dict[str, Channel] = {}
     inputs: dict[str, Channel] = {}
@@ -76,20 +75,16 @@ def _matrix(functions: Sequence[Function], units: FileUnits) -> FrequencyRespons
         raise ImportFailed(
             f"frequency responses: there is none of {', '.join(missing)}; wanted are all outputs to all inputs"
         )
+    estimator = re.search(r", estimator ([^,]+)", functions[0].lines[4])
     return FrequencyResponseMatrix(
         outputs=tuple(outputs.values()),
         inputs=tuple(inputs.values()),
         frequency_hz=frequency_hz,
         value=np.array([[paths[o, i] for i in inputs] for o in outputs]).transpose(2, 0, 1),
-        estimator=_estimator(functions[0]),
+        estimator=estimator[1] if estimator else "imported",
         input_rms=tuple(rms[name] for name in inputs) if set(rms) == set(inputs) else (),
         specimen=_text(functions[0].lines[1]),
     )
-
-
-def _estimator(function: Function) -> str:
-    found = re.search(r", estimator ([^,]+)", function.lines[4])
-    return found.group(1) if found else "imported"
 
 
 def _text(line: str) -> str:

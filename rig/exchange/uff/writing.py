@@ -63,14 +63,12 @@ def _functions(items: Sequence[Contents], encoding: str) -> Iterator[Dataset]:
 def _head(items: Sequence[Contents]) -> list[Dataset]:
     now = datetime.now()
     day, hour = now.strftime("%d-%b-%y"), now.strftime("%H:%M:%S")
-    dates = {f"{what}_{name}": value for name in _DATES for what, value in (("date", day), ("time", hour))}
+    names = ("db_created", "db_saved", "file_written")
+    dates = {f"{what}_{name}": value for name in names for what, value in (("date", day), ("time", hour))}
     header = {"type": 151, "model_name": _ascii(items[0].title), "description": items[0].kind, "db_app": _PROGRAM}
     units = {"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1}
     factors = {"length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15}
     return [{**header, **dates, "program": _PROGRAM}, {**units, **factors}]
-
-
-_DATES = ("db_created", "db_saved", "file_written")
 
 
 def _ascii(text: str) -> str:
@@ -93,10 +91,6 @@ def _at(prefix: str, name: str, degree: tuple[int, int]) -> Dataset:
     return {f"{prefix}_ent_name": _ascii(name)[:10], f"{prefix}_node": degree[0], f"{prefix}_dir": degree[1]}
 
 
-def _nowhere(*prefixes: str) -> Dataset:
-    return {key: value for prefix in prefixes for key, value in _at(prefix, "NONE", (0, 0)).items()}
-
-
 def _channels(item: Contents, name: str = "channels") -> list[Channel]:
     return [Channel(**channel) for channel in item.attributes[name]]
 
@@ -107,24 +101,11 @@ def _time_data(item: Contents) -> Iterator[Dataset]:
     degrees = degrees_of_freedom(channels)
     x = item.arrays["time_s"]
     for number, channel in enumerate(channels):
-        function = _function(
-            TIME_RESPONSE,
-            item.attributes["point"],
-            channel.name,
-            item,
-            x,
-            item.arrays["samples"][number].astype(np.float64),
-        )
+        samples = item.arrays["samples"][number].astype(np.float64)
+        function = _function(TIME_RESPONSE, item.attributes["point"], channel.name, item, x, samples)
         function |= {"binary": 1, "abscissa_spacing": 1, "id5": _ascii(f"sample rate {rate!r} Hz, {channel.role}")}
-        yield (
-            function
-            | _at("rsp", channel.name, degrees[channel.name])
-            | _nowhere("ref")
-            | {
-                **axis("abscissa", "Time", "s"),
-                **axis("ordinate", channel.name, channel.unit),
-            }
-        )
+        axes = axis("abscissa", "Time", "s") | axis("ordinate", channel.name, channel.unit)
+        yield function | _at("rsp", channel.name, degrees[channel.name]) | _at("ref", "NONE", (0, 0)) | axes
 
 
 def _response_matrix(item: Contents) -> Iterator[Dataset]:
@@ -141,16 +122,9 @@ def _response_matrix(item: Contents) -> Iterator[Dataset]:
             estimator = item.attributes["estimator"] or "unknown"
             function["id5"] = _ascii(f"{output.role} / {source.role}, estimator {estimator}{level}")
             function["id2"] = _ascii(item.attributes["specimen"])
-            yield (
-                function
-                | _at("rsp", output.name, degrees[output.name])
-                | _at("ref", source.name, degrees[source.name])
-                | {
-                    **axis("abscissa", "Frequency", "Hz"),
-                    **axis("ordinate", output.name, output.unit),
-                    **axis("orddenom", source.name, source.unit),
-                }
-            )
+            axes = axis("abscissa", "Frequency", "Hz") | axis("ordinate", output.name, output.unit)
+            places = _at("rsp", output.name, degrees[output.name]) | _at("ref", source.name, degrees[source.name])
+            yield function | places | axes | axis("orddenom", source.name, source.unit)
 
 
 def _table(item: Contents) -> Iterator[Dataset]:
@@ -164,7 +138,8 @@ def _table(item: Contents) -> Iterator[Dataset]:
                 continue
             rows = np.flatnonzero(known) + 1.0
             function = _function(GENERAL, number, title, item, rows, values[known])
-            yield function | _nowhere("rsp", "ref") | axis("abscissa", "Point", "") | axis("ordinate", name, unit)
+            nowhere = _at("rsp", "NONE", (0, 0)) | _at("ref", "NONE", (0, 0))
+            yield function | nowhere | axis("abscissa", "Point", "") | axis("ordinate", name, unit)
 
 
 def _complex_columns(item: Contents, name: str) -> Iterator[tuple[str, str, Array]]:
@@ -191,7 +166,7 @@ def _frequency_responses(item: Contents) -> Iterator[Dataset]:
         forces = _function(GENERAL, number + 1, level["label"], item, x, force)
         abscissa, drive = axis("abscissa", "Frequency", "Hz"), _at("rsp", "drive", (1, 3))
         ratio |= abscissa | axis("ordinate", level["kind"], unit) | axis("orddenom", "force", "N") | drive
-        forces |= abscissa | axis("ordinate", "force", "N") | _at("rsp", "force", (1, 3)) | _nowhere("ref")
+        forces |= abscissa | axis("ordinate", "force", "N") | _at("rsp", "force", (1, 3)) | _at("ref", "NONE", (0, 0))
         yield ratio | _at("ref", "force", (1, 3)) | {"id2": _ascii(level["specimen"]), "id5": level_line}
         yield forces | {"id2": _ascii(level["specimen"]), "id5": level_line}
 

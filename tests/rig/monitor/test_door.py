@@ -10,11 +10,10 @@ from contextlib import ExitStack, suppress
 
 import pytest
 
-from rig.monitor import descriptors, door, door_server, visits
-from rig.monitor.descriptors import Capacity, capacity
-from rig.monitor.first_message import is_whole, shows_key
+from rig.monitor import connections, door, visits
 from rig.monitor.process import Address
-from rig.monitor.security import Keys
+from rig.monitor.security import Keys, is_whole
+from rig.monitor.visits import Capacity, capacity
 from tests.rig.monitor.crowd import SAID, trusting_all
 from tests.rig.monitor.scripted import Scripted
 from tests.rig.monitor.visitor import Visitor, heard, served
@@ -170,7 +169,7 @@ def test_connections_fit_into_the_descriptors(limits, monkeypatch):
     monkeypatch.setattr(resource, "getrlimit", lambda kind: tuple(now))
     monkeypatch.setattr(resource, "setrlimit", lambda kind, given: now.__setitem__(slice(None), given))
     found = capacity()
-    kept = visits.MOST_KNOWN + visits.MOST_FEEDS + descriptors.FILES
+    kept = visits.MOST_KNOWN + visits.MOST_FEEDS + visits.FILES
     assert 0 < found.strangers <= 128
     assert now[1] == limits[1]
     assert now[0] == -1 or sum(found) + kept <= now[0]
@@ -199,8 +198,8 @@ def test_a_request_is_whole_with_its_empty_line():
 def test_a_key_is_seen_in_a_request_before_it_is_read():
     keys = Keys()
     own = f"{keys.cookie_name}={keys.cookie}"
-    assert shows_key(f"POST /stop HTTP/1.1\r\nhost: x\r\nCOOKIE:a=b; {own}\r\n\r\n".encode(), keys)
-    assert shows_key(f"GET /?token={keys.entry} HTTP/1.1\r\n\r\n".encode(), keys)
+    assert keys.shown_by(f"POST /stop HTTP/1.1\r\nhost: x\r\nCOOKIE:a=b; {own}\r\n\r\n".encode())
+    assert keys.shown_by(f"GET /?token={keys.entry} HTTP/1.1\r\n\r\n".encode())
     wrong = [
         f"GET /{own} HTTP/1.1",
         f"GET / HTTP/1.1\r\nX-Cookie: {own}",
@@ -209,7 +208,7 @@ def test_a_key_is_seen_in_a_request_before_it_is_read():
         "",
     ]
     wrong += [f"GET /?token={keys.action} HTTP/1.1", "\x00\xff: \xfe", "GET /?token=%ff%00&&& HTTP/1.1", ":" * 9000]
-    assert not any(shows_key(f"{text}\r\n\r\n".encode("latin-1"), keys) for text in wrong)
+    assert not any(keys.shown_by(f"{text}\r\n\r\n".encode("latin-1")) for text in wrong)
     assert keys.opens(keys.entry)  # it was looked at, not used
 
 
@@ -232,5 +231,5 @@ def test_nothing_a_stranger_does_is_told(server, capfd):
 def test_uvicorn_listens_nowhere_itself(run):
     with served(run) as server:
         Visitor(server.url).enter()
-        assert isinstance(server._server, door_server.DoorServer)
+        assert isinstance(server._server, connections.DoorServer)
         assert server._server.servers == []

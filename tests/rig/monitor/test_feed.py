@@ -11,8 +11,8 @@ import pytest
 
 from rig.live.place import runs
 from rig.live.publisher import Publisher
-from rig.live.reader import ReplayState
 from rig.monitor.feed import Earlier, Place
+from rig.monitor.replay import ReplayState
 from rig.monitor.sources import Latest
 from rig.tick.safety.layout import GuardMode
 from tests.rig.monitor.scripted import Scripted, facts, point

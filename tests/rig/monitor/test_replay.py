@@ -15,8 +15,8 @@ from rig.campaigns.plans import load_plan
 from rig.errors import RecordingError
 from rig.live.layout import BIN_S, BINS
 from rig.live.place import runs
-from rig.live.reader import LiveRun, ReplayState
-from rig.monitor.replay import Replay
+from rig.live.reader import LiveRun
+from rig.monitor.replay import Replay, ReplayState
 from rig.monitor.shown import bins_json, shown_frame
 from rig.monitor.words import point_cells, state_text
 from rig.recording.conversion import finalise

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import pytest
 
 from rig.live.facts import LimitFacts
-from rig.live.reader import ReplayState
 from rig.monitor import server, stopping
+from rig.monitor.replay import ReplayState
 from rig.monitor.sources import Latest, chosen
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason, GuardMode

@@ -14,7 +14,8 @@ from rig.bench import load_bench
 from rig.campaigns.plans import load_plan
 from rig.campaigns.running.watched import watched_facts
 from rig.live.layout import FRAME
-from rig.live.reader import Frame, ReplayState
+from rig.live.reader import Frame
+from rig.monitor.replay import ReplayState
 from rig.monitor.shown import as_json, shown_frame
 from rig.monitor.terminal import STALE_S, draw
 from rig.monitor.words import duration, event_text, figure, point_text, share_word, state_text

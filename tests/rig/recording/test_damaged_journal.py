@@ -9,7 +9,7 @@ import rig
 from rig.arming.run_options import Silent
 from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
-from rig.recording.journal_blocks import read_journal
+from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.reader import Recording
 from tests.rig.campaigns.running.test_runs import plan_with
 
@@ -36,7 +36,7 @@ def recorded(tmp_path, monkeypatch):
 
 def damage(output, kind, which):
     """Change one bit in the payload of the block of a kind."""
-    blocks = [block for block in read_journal(journal_path(output)) if block.kind is kind]
+    blocks = [block for block in JournalBlocks(journal_path(output)) if block.kind is kind]
     data = bytearray(journal_path(output).read_bytes())
     data[blocks[which].offset + len(blocks[which].payload) // 2] ^= 4
     journal_path(output).write_bytes(data)

@@ -15,7 +15,7 @@ from rig.recording.blocks import LARGEST_PAYLOAD, BlockKind
 from rig.recording.conversion import finalise
 from rig.recording.header import Column
 from rig.recording.journal import JournalWriter, journal_path
-from rig.recording.journal_blocks import read_journal
+from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.journal_contents import JournalContents
 from rig.recording.reader import Recording
 from tests.refused import refused
@@ -107,7 +107,7 @@ def test_a_large_array_becomes_blocks_that_a_reader_accepts(tmp_path):
         writer.part({})
         writer.rows(many)
         assert writer.n_rows == 100_000
-    sizes = [len(block.payload) for block in read_journal(tmp_path / "a.journal") if block.kind is BlockKind.ROWS]
+    sizes = [len(block.payload) for block in JournalBlocks(tmp_path / "a.journal") if block.kind is BlockKind.ROWS]
     assert len(sizes) > 1
     assert max(sizes) <= LARGEST_PAYLOAD
     assert sum(sizes) == many.nbytes
@@ -291,7 +291,7 @@ def test_a_journal_that_loses_its_name_while_it_is_written_is_noticed_and_saved(
 def test_a_tail_of_zeros_as_a_power_cut_leaves_it_is_torn(tmp_path):
     path = journal(tmp_path / "a.journal", 300)
     path.write_bytes(path.read_bytes() + bytes(5000))
-    blocks = read_journal(path)
+    blocks = JournalBlocks(path)
     assert sum(1 for _ in blocks) == 9
     assert (blocks.tail.n_bytes, blocks.tail.torn) == (5000, True)
 
@@ -324,7 +324,7 @@ def test_a_journal_has_one_writer_at_a_time(tmp_path):
 def test_what_is_no_journal_is_refused_and_left_alone(tmp_path, content, message):
     path = tmp_path / "a.journal"
     path.write_bytes(content)
-    for use in (read_journal, JournalWriter.reopen):
+    for use in (JournalBlocks, JournalWriter.reopen):
         with refused(RecordingError, **message):
             use(path)
     assert path.read_bytes() == content
@@ -335,7 +335,7 @@ def test_a_journal_of_a_later_schema_asks_for_an_update(tmp_path, monkeypatch):
     path = journal(tmp_path / "a.journal", 10)
     monkeypatch.undo()
     with refused(RecordingError, "written-by-schema-this-version-reads"):
-        read_journal(path)
+        JournalBlocks(path)
 
 
 def test_a_later_block_version_asks_for_an_update(tmp_path):
@@ -345,7 +345,7 @@ def test_a_later_block_version_asks_for_an_update(tmp_path):
         data[start + 4] = 3
     path.write_bytes(data)
     with refused(RecordingError, "journal-version-this-version-reads-up"):
-        read_journal(path)
+        JournalBlocks(path)
 
 
 @pytest.mark.parametrize(
@@ -470,7 +470,7 @@ def test_of_a_damaged_journal_whole_blocks_are_recovered_in_their_places_and_not
     path = tmp_path / "a.journal"
     path.write_bytes(data)
     try:
-        blocks = read_journal(path)
+        blocks = JournalBlocks(path)
         found = [(int(block.kind), block.sequence, block.payload) for block in blocks]
         contents = JournalContents(path)
     except RecordingError:
@@ -518,7 +518,7 @@ def test_deeply_nested_json_is_a_bad_block_and_no_crash(tmp_path, original):
     blocks = [(kind, payload) for kind, _, payload in blocks_by_hand(original)]
     path = tmp_path / "a.journal"
     path.write_bytes(packed_by_hand([*blocks, (BlockKind.PART, deep)]))
-    found = read_journal(path)
+    found = JournalBlocks(path)
     assert len(list(found)) == len(blocks) - 1
     assert "cannot be read" in found.tail.reason
 
@@ -549,7 +549,7 @@ def test_an_absurd_length_is_not_believed(tmp_path):
     with path.open("ab") as stream:
         stream.write(head)
         stream.truncate(len(whole) + 3 * LARGEST_PAYLOAD)
-    blocks = read_journal(path)
+    blocks = JournalBlocks(path)
     assert [block.sequence for block in blocks] == [1, 2, 3, 4, 5, 6, 7]
     assert "a length of 33554432 bytes" in blocks.tail.reason
 

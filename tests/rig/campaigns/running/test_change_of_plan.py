@@ -21,7 +21,7 @@ from rig.measurements import point_rows, spectra
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.blocks import BlockKind
 from rig.recording.journal import journal_path
-from rig.recording.journal_blocks import read_journal
+from rig.recording.journal_blocks import JournalBlocks
 from rig.recording.reader import Recording
 from rig.show.summary import summarise
 from rig.tick.sequencer.segments import SettleRule
@@ -178,7 +178,7 @@ def test_realisations_of_different_lengths_make_one_spectrum(tmp_path):
 
 def test_the_journal_of_a_killed_second_part_is_read_wherever_it_ends_and_knows_its_plan(under_way, tmp_path):
     whole = journal_path(under_way).read_bytes()
-    blocks = [(block.kind, block.stop) for block in read_journal(journal_path(under_way))]
+    blocks = [(block.kind, block.stop) for block in JournalBlocks(journal_path(under_way))]
     begins = next(stop for kind, stop in blocks if kind is BlockKind.PART)
     output = Path(shutil.copy(under_way, tmp_path / "run.h5"))
     points_at = [stop for kind, stop in blocks if kind is BlockKind.POINT]
@@ -197,7 +197,7 @@ def test_the_journal_of_a_killed_second_part_is_read_wherever_it_ends_and_knows_
 @pytest.mark.parametrize("points_left", [0, 1, 2])
 def test_a_kill_in_the_second_part_is_resumed_by_the_changed_plan(under_way, tmp_path, points_left):
     whole = journal_path(under_way).read_bytes()
-    stops = [block.stop for block in read_journal(journal_path(under_way)) if block.kind is BlockKind.POINT]
+    stops = [block.stop for block in JournalBlocks(journal_path(under_way)) if block.kind is BlockKind.POINT]
     output = Path(shutil.copy(under_way, tmp_path / "run.h5"))
     journal_path(output).write_bytes(whole[: [*stops, len(whole)][2 - points_left] - 5])
     with rig.resume(output) as run:
@@ -275,7 +275,7 @@ def test_a_recording_of_schema_1_goes_on_with_and_without_a_change(tmp_path, mon
         assert output.exists() == finished
     if not finished:
         journal = journal_path(output)
-        assert read_journal(journal).header.schema == 1
+        assert JournalBlocks(journal).header.schema == 1
         journal.write_bytes(journal.read_bytes()[:-9])  # killed while its end was written
     with rig.resume(output) as run:
         assert run.complete
@@ -295,7 +295,7 @@ def test_the_journal_of_schema_1_takes_no_change_of_plan(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr("rig.campaigns.running.runner.finalise", lambda *_: None)
         rig.resume(output, plan=SECOND).close()
-    assert read_journal(journal_path(output)).header.schema == 3
+    assert JournalBlocks(journal_path(output)).header.schema == 3
     with Recording(output) as recording:
         assert len(recording.parts) == 2
         assert recording.complete

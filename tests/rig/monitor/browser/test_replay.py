@@ -2,7 +2,7 @@
 
 import pytest
 
-from rig.live.reader import ReplayState
+from rig.monitor.replay import ReplayState
 from tests.rig.monitor.browser.told import Told
 
 ESCAPE = "\ue00c"
