@@ -3,13 +3,13 @@
 A list replaces the base's whole, so that what stands in lists keeps its required keys.
 """
 
-from rig.authoring.draft7 import Schema
+from rig.authoring.draft7 import Schema, name_in, nodes
 
 
 def requirements(node: Schema, definitions: Schema) -> Schema:
     """Return the schema that asks for the required keys of a table, and of the tables in it, and for nothing else."""
     if "$ref" in node:
-        return requirements(definitions[_name(node)], definitions)
+        return requirements(definitions[name_in(node["$ref"])], definitions)
     out: Schema = {"required": node["required"]} if node.get("required") else {}
     inside = {key: requirements(part, definitions) for key, part in node.get("properties", {}).items()}
     if inside := {key: part for key, part in inside.items() if part}:
@@ -17,26 +17,14 @@ def requirements(node: Schema, definitions: Schema) -> Schema:
     conditions = [found for part in node.get("allOf", ()) if (found := requirements(part, definitions))]
     for variant in node.get("oneOf", ()):
         if "$ref" in variant:
-            conditions.append(_if_chosen(definitions[_name(variant)], definitions))
-            out["required"] = [_tag(definitions[_name(variant)])]
+            chosen = definitions[name_in(variant["$ref"])]
+            tag = next(str(key) for key, part in chosen["properties"].items() if "const" in part)
+            given = {"properties": {tag: {"const": chosen["properties"][tag]["const"]}}, "required": [tag]}
+            conditions.append({"if": given, "then": requirements(chosen, definitions)})
+            out["required"] = [tag]
         else:
             out["oneOf"] = node["oneOf"]
     return {**out, "allOf": conditions} if conditions else out
-
-
-def _if_chosen(variant: Schema, definitions: Schema) -> Schema:
-    tag = _tag(variant)
-    chosen = {"properties": {tag: {"const": variant["properties"][tag]["const"]}}, "required": [tag]}
-    return {"if": chosen, "then": requirements(variant, definitions)}
-
-
-def _tag(variant: Schema) -> str:
-    """Return the key that tells the variants of a union apart."""
-    return next(str(key) for key, part in variant["properties"].items() if "const" in part)
-
-
-def _name(node: Schema) -> str:
-    return str(node["$ref"]).rpartition("/")[2]
 
 
 class Loosened:
@@ -50,7 +38,7 @@ class Loosened:
         out = {word: value for word, value in node.items() if word != "required"}
         union = out.pop("oneOf", [])
         if "$ref" in out:
-            out["$ref"] = self._reference(_name(out))
+            out["$ref"] = self._reference(name_in(out["$ref"]))
         if "properties" in out:
             out["properties"] = {key: self.table(part) for key, part in out["properties"].items()}
         if "allOf" in out:
@@ -81,10 +69,5 @@ def reachable(schema: Schema) -> Schema:
     return {**schema, "definitions": {name: definitions[name] for name in sorted(wanted)}}
 
 
-def _references(node: object) -> set[str]:
-    if isinstance(node, list):
-        return set().union(*map(_references, node)) if node else set()
-    if not isinstance(node, dict):
-        return set()
-    own = {_name(node)} if isinstance(node.get("$ref"), str) else set()
-    return own.union(*map(_references, node.values()))
+def _references(schema: Schema) -> set[str]:
+    return {name_in(node["$ref"]) for node in nodes(schema) if isinstance(node.get("$ref"), str)}

@@ -9,7 +9,7 @@ import re
 import textwrap
 from collections.abc import Iterator
 
-from rig.authoring.draft7 import Schema
+from rig.authoring.draft7 import Schema, name_in
 from rig.bench.configuration import Table
 
 WIDTH = 110
@@ -18,17 +18,13 @@ WIDTH = 110
 
 def commented(table: Table, schema: Schema) -> str:
     """Return a TOML file that holds ``table``, with a comment for every key that the schema knows."""
-    about = _about(str(schema["description"]), schema["title"])
+    title = schema["title"].removeprefix("vibrolock ").capitalize()
+    about = _text(f"{title}: {schema['description'].partition(chr(10))[0]}")
     note = "A line such as `#key = value` is optional and shows the default: take the # away to change it."
     return "\n".join([*about, *_text(note), *_table(table, schema, schema["definitions"], ())]) + "\n"
 
 
-def _about(description: str, title: str) -> list[str]:
-    return _text(f"{title.removeprefix('vibrolock ').capitalize()}: {description.partition(chr(10))[0]}")
-
-
 def _text(words: str) -> list[str]:
-    """Return a text as lines of a comment."""
     return textwrap.wrap(words, WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
 
 
@@ -77,19 +73,14 @@ def _resolved(node: Schema, definitions: Schema, value: object = None) -> Schema
     out = dict(node)
     references = [part for part in [node, *node.get("allOf", ())] if "$ref" in part]
     for part in references:
-        out = {**_resolved(definitions[part["$ref"].rpartition("/")[2]], definitions, value), **out}
+        out = {**_resolved(definitions[name_in(part["$ref"])], definitions, value), **out}
     for variant in [*node.get("oneOf", ()), *node.get("anyOf", ())]:
         if "$ref" in variant and isinstance(value, dict):
             inside = _resolved(variant, definitions, value)
-            if _fits(value, inside):
+            keys = inside.get("properties", {})  # those of its variant, with the words of it
+            if all(name in keys and value[name] == keys[name].get("const", value[name]) for name in value):
                 return {**inside, **out}
     return out
-
-
-def _fits(value: Table, node: Schema) -> bool:
-    """Return whether a table may be of this variant: its keys are known, and its words are those of the variant."""
-    keys = node.get("properties", {})
-    return all(name in keys and value[name] == keys[name].get("const", value[name]) for name in value)
 
 
 def _holds_tables(node: Schema, definitions: Schema) -> bool:
@@ -121,7 +112,6 @@ def _allowed(node: Schema) -> str:
 
 
 def _value(value: object) -> str:
-    """Return a value as TOML writes it, in one line."""
     if isinstance(value, dict):
         inside = ", ".join(f"{key} = {_value(item)}" for key, item in value.items())
         return f"{{ {inside} }}" if inside else "{}"

@@ -4,6 +4,8 @@ What TOML cannot hold (null) is left out. What a reader of draft 7 would ignore 
 words, ``prefixItems``, the ``discriminator`` of a union.
 """
 
+from collections.abc import Iterator
+
 from pydantic.json_schema import JsonSchemaValue
 
 from rig.text.units import titled
@@ -22,9 +24,11 @@ _LEFT_OUT = ("title", "discriminator", "prefixItems")
 def draft7(schema: Schema) -> Schema:
     """Return a schema of pydantic in draft 7: definitions under ``definitions``, titles with units, unions with their tag."""
     out = _converted(schema)
-    for name, key in _tags(schema):
-        variant = out["definitions"][name]
-        variant["required"] = list(dict.fromkeys([key, *variant.get("required", ())]))
+    for node in nodes(schema):
+        if isinstance(union := node.get("discriminator"), dict):  # a file must give the tag of a union
+            for reference in union["mapping"].values():
+                variant = out["definitions"][name_in(reference)]
+                variant["required"] = list(dict.fromkeys([union["propertyName"], *variant.get("required", ())]))
     return out
 
 
@@ -34,19 +38,16 @@ def plain(text: str) -> str:
     return "\n\n".join(part for part in paragraphs if part)
 
 
-def _tags(node: object) -> set[tuple[str, str]]:
-    """Return name and tag of every definition that is a variant of a tagged union: a file must give the tag."""
-    if isinstance(node, list):
-        return set().union(*map(_tags, node)) if node else set()
-    if not isinstance(node, dict):
-        return set()
-    found = set().union(*(_tags(value) for value in node.values())) if node else set()
-    if isinstance(union := node.get("discriminator"), dict):
-        found |= {(_name(reference), str(union["propertyName"])) for reference in union["mapping"].values()}
-    return found
+def nodes(schema: object) -> Iterator[Schema]:
+    """Yield every table in a schema, the outermost first."""
+    if isinstance(schema, dict):
+        yield schema
+    for inside in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+        yield from nodes(inside)
 
 
-def _name(reference: str) -> str:
+def name_in(reference: str) -> str:
+    """Return the name of the definition that a ``$ref`` refers to."""
     return reference.rpartition("/")[2]
 
 
@@ -62,26 +63,20 @@ def _converted(node: Schema, key: str = "") -> Schema:
         elif word in _SINGLE:
             out[word] = _converted(value) if isinstance(value, dict) else value
         elif word == "$ref":
-            out[word] = f"#/definitions/{_name(value)}"
+            out[word] = f"#/definitions/{name_in(value)}"
         elif word == "description":
             out[word] = plain(value)
         elif word not in _LEFT_OUT and not (word == "default" and value is None):
             out[word] = value
     if "prefixItems" in node:
-        _list_items(out, [_converted(part) for part in node["prefixItems"]])
+        parts = [_converted(part) for part in node["prefixItems"]]
+        alike = all(part == parts[0] for part in parts)
+        out["items"] = {**parts[0], **out.get("items", {})} if alike else parts
     if len(out.get("anyOf", ())) == 1:  # the other choice was null
         _absorb(out, out.pop("anyOf")[0])
     if "$ref" in out and len(out) > 1:
         out["allOf"] = [{"$ref": out.pop("$ref")}, *out.get("allOf", ())]
     return out
-
-
-def _list_items(out: Schema, parts: list[Schema]) -> None:
-    """Describe the items of a list of fixed length: by one schema if all are alike, else one by one."""
-    if all(part == parts[0] for part in parts):
-        out["items"] = {**parts[0], **out.get("items", {})}
-    else:
-        out["items"] = parts
 
 
 def _absorb(out: Schema, only: Schema) -> None:

@@ -10,7 +10,7 @@ from rig.authoring.commented import commented
 from rig.authoring.draft7 import Schema
 from rig.authoring.schemas import schema_of
 from rig.bench.configuration import Table, read_toml
-from rig.errors import ConfigurationError
+from rig.errors import ConfigurationError, RecordingError
 from rig.system.whole_file import whole_file
 
 BENCH_OF_DRIVER = "box-bench.toml"
@@ -41,7 +41,8 @@ def new_file(
     """
     name = {"plan": kind, "sensors": "sensors"}.get(what, "bench")
     named = {} if what == "sensors" else {"name": output.stem}
-    begun = _plan(kind, bench) if what == "plan" else {**(table or _start(what)), **named}
+    starts = Path(str(resources.files("rig.authoring"))) / "starts"
+    begun = _plan(kind, bench) if what == "plan" else {**(table or read_toml(starts / f"{what}.toml")), **named}
     schema = schema_of(name)
     beside = schema_file or output.with_name(f"{name}.schema.json")
     text = f"#:schema {_reference(beside, output)}\n{commented(begun, schema)}"
@@ -57,7 +58,10 @@ def new_driver(output: Path, overwrite: bool = False) -> None:
     if output.exists() and not overwrite:
         raise _exists(output)
     unwanted = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
-    shutil.copytree(_driver_template(), output, dirs_exist_ok=overwrite, ignore=unwanted)
+    # The template stands in docs in the source and inside the package in a wheel.
+    inside = Path(str(resources.files("rig.authoring"))) / "driver-template"
+    template = inside if inside.is_dir() else Path(__file__).parents[2] / "docs" / "driver-template"
+    shutil.copytree(template, output, dirs_exist_ok=overwrite, ignore=unwanted)
     bench, schema = output / BENCH_OF_DRIVER, output / "bench.schema.json"
     text = f"#:schema {_reference(schema, bench)}\n{bench.read_text(encoding='utf-8')}"
     written({bench: text, schema: schema_text(schema_of("bench"))}, overwrite=True)
@@ -65,8 +69,6 @@ def new_driver(output: Path, overwrite: bool = False) -> None:
 
 def written(files: dict[Path, str], overwrite: bool) -> None:
     """Write texts to files: all, or none if one exists with another content and ``overwrite`` is false."""
-    from rig.errors import RecordingError
-
     for path, text in files.items():
         if path.is_dir() or not path.parent.is_dir():
             raise RecordingError(f"{path}: cannot be written, it is a folder or lies in none")
@@ -77,20 +79,13 @@ def written(files: dict[Path, str], overwrite: bool) -> None:
             part.write_text(text, encoding="utf-8")
 
 
-def _exists(path: Path) -> Exception:
-    from rig.errors import RecordingError
-
+def _exists(path: Path) -> RecordingError:
     return RecordingError(f"{path}: exists already; choose another name, or --overwrite")
 
 
 def _reference(schema: Path, file: Path) -> str:
-    """Return the schema's path as the file refers to it."""
     relative = Path(os.path.relpath(schema.resolve(), file.resolve().parent)).as_posix()
     return relative if relative.startswith(".") else f"./{relative}"
-
-
-def _start(name: str) -> Table:
-    return read_toml(Path(str(resources.files("rig.authoring"))) / "starts" / f"{name}.toml")
 
 
 def _plan(kind: str, bench: str | None) -> Table:
@@ -108,9 +103,3 @@ def _plan(kind: str, bench: str | None) -> Table:
         "" if bench in (None, table["bench"]) else f"; its numbers are for the bench {table['bench']}, to be replaced"
     )
     return {**table, "bench": bench or table["bench"], "description": f"begun from the shipped plan {name}{told}"}
-
-
-def _driver_template() -> Path:
-    """Return the folder of the template, which stands in ``docs`` in the source and inside the package in a wheel."""
-    inside = Path(str(resources.files("rig.authoring"))) / "driver-template"
-    return inside if inside.is_dir() else Path(__file__).parents[2] / "docs" / "driver-template"

@@ -63,13 +63,16 @@ def bench_schema() -> Schema:
     for name, option in options.items():
         definitions |= option.pop("definitions", {})
         rules = requirements(option, definitions)
-        if name == "virtual":
-            rules = {"required": ["options"], "properties": {"options": _unless("specimen", rules)}}
-        else:
-            rules = {"required": ["options"], "properties": {"options": rules}}
+        rules = _unless("specimen", rules) if name == "virtual" else rules
+        rules = {"required": ["options"], "properties": {"options": rules}}
         asked["properties"]["driver"].setdefault("allOf", []).append(_where_named(name, rules))
         definitions[f"{name}-options"] = loosened.table(option)
-    _describe_driver(definitions["DriverChoiceChanges"], options)
+    driver = definitions[
+        "DriverChoiceChanges"
+    ]  # those of the product have known options, others have options of their own
+    known = {name: {"$ref": f"#/definitions/{name}-options"} for name in options}
+    driver["properties"]["options"]["anyOf"] = [*known.values(), {"type": "object"}]  # so that an editor completes them
+    driver["allOf"] = [_where_named(name, {"properties": {"options": own}}) for name, own in known.items()]
     loose["properties"] = {"base": _BASE, "sensors": _SENSORS, **loose["properties"]}
     loose["allOf"] = [*loose.get("allOf", ()), _unless("base", asked)]
     return _whole({**loose, "definitions": definitions}, "bench")
@@ -96,19 +99,11 @@ def sensors_schema() -> Schema:
     return _whole(_of(SensorFile), "sensors")
 
 
-def _describe_driver(table: Schema, options: Schema) -> None:
-    """Say in the table of a driver which options the drivers of the product have; others have options of their own."""
-    known = {driver: {"$ref": f"#/definitions/{driver}-options"} for driver in options}
-    table["properties"]["options"]["anyOf"] = [*known.values(), {"type": "object"}]  # so that an editor completes them
-    table["allOf"] = [_where_named(driver, {"properties": {"options": own}}) for driver, own in known.items()]
-
-
 def _where_named(driver: str, rules: Schema) -> Schema:
     return {"if": {"properties": {"name": {"const": driver}}, "required": ["name"]}, "then": rules}
 
 
 def _unless(key: str, rules: Schema) -> Schema:
-    """Return rules for a table that does not have a key."""
     return {"if": {"not": {"required": [key]}}, "then": rules}
 
 

@@ -35,19 +35,9 @@ ENCODINGS = ("ascii", "binary")
 def read_objects(path: Path, data: str = "results", points: Sequence[int] = ()) -> list[Any]:
     """Return the objects in a file: one or several (levels of a multisine, sweeps, time data, modes with responses).
 
-    Parameters
-    ----------
-    path
-        A recording, model or imported measurement.
-    data
-        ``results`` (measurements of a recording, see `rig.measurements`) or ``time`` (the samples of its points).
-    points
-        Stored numbers, from 0, of the points whose samples are returned; if empty, of all recorded points.
-
-    Raises
-    ------
-    RecordingError
-        If the file cannot be read, or does not contain such points or data.
+    ``path`` is a recording, model or imported measurement. ``data`` is ``results`` (measurements of a recording, see
+    `rig.measurements`) or ``time``: the samples of its ``points`` by their stored numbers, from 0; if empty, of all recorded.
+    Raises `RecordingError` if the file cannot be read, or does not contain such points or data.
     """
     if data not in DATA:
         raise ConfigurationError(field="data", value=data, allowed=f"{' or '.join(DATA)}")
@@ -76,9 +66,6 @@ def _time_data(recording: Recording, points: Sequence[int]) -> list[Any]:
     if not out:
         raise RecordingError("the recording holds no samples of any point")
     return out
-
-
-_WRITERS = {"mat": write_mat, "csv": write_csv}
 
 
 def export_file(
@@ -121,6 +108,6 @@ def write_contents(items: list[Contents], output: Path, format_: str, encoding: 
             if format_ == "uff":
                 write_uff(items, part, encoding)
             else:
-                _WRITERS[format_](items, part)
+                (write_mat if format_ == "mat" else write_csv)(items, part)
         except RigError as error:
             raise type(error)(f"{output}: {error}") from None

@@ -1,6 +1,6 @@
 """Read measurements and models from files of other programs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,6 +12,8 @@ from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.sources import format_of, read_data
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     import identification as i
     from rig.results.time_data.series import TimeData
 
@@ -27,16 +29,6 @@ if TYPE_CHECKING:
         | i.TimeRecords
         | i.Transient
         | TimeData
-    )
-    AnyMapping = (
-        i.FrequencyResponseMapping
-        | i.ResponseMatrixMapping
-        | i.MultisineMapping
-        | i.TimeDataMapping
-        | i.HammerTestMapping
-        | i.BackboneMapping
-        | i.PnlssMapping
-        | i.NonlinearModeMapping
     )
 
 _DEFAULT_KIND = "frequency-responses"  # kind of a mapping that names none
@@ -118,25 +110,29 @@ def import_sep005(series: Sequence[Mapping[str, object]], mapping: str | Path) -
         raise ImportFailed.of(error, where=f"the series do not fit {mapping}") from None
 
 
-def read_mapping(path: str | Path) -> "AnyMapping":
-    """Read a mapping from TOML; raise `ConfigurationError` that names each wrong key and its value."""
+def _kinds() -> "dict[str, tuple[type[BaseModel], Callable[..., Measurement]]]":
+    """Return the mappings by kind, each with the function that applies it to values."""
     import identification as i
 
-    kinds: dict[str, type[AnyMapping]] = {
-        _DEFAULT_KIND: i.FrequencyResponseMapping,
-        "frequency-response-matrix": i.ResponseMatrixMapping,
-        "multisine": i.MultisineMapping,
-        "time-data": i.TimeDataMapping,
-        "hammer-test": i.HammerTestMapping,
-        "backbone": i.BackboneMapping,
-        "pnlss": i.PnlssMapping,
-        "nonlinear-mode": i.NonlinearModeMapping,
+    return {
+        _DEFAULT_KIND: (i.FrequencyResponseMapping, i.map_frequency_responses),
+        "frequency-response-matrix": (i.ResponseMatrixMapping, i.map_response_matrix),
+        "multisine": (i.MultisineMapping, _response_matrix),
+        "time-data": (i.TimeDataMapping, i.map_time_data),
+        "hammer-test": (i.HammerTestMapping, i.map_hammer_test),
+        "backbone": (i.BackboneMapping, i.map_backbone),
+        "pnlss": (i.PnlssMapping, i.map_pnlss),
+        "nonlinear-mode": (i.NonlinearModeMapping, i.map_nonlinear_mode),
     }
-    table = read_toml(Path(path))
+
+
+def read_mapping(path: str | Path) -> "BaseModel":
+    """Read a mapping from TOML; raise `ConfigurationError` that names each wrong key and its value."""
+    table, kinds = read_toml(Path(path)), _kinds()
     kind = table.get("kind", _DEFAULT_KIND)
     if not isinstance(kind, str) or kind not in kinds:
         raise ConfigurationError(where=path, field="kind", value=kind, allowed=kinds)
-    return validated(kinds[kind], table, str(path))
+    return validated(kinds[kind][0], table, str(path))
 
 
 def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> "Measurement":
@@ -154,32 +150,16 @@ def _read_with(mapping_path: Path, path: Path, form: str, units: str) -> "Measur
     return _mapped(data, mapping, files)
 
 
-def _mapped(data: FileData, mapping: "AnyMapping", files: Mapping[str, FileData]) -> "Measurement":
-    """Apply a mapping to data; spectra are converted to frequency responses."""
-    import identification as i
+def _mapped(data: FileData, mapping: "BaseModel", files: Mapping[str, FileData]) -> "Measurement":
+    from identification import TimeDataMapping
 
     _check_units(data, mapping, files)
-    values = data.for_mapping()
-    match mapping:
-        case i.TimeDataMapping():
-            return i.map_time_data(values, mapping, {name: one.for_mapping() for name, one in files.items()})
-        case i.MultisineMapping():
-            return _response_matrix(i.map_multisine(values, mapping), mapping.instrument, mapping.specimen)
-        case i.ResponseMatrixMapping():
-            return i.map_response_matrix(values, mapping)
-        case i.HammerTestMapping():
-            return i.map_hammer_test(values, mapping)
-        case i.BackboneMapping():
-            return i.map_backbone(values, mapping)
-        case i.PnlssMapping():
-            return i.map_pnlss(values, mapping)
-        case i.NonlinearModeMapping():
-            return i.map_nonlinear_mode(values, mapping)
-        case _:
-            return i.map_frequency_responses(values, mapping)
+    apply = next(apply for kind, apply in _kinds().values() if isinstance(mapping, kind))
+    further = [{name: one.for_mapping() for name, one in files.items()}] if isinstance(mapping, TimeDataMapping) else []
+    return apply(data.for_mapping(), mapping, *further)
 
 
-def _check_units(data: FileData, mapping: "AnyMapping", files: Mapping[str, FileData]) -> None:
+def _check_units(data: FileData, mapping: "BaseModel", files: Mapping[str, FileData]) -> None:
     """Refuse units in a mapping that contradict those that the file itself gives for its values."""
     import identification as i
     from identification import IdentificationError
@@ -204,13 +184,14 @@ def _check_units(data: FileData, mapping: "AnyMapping", files: Mapping[str, File
             )
 
 
-def _response_matrix(spectra: "i.PeriodicSpectra", instrument: str, specimen: str) -> "i.FrequencyResponseMatrix":
+def _response_matrix(values: Mapping[str, object], mapping: "i.MultisineMapping") -> "i.FrequencyResponseMatrix":
     """Return the frequency responses of all motions to the force, with an instrument or as H1."""
-    from identification import best_linear_approximation
+    from identification import best_linear_approximation, map_multisine
 
-    if not instrument:
-        return best_linear_approximation(spectra, estimator="H1", specimen=specimen)
-    return best_linear_approximation(spectra, instruments=(instrument,), specimen=specimen)
+    spectra = map_multisine(values, mapping)
+    if not mapping.instrument:
+        return best_linear_approximation(spectra, estimator="H1", specimen=mapping.specimen)
+    return best_linear_approximation(spectra, instruments=(mapping.instrument,), specimen=mapping.specimen)
 
 
 def _chosen(found: Sequence[T], path: Path, item: int) -> T:

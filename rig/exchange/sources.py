@@ -38,23 +38,10 @@ def format_of(path: Path, given: str, option: str, known: tuple[str, ...] = tupl
 
 
 def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout | None" = None) -> FileData:
-    """Return what is in a file.
+    """Return what is in a file of one of `FORMATS`; raise `ImportFailed` if it cannot be read.
 
-    Parameters
-    ----------
-    path
-        The file.
-    format_
-        One of `FORMATS`.
-    units
-        Source of the units of a universal file, see `rig.exchange.reading.import_file`.
-    layout
-        Layout of a CSV file without one line of names.
-
-    Raises
-    ------
-    ImportFailed
-        If the file cannot be read.
+    ``units`` is the source of the units of a universal file, see `rig.exchange.reading.import_file`; ``layout`` that of a CSV
+    file without one line of names.
     """
     if layout is not None and format_ != "csv":
         raise ConfigurationError(f"is for CSV files, {path} is read as {format_}", field="csv")

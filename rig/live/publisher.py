@@ -12,13 +12,11 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import ParamSpec
 
 import numpy as np
 
-from rig.live.binning import put_bin
 from rig.live.facts import RunFacts
-from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, window_rows
+from rig.live.layout import BIN_S, BINS, FRAME, HEAD, bin_dtype, put_bin, window_rows
 from rig.live.place import FRAME_FILE, LINES, STOP, TRACES, new_folder, remove
 from rig.live.stopping import stopping_on_request
 from rig.live.time_left import time_left_s
@@ -30,7 +28,6 @@ from vibrolock.printable import error_text
 
 FRAMES_PER_S = 30.0  # frames per second, at most; chosen: twice as often as the page looks
 LATENESS_S = 1.0  # s between two statistics of the lateness; chosen
-Arguments = ParamSpec("Arguments")
 
 
 class Live:
@@ -91,10 +88,12 @@ class Publisher(Live, Closing):
     def take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
         """Add rows to the traces, and publish a frame if one is due."""
         if rows.size:
-            self._carefully(self._take, rows, loop, finished, total)
+            self._carefully(lambda: self._take(rows, loop, finished, total))
 
     def _take(self, rows: np.ndarray, loop: RunningLoop, finished: int, total: int) -> None:
-        self._keep(rows)
+        self._recent.append(rows)
+        while sum(chunk.size for chunk in self._recent[1:]) >= self._most_rows:
+            del self._recent[0]
         self._add_to_traces(rows, loop)
         now = time.monotonic()
         state = int(rows["guard"][-1]), int(rows["lock"][-1])
@@ -105,7 +104,7 @@ class Publisher(Live, Closing):
 
     def line(self, what: str, told: Mapping[str, object]) -> None:
         """Append a line. Where the memory is full, it is left out."""
-        self._carefully(self._line, what, told)
+        self._carefully(lambda: self._line(what, told))
 
     def _line(self, what: str, told: Mapping[str, object]) -> None:
         if what == "part":
@@ -149,24 +148,15 @@ class Publisher(Live, Closing):
         remove(self.folder)
         os.close(self._lock)
 
-    def _carefully(
-        self, step: Callable[Arguments, None], *arguments: Arguments.args, **named: Arguments.kwargs
-    ) -> None:
+    def _carefully(self, step: Callable[[], None]) -> None:
         """Run a step of publishing; whatever goes wrong with it, the test is more important than its picture."""
         if self._failed:
             return
         try:
-            step(*arguments, **named)
+            step()
         except Exception as error:
             self._failed = True
-            text = f"the run can no longer be watched ({error_text(error)}); requests to stop are still heeded"
-            self._remark(text)
-
-    def _keep(self, rows: np.ndarray) -> None:
-        """Keep the chunks that hold the last rows."""
-        self._recent.append(rows)
-        while sum(chunk.size for chunk in self._recent[1:]) >= self._most_rows:
-            del self._recent[0]
+            self._remark(f"the run can no longer be watched ({error_text(error)}); requests to stop are still heeded")
 
     def _add_to_traces(self, rows: np.ndarray, loop: RunningLoop) -> None:
         self._rows.append(rows)

@@ -1,4 +1,8 @@
-"""Read recordings as measurements in memory, and as experiments for nonlinear state-space models."""
+"""Read recordings as measurements in memory, and as experiments for nonlinear state-space models.
+
+What reads a recording raises `rig.errors.RecordingError` for one of another kind, and `identification.IdentificationError` if
+nothing in it was accepted.
+"""
 
 from identification.multisine import Estimator
 from rig.campaigns.evaluation.recorded import bench_of_recording, point_rows

@@ -28,25 +28,20 @@ def backbone(recording: Recording) -> Backbone:
     """Return the accepted points of a backbone recording that belong to the current plan, in the order of the plan.
 
     For a continuous backbone these are the means of up and down, without the differences between them (see
-    `continuous_backbones`). Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if
-    there is no point.
+    `continuous_backbones`).
     """
     return cast(Backbone, _measured(recording, Backbone))
 
 
 def continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
-    """Return the accepted points of a continuous backbone, one backbone per repeat, with the results of the ways up and down.
-
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no point.
-    """
+    """Return the accepted points of a continuous backbone, one backbone per repeat, with the results up and down."""
     return cast(tuple[ContinuousBackbone, ...], _measured(recording, ContinuousBackbone))
 
 
 def decays(recording: Recording) -> dict[int, DecayBackbone]:
     """Return the decay of every accepted point of a decay recording, by the stored number of its point, which counts from 0.
 
-    The exciter's part is taken out through the measured force; times count from the release. Raises `RecordingError` for a
-    recording of another kind, `identification.IdentificationError` if there is no decay.
+    The exciter's part is taken out through the measured force; times count from the release.
     """
     return cast(dict[int, DecayBackbone], _measured(recording, DecayBackbone))
 
@@ -55,17 +50,13 @@ def frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
     """Return the fundamentals of force and drive of a stepped-sine, stepped-phase or response-controlled recording.
 
     There is one response per level and pass, with its accepted points in the order of measurement; for stepped phase this is
-    the order along the branch. Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if
-    there is no point.
+    the order along the branch.
     """
     return cast(tuple[FrequencyResponse, ...], _measured(recording, FrequencyResponse))
 
 
 def dwell_course(recording: Recording) -> DwellCourse:
-    """Return frequency, damping, amplitude and force of every accepted mean of a dwell, over cycles and time.
-
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no mean.
-    """
+    """Return frequency, damping, amplitude and force of every accepted mean of a dwell, over cycles and time."""
     return cast(DwellCourse, _measured(recording, DwellCourse))
 
 
@@ -82,26 +73,19 @@ def sweeps(recording: Recording) -> dict[int, Transient]:
     """Return the fundamentals over time of every accepted sweep, by the stored number of its point, which counts from 0.
 
     The output is channel ``voltage``.
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no sweep.
     """
     return cast(dict[int, Transient], _measured(recording, Transient))
 
 
 def spectra(recording: Recording) -> dict[float, PeriodicSpectra]:
-    """Return the spectra of every accepted realisation, by level (V RMS). The output is channel ``voltage``.
-
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no realisation.
-    """
+    """Return the spectra of every accepted realisation, by level (V RMS). The output is channel ``voltage``."""
     return cast(dict[float, PeriodicSpectra], _measured(recording, PeriodicSpectra))
 
 
 def response_matrices(
     recording: Recording, *, estimator: Estimator = "instrument"
 ) -> dict[float, FrequencyResponseMatrix]:
-    """Return the frequency responses from the force to every motion, by level (V RMS), with their covariance.
-
-    Raises `RecordingError` for a recording of another kind, `identification.IdentificationError` if there is no realisation.
-    """
+    """Return the frequency responses from the force to every motion, by level (V RMS), with their covariance."""
     found = _measured(recording, FrequencyResponseMatrix, estimator=estimator)
     return cast(dict[float, FrequencyResponseMatrix], found)
 

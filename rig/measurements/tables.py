@@ -1,7 +1,8 @@
 """Recordings as tables of pandas and xarray, with units. Both libraries are optional: ``pip install 'vibrolock[tables]'``."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,10 +33,7 @@ def points_table(recording: Recording) -> "pandas.DataFrame":
 
     Raises ImportError without pandas.
     """
-    try:
-        import pandas
-    except ImportError:
-        raise _missing("pandas") from None
+    pandas = _library("pandas")
     campaign = KINDS[recording.kind]
     points: list[Point[object]] = [point_from(table, campaign.result) for table in recording.latest.values()]
     columns = {
@@ -93,10 +91,7 @@ def telemetry(
 
     Raises `RecordingError` for a column, part, point or number that there is not, ImportError without xarray.
     """
-    try:
-        import xarray
-    except ImportError:
-        raise _missing("xarray") from None
+    library = _library("xarray")
     number, samples, found = selected_rows(
         recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every
     )
@@ -104,7 +99,8 @@ def telemetry(
     variables = {name: ("time", values, attributes) for name, values, attributes in found}
     coordinate = ("time", samples / rate_hz, {"units": "s", "long_name": "time from the beginning of the part"})
     facts = {"kind": recording.kind, "part": number, "sample_rate_hz": rate_hz, "started": recording.started}
-    return xarray.Dataset(variables, {"time": coordinate}, facts)
+    table: xarray.Dataset = library.Dataset(variables, {"time": coordinate}, facts)
+    return table
 
 
 def selected_rows(
@@ -160,7 +156,6 @@ def _stretch(recording: Recording, part: int | None, point: int | None) -> tuple
 def _variables(
     recording: Recording, part: Part, columns: Sequence[str] | None, rows: slice, every: int
 ) -> list[tuple[str, np.ndarray, dict[str, str]]]:
-    """Return name, values and attributes of each channel and column that is wanted."""
     channels = {str(channel["name"]): index for index, channel in enumerate(recording.channels)}
     scalars = {column.name: column for column in part.columns if column.name != "inputs"}
     known = [*channels, *(name for name in scalars if name not in channels)]
@@ -186,5 +181,8 @@ def _stored_unit(column: Column) -> str:
     return unit_of(column.key) or "1" if column.scale != 1.0 else column.unit or "1"
 
 
-def _missing(library: str) -> ImportError:
-    return ImportError(f"{library} is not installed, and tables need it: pip install 'vibrolock[tables]'")
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ImportError(f"{name} is not installed, and tables need it: pip install 'vibrolock[tables]'") from None

@@ -12,8 +12,7 @@ from rig.bench import Bench
 from rig.campaigns.evaluation.stored_samples import StoredSamples
 from rig.campaigns.planning.plan import Plan
 from rig.errors import RigError
-from rig.live.binning import put_bin
-from rig.live.layout import BIN_S, bin_dtype
+from rig.live.layout import BIN_S, bin_dtype, put_bin
 from rig.recording.parts import Part
 from rig.tick.layout import recorded_row
 from rig.tick.safety.layout import GuardMode

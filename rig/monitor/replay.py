@@ -267,7 +267,7 @@ class Replay(Closing):
         errors = window["phase_error_rad"][-max(1, round(MEAN_S * self._rate)) :]
         if np.isfinite(errors).any():
             state["phase_error_rad"] = np.nanmean(errors)
-        bands = fundamentals_of(window, self.facts)
+        bands = fundamentals_of(window)
         if bands.size and last["frequency_hz"] > 0.0:
             state["force_n"] = abs(bands[self._force, 1])
             state["drive_m_s2"] = abs(bands[self._drive, 1])

@@ -19,6 +19,7 @@ SCOPE_PERIODS = 3
 """Periods of the waveform that are shown and analysed; chosen: few enough to see the waveform's shape."""
 SCOPE_POINTS = 400
 """Most points of a shown waveform; chosen: about the width of its plot in pixels."""
+DIGITS = 6  # of a number on the page; chosen: finer than any plot
 HARMONICS = 10
 """Harmonics whose amplitudes are shown; chosen."""
 BULKY = {"harmonics", "harmonics_std", "rounding_std"}
@@ -51,34 +52,6 @@ class Share:
     def share(self) -> float:
         """Value over limit or range."""
         return self.value / self.of
-
-
-@dataclass(frozen=True)
-class Curve:
-    """Waveform of the output or of a channel."""
-
-    name: str
-    unit: str
-    values: Float
-
-
-@dataclass(frozen=True)
-class Scope:
-    """Waveforms of the last periods over one time axis."""
-
-    t_ms: Float
-    curves: list[Curve]
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """Amplitudes of a channel from the first harmonic on."""
-
-    name: str
-    unit: str
-    amplitudes: Float
-    purity: float
-    """Amplitude of the fundamental over the root sum of squares of all; NaN where nothing vibrates."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +89,11 @@ class Details:
     overruns: int
     lost: int
     shares: list[Share]
-    scope: Scope
-    harmonics: list[Spectrum]
+    scope: dict[str, object]
+    """Waveforms of the last periods: ``t_ms`` and ``curves``, each with name, unit and values."""
+    harmonics: list[dict[str, object]]
+    """Spectra of force and drive: name, unit, amplitudes from the first harmonic on, and purity: the fundamental over the root
+    sum of squares of all; NaN where nothing vibrates."""
     age_s: float
     """Time since the frame was written."""
 
@@ -212,33 +188,37 @@ def shown_frame(frame: Frame | None, facts: RunFacts, lines: Sequence[Line]) -> 
 
 
 def _details(frame: Frame, facts: RunFacts, guard: str, output_off: bool) -> Details:
-    state, window = frame.state, frame.window
-    fundamentals = fundamentals_of(window, facts)
+    state = frame.state
+    rows = _last_periods(frame.window)
+    fundamentals = fundamentals_of(frame.window)
     good = int(state["good_periods"])
+    alike = (
+        "part",
+        "finished",
+        "level",
+        "target",
+        "frequency_hz",
+        "voltage_v",
+        "force_n",
+        "left_s",
+        "overruns",
+        "lost",
+    )
     return Details(
+        **{name: state[name].item() for name in alike},
         guard=guard,
         output_off=output_off,
         lock=LockState(int(state["lock"])).name.lower(),
-        part=int(state["part"]),
         time_s=int(state["sample"]) / facts.sample_rate_hz,
         point=int(state["point"]) + 1,
-        finished=int(state["finished"]),
         points=int(state["total"]),
-        level=float(state["level"]),
-        target=float(state["target"]),
-        frequency_hz=float(state["frequency_hz"]),
         phase_error_deg=math.degrees(float(state["phase_error_rad"])),
-        voltage_v=float(state["voltage_v"]),
-        force_n=float(state["force_n"]),
         acceleration_m_s2=float(state["drive_m_s2"]),
         displacement_mm=1e3 * float(state["displacement_m"]),
         settled=None if good < 0 else (good, int(state["settled_periods"])),
-        left_s=float(state["left_s"]),
-        late_us=tuple(float(value) for value in state["late_us"]),
-        overruns=int(state["overruns"]),
-        lost=int(state["lost"]),
-        shares=_shares(state, window, facts, fundamentals),
-        scope=_scope(window, facts),
+        late_us=tuple(state["late_us"].tolist()),
+        shares=_shares(state, rows if rows.size else frame.window, facts, fundamentals),
+        scope=_scope(rows, facts),
         harmonics=_spectra(fundamentals, facts),
         age_s=frame.age_s,
     )
@@ -281,51 +261,51 @@ def shown_line(line: Line, facts: RunFacts) -> dict[str, object]:
     return shown
 
 
-def as_json(value: object, digits: int = 6) -> JsonValue:
-    """Return a value as JSON can hold it: lists for arrays, None for what is not finite, numbers of so many digits."""
+def as_json(value: object) -> JsonValue:
+    """Return a value as JSON can hold it: lists for arrays, None for what is not finite, numbers of `DIGITS`."""
     if isinstance(value, np.ndarray):
-        return _list(value, digits)
+        return _list(value)
     if isinstance(value, Share):
-        return as_json({**vars(value), "share": value.share}, digits)
+        return as_json({**vars(value), "share": value.share})
     if is_dataclass(value):
         value = vars(value)
     if isinstance(value, Mapping):
-        return {str(key): as_json(one, digits) for key, one in value.items()}
+        return {str(key): as_json(one) for key, one in value.items()}
     if isinstance(value, list | tuple):
-        return [as_json(one, digits) for one in value]
+        return [as_json(one) for one in value]
     if isinstance(value, float):
-        return float(f"{value:.{digits}g}") if math.isfinite(value) else None
+        return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
     if value is None or isinstance(value, str | int):
         return value
     raise TypeError(f"{type(value).__name__} is not a JSON value")
 
 
-def _list(values: Float, digits: int) -> list[JsonValue]:
-    """Return an array as a list, rounded to so many digits of its largest value; None for what is not finite."""
+def _list(values: Float) -> list[JsonValue]:
+    """Return an array as a list, rounded to `DIGITS` of its largest value; None for what is not finite."""
     if values.dtype.kind != "f":
         return list(values.tolist())
     known = np.isfinite(values)
     largest = float(np.max(np.abs(values), initial=0.0, where=known))
-    decimals = digits - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
+    decimals = DIGITS - 1 - math.floor(math.log10(largest)) if largest > 0.0 else 0
     rounded = np.round(values.astype(float), decimals).tolist()
     return list(rounded if known.all() else [one if math.isfinite(one) else None for one in rounded])
 
 
-def _last_periods(window: NDArray[np.void], periods: int) -> NDArray[np.void]:
-    """Return the rows of the last ``periods`` whole periods, or of fewer."""
+def _last_periods(window: NDArray[np.void]) -> NDArray[np.void]:
+    """Return the rows of the last `SCOPE_PERIODS` whole periods, or of fewer."""
     theta = window["theta_rad"].astype(float)
     begins = np.flatnonzero(np.diff(theta) < -math.pi) + 1
     if begins.size < 2:
         return window[:0]
-    return window[begins[max(begins.size - 1 - periods, 0)] : begins[-1]]
+    return window[begins[max(begins.size - 1 - SCOPE_PERIODS, 0)] : begins[-1]]
 
 
-def fundamentals_of(window: NDArray[np.void], facts: RunFacts) -> Complex:
+def fundamentals_of(window: NDArray[np.void]) -> Complex:
     """Return mean and harmonics of every channel over the last periods: complex[n_channels, H + 1], or [0, H + 1] for none.
 
     By least squares on the recorded phase of the oscillator.
     """
-    rows = _last_periods(window, SCOPE_PERIODS)
+    rows = _last_periods(window)
     inputs = rows["inputs"].astype(float)
     good = np.isfinite(inputs).all(axis=1)
     if good.sum() < 4 * HARMONICS:
@@ -337,10 +317,8 @@ def fundamentals_of(window: NDArray[np.void], facts: RunFacts) -> Complex:
     return np.asarray(np.hstack([found[:, :1].astype(complex), cos - 1j * sin]))
 
 
-def _shares(state: np.void, window: NDArray[np.void], facts: RunFacts, fundamentals: Complex) -> list[Share]:
-    """Return how much of every limit and range the last rows used."""
-    rows = _last_periods(window, SCOPE_PERIODS)
-    inputs = np.abs((rows if rows.size else window)["inputs"]).astype(float)
+def _shares(state: np.void, rows: NDArray[np.void], facts: RunFacts, fundamentals: Complex) -> list[Share]:
+    inputs = np.abs(rows["inputs"]).astype(float)
     largest = np.fmax.reduce(inputs, axis=0) if inputs.size else np.full(len(facts.channels), math.nan)
     omega = 2.0 * math.pi * float(state["frequency_hz"])
     out = [Share("output", "V", "limit", float(state["voltage_v"]), facts.limits.voltage_v)]
@@ -359,21 +337,20 @@ def _force_and_drive(facts: RunFacts) -> list[tuple[int, ChannelFacts]]:
     return [(at, facts.channels[at]) for at in (facts.index("force"), facts.index("drive"))]
 
 
-def _scope(window: NDArray[np.void], facts: RunFacts) -> Scope:
-    rows = _last_periods(window, SCOPE_PERIODS)
+def _scope(rows: NDArray[np.void], facts: RunFacts) -> dict[str, object]:
     stride = max(1, -(-rows.size // SCOPE_POINTS))
     rows = rows[::stride]
-    curves = [Curve("output", "V", rows["output_v"])]
-    curves += [Curve(channel.name, channel.unit, rows["inputs"][:, at]) for at, channel in _force_and_drive(facts)]
-    t_ms = np.arange(rows.size, dtype=float) * (1e3 * stride / facts.sample_rate_hz)
-    return Scope(t_ms, curves)
+    curves = [{"name": "output", "unit": "V", "values": rows["output_v"]}]
+    for at, channel in _force_and_drive(facts):
+        curves.append({"name": channel.name, "unit": channel.unit, "values": rows["inputs"][:, at]})
+    return {"t_ms": np.arange(rows.size, dtype=float) * (1e3 * stride / facts.sample_rate_hz), "curves": curves}
 
 
-def _spectra(fundamentals: Complex, facts: RunFacts) -> list[Spectrum]:
-    out = []
+def _spectra(fundamentals: Complex, facts: RunFacts) -> list[dict[str, object]]:
+    out: list[dict[str, object]] = []
     for at, channel in _force_and_drive(facts):
         amplitudes = np.abs(fundamentals[at, 1:]) if fundamentals.size else np.zeros(0)
         whole = float(np.linalg.norm(amplitudes))
         purity = float(amplitudes[0]) / whole if whole > 0.0 else math.nan
-        out.append(Spectrum(channel.name, channel.unit, amplitudes, purity))
+        out.append({"name": channel.name, "unit": channel.unit, "amplitudes": amplitudes, "purity": purity})
     return out

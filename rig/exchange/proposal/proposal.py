@@ -20,21 +20,11 @@ _MAX_CHANNELS = 16  # channels that are proposed; chosen
 
 
 def proposed_mapping(paths: Sequence[Path], format_: str = "", units: str = "") -> tuple[str, tuple[str, ...]]:
-    """Return a mapping of time data for a file and further ones beside it, as text, and what is left to be filled in.
+    """Return a mapping of time data, as text, and what is left to be filled in.
 
-    Parameters
-    ----------
-    paths
-        The file that will be imported, and others whose channels belong to the same records.
-    format_
-        Format of the first file; by its ending if empty.
-    units
-        Of a universal file, see `rig.exchange.reading.import_file`.
-
-    Raises
-    ------
-    ImportFailed
-        If a file cannot be read, or holds no array long enough to be a signal.
+    ``paths`` are the file that will be imported, and others whose channels belong to the same records; ``format_`` is that
+    of the first, by its ending if empty; ``units`` those of a universal file, see `rig.exchange.reading.import_file`. Raises
+    `ImportFailed` if a file cannot be read, or holds no array long enough to be a signal.
     """
     for number, path in enumerate(paths):
         format_of(path, format_ if not number else "", "`format`")

@@ -13,15 +13,10 @@ _CODES = ("", "SI", "BG", "MG", "BA", "MM", "CM", "IN", "GM", "US")  # names of 
 
 
 class FileUnits:
-    """Factors from the quantities of a file to SI.
+    """Factors from the quantities of a file to SI, by its ``system`` of units (dataset 164) if it has one.
 
-    Parameters
-    ----------
-    system
-        System of units (dataset 164); None if the file has none.
-    assumed
-        Source that decides if labels and dataset 164 disagree or are missing: ``labels``, ``file`` (dataset 164) or ``si``. If
-        empty, such a file is refused.
+    ``assumed`` decides if labels and dataset 164 disagree or are missing: ``labels``, ``file`` (dataset 164) or ``si``; if
+    empty, such a file is refused.
     """
 
     def __init__(self, system: UnitSystem | None, assumed: str = "") -> None:
@@ -34,7 +29,9 @@ class FileUnits:
         labelled = None if label in ("", "NONE") else si_of(label, f"{where}: unit of the {name}")
         if self._assumed == "si":
             return (quantity or (labelled[0] if labelled else "1")), 1.0
-        filed = self._filed(code, quantity)
+        filed = None  # unit and factor by dataset 164, whose factors divide to give SI
+        if self._system is not None and quantity:
+            filed = quantity, 1.0 / (self._system.force if code in _FORCE else self._system.length)
         if labelled and (self._assumed == "labels" or filed is None or label in _INDEPENDENT):
             return labelled
         if labelled and filed and self._assumed != "file":
@@ -64,12 +61,6 @@ class FileUnits:
         """Name of the file's system of units."""
         code = 0 if self._system is None else self._system.code
         return _CODES[code] if 0 <= code < len(_CODES) else f"code {code}"
-
-    def _filed(self, code: int, quantity: str) -> tuple[str, float] | None:
-        """Return unit and factor by dataset 164, whose factors divide to give SI; None if it does not define the quantity."""
-        if self._system is None or not quantity:
-            return None
-        return quantity, 1.0 / (self._system.force if code in _FORCE else self._system.length)
 
 
 def file_units(file: UniversalFile, assumed: str = "") -> FileUnits:

@@ -21,7 +21,7 @@ from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import MultisineResult
 from rig.errors import RecordingError
 from rig.measurements import bench_of_recording, point_rows
-from rig.measurements.experiments.periods import Periods, WantedPeriods, realisation
+from rig.measurements.experiments.periods import Periods, realisation
 from rig.measurements.experiments.records import FEWEST_PERIODS, segment, sweep_pieces
 from rig.measurements.experiments.signals import Signals
 from rig.recording.reader import Recording
@@ -118,15 +118,16 @@ def experiments(
     if _made_of(recording) == "realisations":
         plan = validated(MultisinePlan, recording.configuration["plan"], "plan of the recording")
         ahead = max(1, plan.transient_periods) if transient_periods is None else transient_periods
-        wanted = WantedPeriods(rate_hz=rate_hz, periods=periods, transient_periods=ahead)
         return tuple(
             realisation(
                 signals,
                 plan,
                 point,
                 point_rows(recording, point.number),
-                wanted,
-                f"{_called(recording.path.stem, point)}, realisation {(point.realisation or 0) + 1}",
+                rate_hz=rate_hz,
+                periods=periods,
+                transient_periods=ahead,
+                name=f"{_called(recording.path.stem, point)}, realisation {(point.realisation or 0) + 1}",
             )
             for point in _accepted(recording, points_of(recording, MultisineResult))
         )
@@ -139,7 +140,6 @@ def experiments(
 def _records(
     recording: Recording, signals: Signals, points: Sequence[Point[object]], rate_hz: float, segment_periods: int
 ) -> Iterable[Experiment]:
-    """Yield the experiments of a recording that is not a multisine."""
     for point in points:
         rows, name = point_rows(recording, point.number), _called(recording.path.stem, point)
         if _made_of(recording) == "sweeps":
@@ -201,7 +201,6 @@ def default_rate_hz(recording: Recording) -> float:
 
 
 def _highest_hz(recording: Recording) -> float:
-    """Return the highest excited frequency, Hz."""
     plan = recording.configuration["plan"]
     if _made_of(recording) == "realisations":
         return float(plan["highest_hz"])

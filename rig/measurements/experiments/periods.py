@@ -1,6 +1,5 @@
 """Multisine realisations as experiments: one settled period each, resampled without error if the rates allow it."""
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,37 +15,28 @@ from rig.measurements.experiments.signals import Signals
 Periods = Literal["mean", "all"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class WantedPeriods:
-    """How realisations become experiments."""
-
-    rate_hz: float
-    """Sample rate of the experiments, Hz."""
-    periods: Periods
-    """Whether to use the mean over the periods of a realisation, or all of them."""
-    transient_periods: float
-    """Number of periods put ahead that do not count in errors."""
-
-
 def realisation(
     signals: Signals,
     plan: MultisinePlan,
     point: Point[MultisineResult],
     rows: np.ndarray,
-    wanted: WantedPeriods,
+    *,
+    rate_hz: float,
+    periods: Periods,
+    transient_periods: float,
     name: str,
 ) -> Experiment:
-    """Return the mean over a realisation's periods, or all periods in sequence, begun where the signal begins.
+    """Return the mean over a realisation's periods, or all ``periods`` in sequence, begun where the signal begins.
 
-    Periods with lost samples are left out. Raises `IdentificationError` if no period is left, or if a period is not a whole
-    number of samples at the wanted rate.
+    ``transient_periods`` put ahead do not count in errors. Periods with lost samples are left out. Raises
+    `IdentificationError` if no period is left, or if a period is not a whole number of samples at the wanted rate.
     """
-    bench, rate_hz = signals.bench, wanted.rate_hz
+    bench = signals.bench
     played = plan.model_copy(update={"periods": result_of(point).periods})
     recorded = turned_periods(bench, played, point.realisation or 0, rows)
     size = samples_of_a_period(plan, bench, rate_hz)
     noise = None
-    if wanted.periods == "mean":
+    if periods == "mean":
         noise = _noise(recorded, size)
         if noise is not None:
             hz = np.arange(1, noise.shape[1] + 1) * bench.sample_rate_hz / recorded.shape[-1]
@@ -55,7 +45,7 @@ def realisation(
         recorded = recorded.mean(axis=1, keepdims=True)
     slow = _resampled(recorded, bench, size, signals.offset)
     once = slow.reshape(slow.shape[0], -1)
-    ahead = round(wanted.transient_periods * size)
+    ahead = round(transient_periods * size)
     both = np.concatenate([once[:, np.arange(-ahead, 0) % once.shape[1]], once], axis=1)
     return Experiment(
         inputs=both[list(signals.inputs)],
