@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.subject import Subject
-from rig.errors import RecordingError
 from rig.text.json_values import JsonValue
 from simulators.analysis import PeriodicResponses
 from simulators.kernels import Flag
@@ -59,9 +58,6 @@ def _points(responses: PeriodicResponses) -> list[JsonValue]:
         }
         for k in range(responses.frequency_hz.size)
     ]
-
-
-FIGURE_ENDINGS = (".png", ".pdf", ".svg")  # endings of figures that are written
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -129,7 +125,7 @@ class Study(Result, ABC):
 
 def draw(study: Study, figure: Path) -> None:
     """Draw an analysis into ``figure`` (png, pdf or svg, by its suffix); raise `RecordingError` if it cannot be written."""
-    from rig.drawing.page import check_replaceable, page_for
+    from rig.drawing.page import check_ending, check_replaceable, page_for
     from rig.drawing.style import title
 
     check_ending(figure)
@@ -137,12 +133,6 @@ def draw(study: Study, figure: Path) -> None:
     with page_for(figure, study.figure_in) as page:
         study.draw_on(page)
         title(page, f"{study.subject.bench.specimen.name}: {study.title}")
-
-
-def check_ending(figure: Path) -> None:
-    """Raise `RecordingError` unless the suffix of ``figure`` is that of a figure format."""
-    if figure.suffix.lower() not in FIGURE_ENDINGS:
-        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
 
 
 def length_unit(largest_m: float) -> tuple[float, str]:

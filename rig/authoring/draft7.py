@@ -73,18 +73,13 @@ def _converted(node: Schema, key: str = "") -> Schema:
         alike = all(part == parts[0] for part in parts)
         out["items"] = {**parts[0], **out.get("items", {})} if alike else parts
     if len(out.get("anyOf", ())) == 1:  # the other choice was null
-        _absorb(out, out.pop("anyOf")[0])
+        for word, value in out.pop("anyOf")[0].items():  # words beside it count where both have them
+            if word == "allOf":
+                out["allOf"] = [*value, *out.get("allOf", ())]
+            elif word == "items" and "items" in out:
+                out["items"] = {**value, **out["items"]}
+            else:
+                out.setdefault(word, value)
     if "$ref" in out and len(out) > 1:
         out["allOf"] = [{"$ref": out.pop("$ref")}, *out.get("allOf", ())]
     return out
-
-
-def _absorb(out: Schema, only: Schema) -> None:
-    """Put the words of the only choice that is left beside the others, whose words count where both have them."""
-    for word, value in only.items():
-        if word == "allOf":
-            out["allOf"] = [*value, *out.get("allOf", ())]
-        elif word == "items" and "items" in out:
-            out["items"] = {**value, **out["items"]}
-        else:
-            out.setdefault(word, value)

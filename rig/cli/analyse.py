@@ -133,8 +133,9 @@ def _show(
     bench: str, near_hz: float | None, analyse: "Callable[[Subject], Study]", figure: Path | None, json: bool
 ) -> None:
     """Analyse, print and draw; exit with status 1 if not everything requested was found."""
-    from rig.analysis.study import check_ending, draw
+    from rig.analysis.study import draw
     from rig.analysis.subject import subject_of
+    from rig.drawing.page import check_ending
     from rig.text.console import print_json
 
     if figure is not None:

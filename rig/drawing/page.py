@@ -37,6 +37,12 @@ COLLAPSED = "constrained_layout not applied"
 """Beginning of what matplotlib warns of where axes have no room."""
 
 
+def check_ending(figure: Path) -> None:
+    """Raise `RecordingError` unless ``figure`` ends as figures do."""
+    if figure.suffix.lower() not in _MARKS:
+        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+
+
 def check_replaceable(figure: Path) -> None:
     """Raise `RecordingError` for a file that exists and is no figure of this program."""
     mark = _MARKS[figure.suffix.lower()][1]

@@ -1,10 +1,9 @@
 """Values that a child process has read, as a JSON document and a file of raw bytes in a folder."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import BinaryIO, TypeGuard
+from typing import Any, BinaryIO, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +82,8 @@ class _Encoder:
         if _is_array(value) or isinstance(value, np.generic | int | float | complex):
             array = np.asarray(value)
             if array.dtype.kind in _PLAIN:
-                return {"array": [array.dtype.str, list(array.shape), self._written(array)], "as": _kind(value)}
+                kind = "array" if value is array else "scalar" if isinstance(value, np.generic) else "number"
+                return {"array": [array.dtype.str, list(array.shape), self._written(array)], "as": kind}
         return f"<{type(value).__name__}>"
 
     def _written(self, array: NDArray[np.generic]) -> int:
@@ -103,44 +103,28 @@ def _is_array(value: object) -> TypeGuard[NDArray[np.generic]]:
     return type(value) is np.ndarray
 
 
-def _kind(value: object) -> str:
-    if isinstance(value, np.ndarray):
-        return "array"
-    return "scalar" if isinstance(value, np.generic) else "number"
-
-
-def _decode(tree: JsonValue, numbers: BinaryIO) -> object:
+def _decode(tree: Any, numbers: BinaryIO) -> Any:
     match tree:
-        case {"bytes": str(text)}:
+        case {"bytes": text}:
             return text.encode("latin-1")
-        case {"record": str(name), "fields": entries}:
-            decoded = _decode(entries, numbers)
-            return _RECORDS[name](**decoded) if isinstance(decoded, dict) else None
-        case {"keys": list(keys), "values": list(values)}:
-            return {str(key): _decode(item, numbers) for key, item in zip(keys, values, strict=True)}
-        case {"list": list(items)}:
+        case {"record": name, "fields": entries}:
+            return _RECORDS[name](**_decode(entries, numbers))
+        case {"keys": keys, "values": values}:
+            return {key: _decode(item, numbers) for key, item in zip(keys, values, strict=True)}
+        case {"list": items}:
             return [_decode(item, numbers) for item in items]
-        case {"cells": list(shape), "items": list(items)}:
+        case {"cells": shape, "items": items}:
             cells = np.empty(len(items), dtype=object)
             for index, item in enumerate(items):
                 cells[index] = _decode(item, numbers)
-            return cells.reshape(_shape(shape))
-        case {"array": [str(dtype), list(shape), int(place)], "as": kind}:
-            array = _read_array(dtype, _shape(shape), place, numbers)
+            return cells.reshape(shape)
+        case {"array": [dtype, shape, place], "as": kind}:
+            array = np.empty(shape, dtype)
+            if array.nbytes:
+                numbers.seek(place)
+                numbers.readinto(array.reshape(-1).view(np.uint8).data)  # type: ignore[attr-defined]
             return array if kind == "array" else array[()] if kind == "scalar" else array.item()
     return tree
-
-
-def _shape(sizes: Sequence[JsonValue]) -> tuple[int, ...]:
-    return tuple(size for size in sizes if isinstance(size, int))
-
-
-def _read_array(dtype: str, shape: Sequence[int], place: int, numbers: BinaryIO) -> NDArray[np.generic]:
-    array = np.empty(shape, dtype)
-    if array.nbytes:
-        numbers.seek(place)
-        numbers.readinto(array.reshape(-1).view(np.uint8).data)  # type: ignore[attr-defined]
-    return array
 
 
 def reason(error: Exception, what: str) -> str:

@@ -90,16 +90,10 @@ def read_frequency_responses(mat_path: str | Path, mapping_path: str | Path) -> 
 
 
 def import_sep005(series: Sequence[Mapping[str, object]], mapping: str | Path) -> "Measurement":
-    """Read the measurement in time series of SEP005 (SDyPy), which a mapping describes by their names.
+    """Read the measurement in time series of SEP005 (SDyPy), which a mapping, a TOML file, describes by their names.
 
-    Parameters
-    ----------
-    series
-        Dictionaries with ``data``, ``name``, ``unit_str`` and ``fs`` or ``time``. Series of one name are realisations.
-    mapping
-        TOML file, such as one of ``kind = "multisine"``.
-
-    Errors are those of `import_file`.
+    ``series`` are dictionaries with ``data``, ``name``, ``unit_str`` and ``fs`` or ``time``; those of one name are
+    realisations. Errors are those of `import_file`.
     """
     from identification import IdentificationError
     from rig.exchange.sep005 import data_of_series

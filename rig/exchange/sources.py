@@ -53,14 +53,8 @@ def read_data(path: Path, format_: str, *, units: str = "", layout: "CsvLayout |
     if format_ == "hdf5" and data.values.get("@format") == "vibrolock":
         kind = data.values.get("@kind")
         raise ImportFailed(f"{path}: is a file of this program, of kind {kind!s}; it needs no import")
-    return data if format_ != "hdf5" else _with_full_names(data)
-
-
-def _with_full_names(data: FileData) -> FileData:
-    """Return the content of an HDF5 file with the values within groups also by full names, and units by attributes.
-
-    These are attributes called ``units`` or ``unit``.
-    """
-    full = {**dict(in_full(data.values)), **data.values}
-    units = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
-    return from_variables(full, units)
+    if format_ != "hdf5":
+        return data
+    full = {**dict(in_full(data.values)), **data.values}  # values within groups also by full names, units by attributes
+    given = {name: full.get(f"{name}@units", full.get(f"{name}@unit")) for name in full if "@" not in name}
+    return from_variables(full, given)

@@ -11,7 +11,7 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.recorded import is_check
 from rig.drawing.curves import View
-from rig.drawing.page import check_replaceable, page_for
+from rig.drawing.page import check_ending, check_replaceable, page_for
 from rig.errors import RecordingError
 from rig.figures.lateness import draw_lateness
 from rig.figures.overlay import overlay
@@ -42,8 +42,7 @@ def plot(
     this program are replaced. Raises `RecordingError` if a file cannot be read or the figure cannot be written.
     """
     sources = [source] if isinstance(source, Path) else list(source)
-    if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+    check_ending(figure)
     if figure.is_dir():
         raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
     if figure.exists() and any(one.exists() and figure.samefile(one) for one in sources):

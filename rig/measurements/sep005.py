@@ -30,19 +30,10 @@ def time_series(
 ) -> list[dict[str, Any]]:
     """Return recorded signals as time series of SEP005, one dictionary a signal, in the units of the channels.
 
-    Parameters
-    ----------
-    recording
-        The open recording.
-    columns
-        Names of channels and of other columns; by default all channels and the output voltage.
-    part, point, from_s, to_s
-        Select rows as in `rig.measurements.tables.telemetry`.
-
-    Rows that are evenly spaced have ``fs``, others ``time`` from the beginning of the part. ``start_timestamp`` is that of the
-    first row, by the clock of the recording's start; only the first part has it. Lost samples are NaN.
-
-    Raises `RecordingError` for a column, part or point that there is not.
+    ``columns`` are names of channels and of other columns; by default all channels and the output voltage. Rows are selected as
+    in `rig.measurements.tables.telemetry`. Evenly spaced rows have ``fs``, others ``time`` from the beginning of the part.
+    ``start_timestamp`` is that of the first row, by the clock of the recording's start; only the first part has it. Lost
+    samples are NaN. Raises `RecordingError` for a column, part or point that there is not.
     """
     wanted = [*(str(channel["name"]) for channel in recording.channels), VOLTAGE] if columns is None else columns
     number, samples, found = selected_rows(recording, columns=wanted, part=part, point=point, from_s=from_s, to_s=to_s)

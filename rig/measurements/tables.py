@@ -13,7 +13,6 @@ from rig.campaigns.kinds import KINDS
 from rig.errors import RecordingError
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
-from rig.text.column import Column
 from rig.text.units import unit_of
 
 if TYPE_CHECKING:
@@ -48,7 +47,10 @@ def points_table(recording: Recording) -> "pandas.DataFrame":
         **columns,
     }
     frame = pandas.DataFrame(table, index=pandas.Index([point.number + 1 for point in points], name="point"))
-    units = {column.key: _stored_unit(column) for column in campaign.columns}
+    units = {  # as stored: tables for people show some in another
+        column.key: unit_of(column.key) or "1" if column.scale != 1.0 else column.unit or "1"
+        for column in campaign.columns
+    }
     bench = recording.configuration["bench"]
     frame.attrs = {
         "kind": recording.kind,
@@ -174,11 +176,6 @@ def _variables(
             attributes = {"units": scalars[name].unit, "long_name": scalars[name].description}
             out.append((name, part.rows(name, read.start, read.stop)[::every], attributes))
     return out
-
-
-def _stored_unit(column: Column) -> str:
-    """Return the unit of a column as it is stored; tables for people show some in another."""
-    return unit_of(column.key) or "1" if column.scale != 1.0 else column.unit or "1"
 
 
 def _library(name: str) -> Any:

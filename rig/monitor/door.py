@@ -16,7 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from rig.monitor.security import LARGEST, Keys, is_whole
-from rig.monitor.visits import Capacity, Visit, Visits, capacity
+from rig.monitor.visits import Visit, Visits, capacity
 
 BACKLOG = 1024
 """Connections that the system keeps until they are accepted."""
@@ -41,10 +41,9 @@ class Door:
         tls: ssl.SSLContext | None,
         keys: Keys,
         connect: Callable[[Visit], asyncio.Protocol],
-        most: Capacity | None = None,
     ) -> None:
         self._listening, self._tls, self._keys, self._connect = listening, tls, keys, connect
-        self._most = most or capacity()
+        self._most = capacity()
         self._unfinished: dict[socket.socket, float] = {}
         self._queue: dict[socket.socket, float] = {}
         self._timers: dict[Callable[[], None], asyncio.TimerHandle] = {}

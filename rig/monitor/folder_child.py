@@ -19,10 +19,6 @@ from rig.system.child import confine
 from vibrolock.printable import one_line, printable
 
 
-def _kinds(paths: list[Path]) -> bytes:
-    return json.dumps([_kind(path) for path in paths]).encode()
-
-
 def _kind(path: Path) -> dict[str, str]:
     """Return kind and a few words. The file is not checked from end to end: in here a damaged one may do what it likes."""
     from rig.results.kinds import KINDS
@@ -30,10 +26,8 @@ def _kind(path: Path) -> dict[str, str]:
     try:
         if not path.exists():
             header = JournalBlocks(journal_path(path)).header
-            return {
-                "kind": printable(header.kind),
-                "summary": f"recording of {printable(header.started)}, not finished",
-            }
+            summary = f"recording of {printable(header.started)}, not finished"
+            return {"kind": printable(header.kind), "summary": summary}
         with open_unchecked(path) as file, reading(path):
             kind, started = kind_in(file), str(file.attrs.get("started", ""))
     except (RigError, OSError) as error:
@@ -69,7 +63,10 @@ def _main() -> int:
     out = os.dup(sys.stdout.fileno())
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # whatever a library prints is no answer
     try:
-        answer = _kinds(paths) if what == "kinds" else {"figure": _figure, "table": _table}[what](paths[0])
+        if what == "kinds":
+            answer = json.dumps([_kind(path) for path in paths]).encode()
+        else:
+            answer = {"figure": _figure, "table": _table}[what](paths[0])
         status = 0
     except (RigError, OSError) as error:
         answer, status = one_line(str(error)).encode(), 1

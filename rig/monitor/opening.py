@@ -29,7 +29,8 @@ def open_in_browser(url: str, say: Callable[[str], None]) -> Path | None:
     try:
         path = _written(url)
     except (OSError, RecordingError) as error:
-        say(f"no browser is opened, as there is no room for the file that tells it the address ({_reason(error)})")
+        reason = (isinstance(error, OSError) and error.strerror) or str(error)
+        say(f"no browser is opened, as there is no room for the file that tells it the address ({reason})")
         return None
     threading.Thread(target=_open, args=(path.as_uri(), say), name="browser", daemon=True).start()
     return path
@@ -68,7 +69,3 @@ def _open(uri: str, say: Callable[[str], None]) -> None:
         opened = False
     if not opened:
         say("no browser could be opened here")
-
-
-def _reason(error: Exception) -> str:
-    return (isinstance(error, OSError) and error.strerror) or str(error)

@@ -155,11 +155,11 @@ class RecordedPart:
 
     def _fits(self, table: NDArray[np.void]) -> bool:
         """Return whether the rows of the first points lie in segments of these points, or of those measured with them."""
-        known = [point for point in self.part.points if "end_sample" in point][:5]
-        return all(self._lies_in(table, int(point["end_sample"]), int(point["number"])) for point in known)
-
-    def _lies_in(self, table: NDArray[np.void], end_sample: int, number: int) -> bool:
-        at = int(self.part.rows("segment", end_sample - 1, end_sample)[0])
-        if not 0 <= at < table.size or number not in self._of.numbers:
-            return False
-        return int(table[at]["point"]) in self._of.plan.together(self._of.numbers.index(number))
+        for point in [point for point in self.part.points if "end_sample" in point][:5]:
+            end_sample, number = int(point["end_sample"]), int(point["number"])
+            at = int(self.part.rows("segment", end_sample - 1, end_sample)[0])
+            if not 0 <= at < table.size or number not in self._of.numbers:
+                return False
+            if int(table[at]["point"]) not in self._of.plan.together(self._of.numbers.index(number)):
+                return False
+        return True

@@ -70,22 +70,29 @@ class Visit:
         """It is open."""
         self._transport = transport
 
-    @property
-    def is_known(self) -> bool:
-        """Whether it has shown a key."""
-        return self in self._visits.known
-
     def shows_key(self) -> None:
-        """A request on it had the cookie, or the token of the address."""
-        self._visits.know(self)
+        """Count it as known, and as the one used last: a request on it had the cookie, or the token of the address."""
+        known = self._visits.known
+        known.pop(self, None)
+        known[self] = None
+        while len(known) > MOST_KNOWN:
+            next(iter(known)).drop()
+        self._visits.leaves(self)
 
     def becomes_feed(self) -> None:
-        """It has become a socket."""
-        self._visits.follow(self)
+        """Count it as a socket; one without a key stays a stranger until it is refused."""
+        if self not in self._visits.known:
+            return
+        del self._visits.known[self]
+        self._visits.feeds[self] = None
+        if len(self._visits.feeds) > MOST_FEEDS:
+            self.drop()
 
     def gone(self) -> None:
-        """It is closed."""
-        self._visits.forget(self)
+        """Forget it, because it is closed."""
+        self._visits.known.pop(self, None)
+        self._visits.feeds.pop(self, None)
+        self._visits.leaves(self)
 
     def drop(self) -> None:
         """Close it at once, whatever it does."""
@@ -130,33 +137,11 @@ class Visits:
     def known_at_once(self) -> Visit:
         """Return a connection that has shown a key before it was opened."""
         visit = Visit(self, 0.0)
-        self.know(visit)
+        visit.shows_key()
         return visit
 
-    def know(self, visit: Visit) -> None:
-        """Count a connection as known, and as the one used last."""
-        self.known.pop(visit, None)
-        self.known[visit] = None
-        while len(self.known) > MOST_KNOWN:
-            next(iter(self.known)).drop()
-        self._leaves(visit)
-
-    def follow(self, visit: Visit) -> None:
-        """Count a socket; one without a key stays a stranger until it is refused."""
-        if visit not in self.known:
-            return
-        del self.known[visit]
-        self.feeds[visit] = None
-        if len(self.feeds) > MOST_FEEDS:
-            visit.drop()
-
-    def forget(self, visit: Visit) -> None:
-        """A connection is closed."""
-        self.known.pop(visit, None)
-        self.feeds.pop(visit, None)
-        self._leaves(visit)
-
-    def _leaves(self, stranger: Visit) -> None:
+    def leaves(self, stranger: Visit) -> None:
+        """Give the place of a stranger to another, if it has one."""
         if stranger in self.strangers:
             del self.strangers[stranger]
             self.on_room()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.tuning import Design, Margins
-from rig.drawing.page import grid, page_for
+from rig.drawing.page import check_ending, grid, page_for
 from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title, unit_text
 from rig.errors import RecordingError
 from vibrolock.arrays import Float
@@ -24,8 +24,7 @@ _STEP = 0.3
 
 def check_figure(figure: Path, overwrite: bool) -> None:
     """Raise `RecordingError`, before anything moves, if a figure could not be written."""
-    if figure.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise RecordingError(f"{figure}: figures are written as .png, .pdf or .svg")
+    check_ending(figure)
     if figure.is_dir():
         raise RecordingError(f"{figure}: is a folder, the name of a file is wanted")
     if not figure.parent.is_dir():

@@ -1,6 +1,7 @@
 """Propose a mapping of time data for a file: look into it, guess, and write TOML with comments."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,10 @@ def proposed(first: Path, others: Sequence[str], format_: str, units: str) -> Ma
 
 def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | None) -> Proposal:
     arrays = [leaf for contents in found for leaf in contents.arrays]
-    samples = _sample_count(arrays, path)
+    lengths = [max(leaf.values.shape) for leaf in arrays if max(leaf.values.shape) >= _MIN_SAMPLES]
+    if not lengths:
+        raise ImportFailed(f"{path}: holds no array of real numbers with {_MIN_SAMPLES} samples or more")
+    samples = max(set(lengths), key=lambda length: (lengths.count(length), length))  # the commonest, then the largest
     times = [leaf for leaf in arrays if is_time(leaf.name, leaf.values)]
     signals = [leaf for leaf in arrays if samples in leaf.values.shape and leaf not in times]
     if not signals:
@@ -81,14 +85,6 @@ def _proposal(found: Sequence[FileContents], path: Path, layout: CsvLayout | Non
     )
 
 
-def _sample_count(arrays: Sequence[Leaf], path: Path) -> int:
-    lengths = [max(leaf.values.shape) for leaf in arrays]
-    long = [length for length in lengths if length >= _MIN_SAMPLES]
-    if not long:
-        raise ImportFailed(f"{path}: holds no array of real numbers with {_MIN_SAMPLES} samples or more")
-    return int(max(set(long), key=lambda length: (long.count(length), length)))
-
-
 def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
     plain = [leaf for leaf in signals if leaf.values.ndim == min(one.values.ndim for one in signals)]
     reference = next((leaf for leaf in plain if role_of(leaf.name, leaf.unit)[0] == "force"), plain[0])
@@ -104,7 +100,13 @@ def _channels(signals: Sequence[Leaf], samples: int) -> list[ProposedChannel]:
         for index in range(1, count + 1):
             name = leaf.name if count == 1 else f"{leaf.name}{index}"
             found.append(ProposedChannel(leaf, name, role, unit, axes, index))
-    return _with_roles(_with_unique_names(found))
+    names = [channel.name for channel in found]
+    return _with_roles(
+        [
+            channel if names.count(channel.name) == 1 else replace(channel, name=f"{channel.name}_{number}")
+            for number, channel in enumerate(found, 1)
+        ]
+    )
 
 
 def _like(leaf: Leaf, known: dict[str, int], samples: int) -> tuple[str, ...]:
@@ -117,14 +119,6 @@ def _like(leaf: Leaf, known: dict[str, int], samples: int) -> tuple[str, ...]:
         left.pop(name, None)
         names.append(name)
     return tuple(names) if len(set(names)) == len(names) and "sample" in names else dimensions(leaf.values, samples)
-
-
-def _with_unique_names(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:
-    names = [channel.name for channel in channels]
-    return [
-        channel if names.count(channel.name) == 1 else channel.called(f"{channel.name}_{number}")
-        for number, channel in enumerate(channels, 1)
-    ]
 
 
 def _with_roles(channels: Sequence[ProposedChannel]) -> list[ProposedChannel]:

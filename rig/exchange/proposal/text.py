@@ -27,10 +27,6 @@ class ProposedChannel:
     axes: tuple[str, ...]
     index: int
 
-    def called(self, name: str) -> "ProposedChannel":
-        """Return it with another name."""
-        return replace(self, name=name)
-
     def played(self, role: str) -> "ProposedChannel":
         """Return it with another role; a unit that does not suit the role becomes 1."""
         suited = {"force": ("N", "V", "1"), "monitor": None}.get(role, ("m", "m/s", "m/s2", "V", "1"))
@@ -79,7 +75,8 @@ def text_of(
         *_layout(proposal),
         *_periods(proposal),
     ]
-    axes = _common_axes(proposal.channels)
+    # The axes of the channel with the fewest dimensions that has more than one, or of a vector.
+    axes = min((one.axes for one in proposal.channels if len(one.axes) > 1), key=len, default=("sample",))
     lines += [f"# Units: {', '.join(_UNITS)}; monitors may have any other."]
     if axes != ("sample",):
         lines += [
@@ -149,12 +146,6 @@ def _periods(proposal: Proposal) -> Iterator[str]:
     else:
         yield "#lowest_hz =                     # excited band, if known: lowest_hz and highest_hz"
     yield "#stretches = [{ start_samples = 0, samples = 8192, repeat = 10, step_samples = 8692 }]    # parts of long records"
-
-
-def _common_axes(channels: Sequence[ProposedChannel]) -> tuple[str, ...]:
-    """Return the axes of the channel with the fewest dimensions that has more than one, or of a vector."""
-    several = [channel.axes for channel in channels if len(channel.axes) > 1]
-    return min(several, key=len) if several else ("sample",)
 
 
 def _channel(channel: ProposedChannel, axes: tuple[str, ...], *, full_scale: bool) -> Iterator[str]:

@@ -47,17 +47,13 @@ def realisation(
     once = slow.reshape(slow.shape[0], -1)
     ahead = round(transient_periods * size)
     both = np.concatenate([once[:, np.arange(-ahead, 0) % once.shape[1]], once], axis=1)
-    return Experiment(
-        inputs=both[list(signals.inputs)],
-        outputs=both[list(signals.outputs)],
-        sample_rate_hz=rate_hz,
-        input_channels=signals.input_channels,
-        output_channels=signals.output_channels,
+    return signals.experiment(
+        both,
+        rate_hz,
         counted_from=ahead,
         period_samples=size,
         name=name,
         level=point.level,
-        specimen=bench.specimen.name,
         excited_hz=(plan.lowest_hz, plan.highest_hz),
         output_noise=noise,
     )

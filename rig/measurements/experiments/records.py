@@ -1,12 +1,10 @@
 """Records without a whole number of periods as experiments: sweeps and settled points."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from identification import Experiment, decimated
-from identification.experiments import InitialState
 from identification.signals import EDGE_SAMPLES
 from rig.campaigns.evaluation.lost_samples import lost_rows
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
@@ -38,7 +36,8 @@ def segment(
     slow = _slower(signals, values[:, : int(enough)], rate_hz, begins_at_rest=False)[:, :wanted]
     if slow.shape[1] < FEWEST_PERIODS * rate_hz / frequency_hz:
         return None
-    return _experiment(signals, slow, rate_hz, "estimated", name, vibration_of(point).force_n)
+    level = vibration_of(point).force_n
+    return signals.experiment(slow, rate_hz, initial_state="estimated", name=name, level=level)
 
 
 def sweep_pieces(
@@ -68,8 +67,8 @@ def sweep_pieces(
         rest = bool(np.all(first <= AT_REST * np.abs(used).max(axis=1)))
         slow = _slower(signals, signals.without_high_pass(values), rate_hz, begins_at_rest=rest)
         called = name if len(pieces) == 1 else f"{name}, piece {number}"
-        found = _experiment(signals, slow, rate_hz, "zero" if rest else "estimated", called, level)
-        yield replace(found, counted_from=round(max(0, before - piece.start) * rate_hz / fs))
+        state, ahead = "zero" if rest else "estimated", round(max(0, before - piece.start) * rate_hz / fs)
+        yield signals.experiment(slow, rate_hz, initial_state=state, name=called, level=level, counted_from=ahead)
 
 
 def _stretches(rows: np.ndarray) -> list[slice]:
@@ -89,19 +88,3 @@ def _slower(signals: Signals, values: np.ndarray, rate_hz: float, *, begins_at_r
         return values[:, :0]
     slow = decimated(values, fs, rate_hz)
     return slow[:, 0 if begins_at_rest else edge : slow.shape[1] - edge]
-
-
-def _experiment(
-    signals: Signals, values: np.ndarray, rate_hz: float, state: InitialState, name: str, level: float
-) -> Experiment:
-    return Experiment(
-        inputs=values[list(signals.inputs)],
-        outputs=values[list(signals.outputs)],
-        sample_rate_hz=rate_hz,
-        input_channels=signals.input_channels,
-        output_channels=signals.output_channels,
-        initial_state=state,
-        name=name,
-        level=level,
-        specimen=signals.bench.specimen.name,
-    )

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
 
-from identification import Channel
+from identification import Channel, Experiment
 from identification.common import chosen_rows
 from rig.bench import Bench
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
@@ -45,15 +46,17 @@ class Signals:
         """All channels, including the output ``voltage``."""
         return (*channels_of(self.bench), VOLTAGE)
 
-    @property
-    def input_channels(self) -> tuple[Channel, ...]:
-        """Channels that are inputs of a model."""
-        return tuple(self.channels[row] for row in self.inputs)
-
-    @property
-    def output_channels(self) -> tuple[Channel, ...]:
-        """Channels that are outputs of a model."""
-        return tuple(self.channels[row] for row in self.outputs)
+    def experiment(self, values: np.ndarray, rate_hz: float, **facts: Any) -> Experiment:
+        """Return an experiment with ``values``, float[n_channels + 1, n] at a rate in Hz; ``facts``: its other fields."""
+        return Experiment(
+            inputs=values[list(self.inputs)],
+            outputs=values[list(self.outputs)],
+            sample_rate_hz=rate_hz,
+            input_channels=tuple(self.channels[row] for row in self.inputs),
+            output_channels=tuple(self.channels[row] for row in self.outputs),
+            specimen=self.bench.specimen.name,
+            **facts,
+        )
 
     def of(self, rows: np.ndarray) -> np.ndarray:
         """Return recorded rows unchanged as float[n_channels + 1, n]."""
