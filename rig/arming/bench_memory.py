@@ -21,7 +21,7 @@ from rig.system.text_files import read_text
 from rig.system.whole_file import whole_file
 from vibrolock.errors import InputError
 
-LARGEST_BYTES = 1_000_000
+LARGEST_BYTES = 1_000_000  # bytes of a memory file that is read; chosen: a thousand times a usual one
 
 
 @dataclass(frozen=True)

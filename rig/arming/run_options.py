@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from rig.tick.tick import Tick
 
-LARGEST_SEED = 2**63 - 1
+LARGEST_SEED = 2**63 - 1  # the largest whole number of TOML and HDF5
 
 
 class Progress(Protocol):

@@ -6,6 +6,7 @@ caution: a finding of ``rig check``, and a line before a person arms. The bench 
 that old files stay readable.
 """
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rig.errors import ConfigurationError
@@ -47,57 +48,50 @@ def cautions(bench: "Bench") -> tuple[str, ...]:
     return tuple(str(one) for one in objections(bench) if isinstance(one, Caution))
 
 
-def _ranges(bench: "Bench") -> list[ConfigurationError]:
-    out: list[ConfigurationError] = []
+def _ranges(bench: "Bench") -> Iterator[ConfigurationError]:
     for index, channel in enumerate(bench.channels):
         scale = abs(channel.sensitivity_v_per_unit)
         low, high = RANGES[channel.role]
         if channel.range_v > high * scale or channel.range_v < low * scale:
-            out.append(
-                ConfigurationError(
-                    f"with range_v = {channel.range_v:g} channel {channel.name!r} would reach beyond {high:g} {channel.unit}, "
-                    f"or less than {low:g}, which no sensor for role {channel.role!r} does",
-                    field=f"channels[{index}].sensitivity_v_per_unit",
-                    value=channel.sensitivity_v_per_unit,
-                    unit=f"V per {channel.unit}",
-                    allowed=f"{channel.range_v / high:.3g} to {channel.range_v / low:.3g}, of either sign",
-                )
+            yield ConfigurationError(
+                f"with range_v = {channel.range_v:g} channel {channel.name!r} would reach beyond {high:g} {channel.unit}, "
+                f"or less than {low:g}, which no sensor for role {channel.role!r} does",
+                field=f"channels[{index}].sensitivity_v_per_unit",
+                value=channel.sensitivity_v_per_unit,
+                unit=f"V per {channel.unit}",
+                allowed=f"{channel.range_v / high:.3g} to {channel.range_v / low:.3g}, of either sign",
             )
-    return out
 
 
-def _block(bench: "Bench") -> list[ConfigurationError]:
+def _block(bench: "Bench") -> Iterator[ConfigurationError]:
     """Check the block length: limits are not checked within a block. A block of one sample is always accepted."""
     block_s = bench.block / bench.sample_rate_hz
     if bench.block == 1:
-        return []
+        return
     if block_s > LONGEST_BLOCK_S:
         most = max(1, int(LONGEST_BLOCK_S * bench.sample_rate_hz))
         why = f"lasts {block_s:.3g} s at {bench.sample_rate_hz:g} samples/s, and so late a limit acts"
         allowed = f"1 to {most} ({LONGEST_BLOCK_S:g} s)"
-        return [ConfigurationError(why, field="block", value=bench.block, allowed=allowed)]
-    if block_s > bench.limits.lost_s:
+        yield ConfigurationError(why, field="block", value=bench.block, allowed=allowed)
+    elif block_s > bench.limits.lost_s:
         most = max(1, int(bench.limits.lost_s * bench.sample_rate_hz))
         why = f"lasts {block_s:.3g} s, and so late a limit acts; one lost block is beyond limits.lost_s and trips"
         allowed = f"1 to {most} with limits.lost_s = {bench.limits.lost_s:g}"
-        return [Caution(why, field="block", value=bench.block, allowed=allowed)]
-    return []
+        yield Caution(why, field="block", value=bench.block, allowed=allowed)
 
 
-def _ramp(bench: "Bench") -> list[ConfigurationError]:
+def _ramp(bench: "Bench") -> Iterator[ConfigurationError]:
     """Check the ramp-down time: a ramp shorter than a period of the vibration excites the specimen like a step."""
     least_s = 1.0 / bench.specimen.linear_frequency_hz
     ramp_s = bench.limits.ramp_down_s
-    if ramp_s >= least_s:
-        return []
-    why = "shorter than a period of the specimen, such a ramp is a step, which excites it"
-    allowed = f"from {least_s:.3g} s, 1/specimen.linear_frequency_hz, to 60 s"
-    return [ConfigurationError(why, field="limits.ramp_down_s", value=ramp_s, unit="s", allowed=allowed)]
+    if ramp_s < least_s:
+        why = "shorter than a period of the specimen, such a ramp is a step, which excites it"
+        allowed = f"from {least_s:.3g} s, 1/specimen.linear_frequency_hz, to 60 s"
+        yield ConfigurationError(why, field="limits.ramp_down_s", value=ramp_s, unit="s", allowed=allowed)
 
 
-def _drops(bench: "Bench") -> list[ConfigurationError]:
+def _drops(bench: "Bench") -> Iterator[ConfigurationError]:
     """Check the limits: the multiple at which the output drops to 0 V should be within the range of the channels."""
-    out: list[ConfigurationError] = []
     for field, roles in (("force_n", ("force",)), ("acceleration_m_s2", ("drive", "response"))):
         narrowest: Channel = min((c for c in bench.channels if c.role in roles), key=lambda c: c.range_in_unit)
         shown = bench.limits.overload_fraction * narrowest.range_in_unit
@@ -109,5 +103,4 @@ def _drops(bench: "Bench") -> list[ConfigurationError]:
             f"{narrowest.name!r} shows up to {shown:.4g} {narrowest.unit} (overload_fraction of its range)"
         )
         allowed = f"up to {shown / OVERTRAVEL_FACTOR:.3g} {narrowest.unit} for a drop that can be seen"
-        out.append(Caution(why, field=f"limits.{field}", value=limit, unit=narrowest.unit, allowed=allowed))
-    return out
+        yield Caution(why, field=f"limits.{field}", value=limit, unit=narrowest.unit, allowed=allowed)

@@ -31,7 +31,7 @@ from rig.wire.messages import (
     Stream,
 )
 
-BEAT_S = 1.0 / HEARTBEATS_HZ
+BEAT_S = 1.0 / HEARTBEATS_HZ  # between two heartbeats
 COUNTED = {DeviceFlag.OUTPUT_HELD: "held_blocks", DeviceFlag.OUTPUT_CONTINUED: "continued_blocks"}
 
 

@@ -6,7 +6,7 @@ from rig.bench import Bench
 from rig.daq import DAQ, LOST, State
 
 PART = 0.02  # of the largest voltage
-SECONDS = 0.5
+SECONDS = 0.5  # of a run; chosen
 
 
 def _driven(daq: DAQ, bench: Bench, amplitude_v: float) -> np.ndarray:

@@ -19,7 +19,7 @@ from vibrolock.described import Described
 
 OUTPUT_HELD = 1 << len(Flag)
 """Bit of the device's flags behind those of the rig, as wired devices have it."""
-OUTPUT_CONTINUED = OUTPUT_HELD << 1
+OUTPUT_CONTINUED = OUTPUT_HELD << 1  # the next bit
 FAULT_FLAGS = (HELD, CONTINUED)
 """Names of the bits behind those of the rig."""
 LONGEST_PERIOD = 16384

@@ -30,11 +30,10 @@ HIGHER = 1.05  # a largest rate that is not more than this many times the bench'
 def examine_device(bench: Bench, seed: int, seconds: float = MEASURED_S) -> DeviceReport:
     """Exchange 0 V with a bench's device for some seconds; return the timing and a ``recommendation`` with its reasons.
 
-    For ``seconds`` the device has the longest queue and watchdog, so that lateness is measured and nothing latches. Then the
-    settings that `rig.loop.recommendation` gives are tried, with a longer queue or block if they do not hold; then a higher
-    sample rate if device and wire have one; last the settings of the bench, unless its watchdog would end that. The report is
-    that of `rig.loop.worker.probe.round_trips` with the bench's settings, where they were tried. Nothing is driven, and nothing
-    that has latched is cleared: an examination that has made the watchdog latch ends there.
+    For ``seconds`` the device has the longest queue and watchdog, so that nothing latches. Then the settings that
+    `rig.loop.recommendation` gives are tried, with a longer queue or block if they do not hold; then a higher sample rate; last
+    the settings of the bench, unless its watchdog would end that: the report is with these, where they were tried. Nothing is
+    driven, and nothing that has latched is cleared: an examination that has made the watchdog latch ends there.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """

@@ -38,12 +38,10 @@ def suspended_s() -> float:
 class WallClockLoop(DrivenLoop):
     """Runs a tick over a started driver, and hands its rows to another process chunk by chunk.
 
-    ``tick`` must have its state in ``state`` (`rig.loop.worker.memory.packed`). ``asked`` returns a sentence on who has asked
-    the process itself to end, or an empty text.
-
-    Every request to end the loop (by the campaign, a signal, a full ring, a campaign process that is gone, a suspended
-    computer) starts the tick's ramp to 0 V. ``cause`` says who requested it, unless it was the campaign. ``failure`` is the
-    driver's error. ``disturbances`` counts events that may have delayed the loop.
+    ``tick`` has its state in ``state`` (`rig.loop.worker.memory.packed`). ``asked`` returns who has asked the process to end.
+    Every request to end (by the campaign, a signal, a full ring, a campaign process that is gone, a suspended computer) starts
+    the tick's ramp to 0 V; ``cause`` says who requested it, unless it was the campaign. ``disturbances`` counts events that
+    may have delayed the loop.
     """
 
     def __init__(

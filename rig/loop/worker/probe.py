@@ -127,8 +127,8 @@ def probe(rate_hz: float, seconds: float, privileged: bool) -> WakeUps:
 def round_trips(bench: Bench, seed: int, seconds: float) -> DeviceReport:
     """Open a bench's device, exchange blocks of 0 V with it for some seconds, and return the timing.
 
-    A device that is armed by its driver is armed, at 0 V, so that it tells
-    which outputs it has held. No blocks are exchanged with a device that has something ``latched``.
+    A device that its driver arms is armed, at 0 V, so that it tells which outputs it has held. One that has something
+    ``latched`` is left alone.
 
     Raises `rig.errors.DaqError` or `rig.errors.ConfigurationError`.
     """

@@ -62,11 +62,9 @@ def settle_queue(
     """Set the queue of an open device that does not run; return the choice, None for a driver without a queue to set.
 
     If it has to be measured, 0 V is exchanged for some ``seconds`` with the longest queue and watchdog, so that nothing
-    latches; the watchdog is that of the bench again afterwards. ``feedback``: whether the plan's outputs answer what is
-    measured; then ``delay_s`` is the longest delay from output to input that its gains bear. ``asked`` returns why the
-    measurement is to end early, or an empty text.
-
-    Raises `rig.errors.DaqError`, also for what was ``asked``.
+    latches. ``feedback``: whether the plan's outputs answer what is measured; then ``delay_s`` is the longest delay from output
+    to input that its gains bear. ``asked`` returns why the measurement is to end early. Raises `rig.errors.DaqError`, also for
+    that.
     """
     allowed = daq.adjustable
     if allowed is None:

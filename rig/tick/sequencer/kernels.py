@@ -231,6 +231,35 @@ def is_refused_for_faults(
 
 
 @kernel
+def step_ramp(
+    progress: Record,
+    segments: np.ndarray,
+    outcomes: np.ndarray,
+    settling: Record,
+    lock: Record,
+    guard: Record,
+    elapsed: float,
+) -> None:
+    """Set level, lag and frequency of a ramp that has taken ``elapsed`` periods; move on at its end, or give up."""
+    segment = segments[progress.segment]
+    done = min((elapsed - progress.frozen_cycles - progress.waited_cycles) / segment.periods, 1.0)
+    rise = 0.5 * (1.0 - math.cos(math.pi * done))
+    progress.level = ramped(progress.start_level, segment.level, rise, segment.geometric == 1)
+    progress.lag = between(progress.start_lag, segment.lag_rad, rise)
+    progress.omega = between(progress.start_omega, segment.omega, rise)
+    if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
+        if lock.state == LOCKED and segment.kind == SegmentKind.LEVEL_SWEEP:
+            progress.kept_level = segment.level
+        close_segment(progress, outcomes, settling, Outcome.DONE)
+    elif is_held_by_window(progress, segment, settling):
+        give_up(progress, segments, outcomes, settling, lock, guard, Outcome.OUTSIDE_WINDOW)
+    elif progress.frozen_cycles >= SATURATED_PERIODS:
+        give_up(progress, segments, outcomes, settling, lock, guard, Outcome.UNREACHABLE)
+    elif progress.waited_cycles >= LONGEST_WAIT:
+        give_up(progress, segments, outcomes, settling, lock, guard, Outcome.LOST_LOCK)
+
+
+@kernel
 def advance(
     progress: Record,
     segments: np.ndarray,
@@ -275,21 +304,7 @@ def advance(
         progress.waited_cycles += passed
     elapsed, samples = cycle - progress.start_cycle, progress.sample - progress.start_sample
     if is_ramp(segment.kind):
-        done = min((elapsed - progress.frozen_cycles - progress.waited_cycles) / segment.periods, 1.0)
-        rise = 0.5 * (1.0 - math.cos(math.pi * done))
-        progress.level = ramped(progress.start_level, segment.level, rise, segment.geometric == 1)
-        progress.lag = between(progress.start_lag, segment.lag_rad, rise)
-        progress.omega = between(progress.start_omega, segment.omega, rise)
-        if done >= 1.0 and has_arrived(segment, progress.start_level, guard.amplitude_v):
-            if lock.state == LOCKED and segment.kind == SegmentKind.LEVEL_SWEEP:
-                progress.kept_level = segment.level
-            close_segment(progress, outcomes, settling, Outcome.DONE)
-        elif is_held_by_window(progress, segment, settling):
-            give_up(progress, segments, outcomes, settling, lock, guard, Outcome.OUTSIDE_WINDOW)
-        elif progress.frozen_cycles >= SATURATED_PERIODS:
-            give_up(progress, segments, outcomes, settling, lock, guard, Outcome.UNREACHABLE)
-        elif progress.waited_cycles >= LONGEST_WAIT:
-            give_up(progress, segments, outcomes, settling, lock, guard, Outcome.LOST_LOCK)
+        step_ramp(progress, segments, outcomes, settling, lock, guard, elapsed)
         return
     progress.level = segment.level
     if segment.kind == SegmentKind.SWEEP:

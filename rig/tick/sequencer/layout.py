@@ -5,8 +5,6 @@ A plan compiles to a table of segments. Durations are in periods of the oscillat
 
 from enum import IntEnum
 
-import numpy as np
-
 from controller.harmonics import ORDERS
 from vibrolock.arrays import record
 
@@ -96,23 +94,10 @@ OUTCOME = record(
 )
 """Result of each segment: samples [first, end), periods used, last averaged phase error, last relative amplitude drift, number
 of samples with a held output, with a continued one, and of lost ones. ``distortion``: last error of the controlled harmonics
-over its tolerance;
-``left_alone``: bit h for each harmonic h that the harmonics loop leaves alone."""
+over its tolerance; ``left_alone``: bit h for each harmonic h that the harmonics loop leaves alone."""
 
-REFUSED = np.dtype(
-    [
-        ("segment", "i8"),
-        ("outcome", "i8"),
-        ("first_sample", "i8"),
-        ("end_sample", "i8"),
-        ("periods", "f8"),
-        ("mean_error_rad", "f8"),
-        ("drift", "f8"),
-        ("held", "i8"),
-        ("continued", "i8"),
-        ("lost", "i8"),
-        ("force_n", "f8"),
-    ]
+REFUSED = record(
+    i8="segment outcome first_sample end_sample held continued lost", f8="periods mean_error_rad drift force_n"
 )
 """A record that was refused and is measured again: what `OUTCOME` says of it, and the force's fundamental, N."""
 

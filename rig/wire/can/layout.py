@@ -1,4 +1,4 @@
-"""Layouts of CAN messages as numpy dtypes and formats of `struct`, compiled from DBC files."""
+"""Layouts of CAN messages as formats of `struct` and in canonical lines, compiled from DBC files."""
 
 import zlib
 from dataclasses import dataclass
@@ -28,35 +28,28 @@ class CompiledMessage:
     length: int
     """Bytes."""
     fd: bool
-    dtype: np.dtype[np.void]
-    """A field for every signal, in the order of their first bytes; itemsize is the length."""
+    placed: tuple[tuple[str, np.dtype[np.number], int], ...]
+    """Name, type and first byte of every signal, in the order of their first bytes."""
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
-        """Names of the signals, in the order of the fields."""
-        return tuple(self.dtype.names or ())
+        """Names of the signals, in the order of their first bytes."""
+        return tuple(name for name, _, _ in self.placed)
 
     @cached_property
     def format(self) -> str:
         """The same layout for `struct`, where all signals are little-endian; faster than a dtype for a handful of signals."""
         out, end = "<", 0
-        for name in self.signals:
-            kind, at = self._field(name)
+        for _, kind, at in self.placed:
             out += f"{at - end}x" * (at > end) + STRUCT_CODES[kind.str[1:]]
             end = at + kind.itemsize
         return out + f"{self.length - end}x" * (self.length > end)
 
-    def _field(self, name: str) -> tuple[np.dtype[np.number], int]:
-        fields = self.dtype.fields
-        assert fields is not None
-        return fields[name][0], fields[name][1]
-
     @cached_property
     def canonical(self) -> str:
         """The layout in one line that depends on nothing else: no comments, units, scales or order of the file."""
-        placed = ((name, *self._field(name)) for name in self.signals)
         fields = " ".join(
-            f"{name}:{'big-endian ' * (kind.byteorder == '>')}{kind.name}@{at}" for name, kind, at in placed
+            f"{name}:{'big-endian ' * (kind.byteorder == '>')}{kind.name}@{at}" for name, kind, at in self.placed
         )
         return f"{self.frame_id:03X} {self.name} {self.length} {'fd' if self.fd else 'classical'} {fields}"
 
@@ -107,16 +100,9 @@ def _compiled(message: "Message", source: str) -> CompiledMessage:
     where = f"{source}: message {message.name}"
     ConfigurationError.raise_if(message.is_multiplexed(), f"{where}: is multiplexed, which cannot be compiled")
     ConfigurationError.raise_if(message.is_extended_frame, "has an identifier of 29 bits", where=where, allowed="11")
-    placed = sorted(((_first_byte(signal, where), signal) for signal in message.signals), key=lambda pair: pair[0])
-    dtype = np.dtype(
-        {
-            "names": [signal.name for _, signal in placed],
-            "formats": [_format(signal, where) for _, signal in placed],
-            "offsets": [first for first, _ in placed],
-            "itemsize": message.length,
-        }
-    )
-    return CompiledMessage(message.name, message.frame_id, message.length, bool(message.is_fd), dtype)
+    placed = [(signal.name, _type(signal, where), _first_byte(signal, where)) for signal in message.signals]
+    ordered = tuple(sorted(placed, key=lambda one: one[2]))
+    return CompiledMessage(message.name, message.frame_id, message.length, bool(message.is_fd), ordered)
 
 
 def _first_byte(signal: "Signal", where: str) -> int:
@@ -129,10 +115,10 @@ def _first_byte(signal: "Signal", where: str) -> int:
     return int(signal.start) // 8
 
 
-def _format(signal: "Signal", where: str) -> str:
+def _type(signal: "Signal", where: str) -> np.dtype[np.number]:
     n_bytes, rest = divmod(signal.length, 8)
     kind = "f" if signal.is_float else "i" if signal.is_signed else "u"
     if rest or f"{kind}{n_bytes}" not in STRUCT_CODES:
         allowed = "32 or 64" if signal.is_float else "8, 16, 32 or 64"
         raise ConfigurationError(f"{where}, signal {signal.name}: has {signal.length} bits, allowed is {allowed}")
-    return f"{'<' if signal.byte_order == 'little_endian' else '>'}{kind}{n_bytes}"
+    return np.dtype(f"{'<' if signal.byte_order == 'little_endian' else '>'}{kind}{n_bytes}")

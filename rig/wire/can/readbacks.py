@@ -9,7 +9,7 @@ COUNT = np.dtype("<i2")
 INDEX_SIZE = 2  # bytes
 INDICES = 1 << 16  # a frame has 16 bits for the index of a count
 COUNTS_A_FRAME = {True: 31, False: 3}
-CLASSICAL_SIZE = INDEX_SIZE + 2 * COUNTS_A_FRAME[False]
+CLASSICAL_SIZE = INDEX_SIZE + 2 * COUNTS_A_FRAME[False]  # bytes of every classical frame
 
 
 class Readbacks:

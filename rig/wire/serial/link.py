@@ -51,8 +51,7 @@ class SerialLink(Link):
     A write that the line does not take within ``write_timeout_s`` raises `DaqTimeout`; what has been begun of a frame is
     finished first, so that the other end sees whole frames. Not to be used from two threads at a time.
 
-    All that there is, is read at a time, and may be many frames. On Linux and macOS; Windows gives no descriptors, and `open`
-    says so.
+    A read may bring many frames. On Linux and macOS; Windows gives no descriptors, and `open` says so.
     """
 
     def __init__(
