@@ -57,14 +57,8 @@ def command_entries(group: Any) -> Iterator[Entry]:
     for command in commands_of(group):
         line = " ".join(command.text.partition("\n\n")[0].split())
         short = command.name.removeprefix("rig ")
-        yield Entry(
-            "command",
-            command.name,
-            (command.name, short),
-            line,
-            f"command-{command.anchor}",
-            command.usage,
-        )
+        known, address = (command.name, short), f"command-{command.anchor}"
+        yield Entry("command", command.name, known, line, address, command.usage)
         for names, text in command.options:
             for option in option_names(names):
                 full = f"{command.name} {option}"

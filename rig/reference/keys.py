@@ -10,7 +10,9 @@ from typing import Any, get_args
 
 from pydantic import AliasChoices, BaseModel
 
+from rig.campaigns.kinds import KINDS
 from rig.reference.entry import Entry
+from vibrolock.on_use import Registry
 
 Schema = dict[str, Any]
 
@@ -40,108 +42,63 @@ class Key:
         return f"key-{self.table}-{self.name}"
 
 
+MODELS = {
+    "drift-limits": "rig.campaigns.dwell.plan:DriftLimits",
+    "controller": "controller:PhaseLockedLoop",
+    "open-loop": "controller:OpenLoop",
+    "lock": "controller:LockRule",
+    "harmonics": "controller.harmonics:HarmonicsSettings",
+    "settle": "rig.tick.sequencer.segments:SettleRule",
+    "plant": "rig.campaigns.planning.plant:PlantFacts",
+    "hypotheses": "rig.rehearsal.hypotheses:Hypotheses",
+    "bench": "rig.bench:Bench",
+    "driver": "rig.bench:DriverChoice",
+    "specimen": "rig.bench:SpecimenFacts",
+    "limits": "rig.bench:Limits",
+    "arming": "rig.bench:Arming",
+    "emergency_stop": "rig.bench:EmergencyStop",
+    "channels": "rig.daq:Channel",
+    "virtual": "rig.drivers.virtual.driver:Queue",
+    "serial": "rig.drivers.serial:SerialOptions",
+    "can": "rig.drivers.can:CanOptions",
+    "faults": "rig.drivers.virtual.faults:PassingFaults",
+    "virtual-rig": "simulators:VirtualRig",
+    "beam": "simulators.parts:BeamStructure",
+    "lap-jointed-beam": "simulators.parts:LapJointedBeam",
+    "lumped-mass": "simulators.parts:LumpedMass",
+    "support": "simulators.parts:Support",
+    "modal": "simulators.parts:ModalStructure",
+    "magnet": "simulators.parts:Magnet",
+    "cubic": "simulators.parts:Cubic",
+    "clearance": "simulators.parts:Clearance",
+    "force-table": "simulators.parts:ForceTable",
+    "damping-table": "simulators.parts:DampingTable",
+    "user": "simulators.parts:User",
+    "jenkins": "simulators.parts:JenkinsSite",
+    "iwan": "simulators.parts:IwanSite",
+    "exciter": "simulators.parts:Exciter",
+    "stinger": "simulators.parts:Stinger",
+    "sensor": "simulators.parts:Sensor",
+    "converter": "simulators.parts:Converter",
+    "scatter": "simulators.parts:Scatter",
+    "deviation": "simulators.parts:Deviation",
+    "wear": "simulators.parts:Wear",
+    "time-data": "identification:TimeDataMapping",
+    "sampled-channel": "identification.mapping:SampledChannel",
+    "stretch": "identification.mapping:Stretch",
+    "csv": "identification.mapping:CsvLayout",
+}
+"""Models of the tables beside those of the plans, by the name under which the reference has them."""
+
+
 @cache
 def tables() -> dict[str, type[BaseModel]]:
     """Return the model of every table by the name under which the reference has it."""
-    from controller import LockRule, OpenLoop, PhaseLockedLoop
-    from controller.harmonics import HarmonicsSettings
-    from identification import TimeDataMapping
-    from identification.mapping import CsvLayout, SampledChannel, Stretch
-    from rig.bench import Arming, Bench, DriverChoice, EmergencyStop, Limits, SpecimenFacts
-    from rig.campaigns.dwell.plan import DriftLimits
-    from rig.campaigns.kinds import KINDS
-    from rig.campaigns.planning.plant import PlantFacts
-    from rig.daq import Channel
-    from rig.drivers.can import CanOptions
-    from rig.drivers.serial import SerialOptions
-    from rig.drivers.virtual.driver import Queue
-    from rig.drivers.virtual.faults import PassingFaults
-    from rig.rehearsal.hypotheses import Hypotheses
-    from rig.tick.sequencer.segments import SettleRule
-
-    return {
-        **{kind: campaign.plan for kind, campaign in KINDS.items()},
-        "drift-limits": DriftLimits,
-        "controller": PhaseLockedLoop,
-        "open-loop": OpenLoop,
-        "lock": LockRule,
-        "harmonics": HarmonicsSettings,
-        "settle": SettleRule,
-        "plant": PlantFacts,
-        "hypotheses": Hypotheses,
-        "bench": Bench,
-        "driver": DriverChoice,
-        "specimen": SpecimenFacts,
-        "limits": Limits,
-        "arming": Arming,
-        "emergency_stop": EmergencyStop,
-        "channels": Channel,
-        "virtual": Queue,
-        "serial": SerialOptions,
-        "can": CanOptions,
-        "faults": PassingFaults,
-        **_parts_of_a_virtual_rig(),
-        "time-data": TimeDataMapping,
-        "sampled-channel": SampledChannel,
-        "stretch": Stretch,
-        "csv": CsvLayout,
-    }
-
-
-def _parts_of_a_virtual_rig() -> dict[str, type[BaseModel]]:
-    from simulators import VirtualRig
-    from simulators.parts import (
-        BeamStructure,
-        Clearance,
-        Converter,
-        Cubic,
-        DampingTable,
-        Deviation,
-        Exciter,
-        ForceTable,
-        IwanSite,
-        JenkinsSite,
-        LapJointedBeam,
-        LumpedMass,
-        Magnet,
-        ModalStructure,
-        Scatter,
-        Sensor,
-        Stinger,
-        Support,
-        User,
-        Wear,
-    )
-
-    return {
-        "virtual-rig": VirtualRig,
-        "beam": BeamStructure,
-        "lap-jointed-beam": LapJointedBeam,
-        "lumped-mass": LumpedMass,
-        "support": Support,
-        "modal": ModalStructure,
-        "magnet": Magnet,
-        "cubic": Cubic,
-        "clearance": Clearance,
-        "force-table": ForceTable,
-        "damping-table": DampingTable,
-        "user": User,
-        "jenkins": JenkinsSite,
-        "iwan": IwanSite,
-        "exciter": Exciter,
-        "stinger": Stinger,
-        "sensor": Sensor,
-        "converter": Converter,
-        "scatter": Scatter,
-        "deviation": Deviation,
-        "wear": Wear,
-    }
+    return {**{kind: campaign.plan for kind, campaign in KINDS.items()}, **Registry[type[BaseModel]](MODELS)}
 
 
 def roots() -> tuple[type[BaseModel], ...]:
     """Return the models of what stands in files: plans, benches, options of drivers, virtual rigs, hypotheses, mappings."""
-    from rig.campaigns.kinds import KINDS
-
     others = ("bench", "virtual", "serial", "can", "virtual-rig", "hypotheses", "time-data")
     return (*(campaign.plan for campaign in KINDS.values()), *(tables()[name] for name in others))
 
@@ -165,7 +122,7 @@ def keys_of(table: str) -> tuple[Key, ...]:
             name=name,
             default="required" if name in required else _default(field.get("default")),
             allowed=_allowed(field),
-            meaning=_in_one_line(field.get("description", "")),
+            meaning=" ".join(field.get("description", "").split()).replace("``", "`"),
             holds=_tables_in(model.model_fields[name].annotation),
         )
         for name, field in sorted(schema["properties"].items(), key=lambda item: item[0] != "kind")
@@ -179,10 +136,6 @@ def _tables_in(kind: object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for one in get_args(kind) for name in _tables_in(one)))
 
 
-def _in_one_line(text: str) -> str:
-    return " ".join(text.split()).replace("``", "`")
-
-
 def _default(value: object) -> str:
     """Return a default as TOML has it; empty for what is absent or a table of its own."""
     if value is None or isinstance(value, dict) or value in ("", []):
@@ -193,9 +146,10 @@ def _default(value: object) -> str:
 
 
 def _allowed(field: Schema) -> str:
-    """Return range, choices or type of a value."""
     options = [option for option in field.get("anyOf", [field]) if option.get("type") != "null"]
-    field = _merged(field, options[0]) if options else field
+    if options:  # of items both may say something
+        items = {**options[0].get("items", {}), **field.get("items", {})}
+        field = {**field, **options[0], **({"items": items} if items else {})}
     if "const" in field:
         return f"`{field['const']}`"
     if "enum" in field:
@@ -205,12 +159,6 @@ def _allowed(field: Schema) -> str:
     if "$ref" in field or "oneOf" in field:
         return "table"
     return _bounds(field) or WORDS.get(field.get("type", "string"), "")
-
-
-def _merged(field: Schema, option: Schema) -> Schema:
-    """Return a field with what its only possible type says; of items both may say something."""
-    items = {**option.get("items", {}), **field.get("items", {})}
-    return {**field, **option, **({"items": items} if items else {})}
 
 
 def _list(field: Schema) -> str:
@@ -241,20 +189,13 @@ def key_entries() -> Iterator[Entry]:
         line = " ".join(str(model.__doc__).partition("\n\n")[0].split()).replace("``", "`")
         yield Entry("table", name, tuple(dict.fromkeys((name, name.replace("-", "_")))), line, f"keys-{name}")
         for key in keys_of(name):
-            full = f"{name}.{key.name}"
-            words = (full,) if key.name in key.holds else (key.name, full, *_other_names(model, key.name))
-            facts = ", ".join(text for text in (_said(key.default), f"allowed: {key.allowed}") if text)
+            full, alias = f"{name}.{key.name}", model.model_fields[key.name].validation_alias
+            others = alias.choices if isinstance(alias, AliasChoices) else ()
+            other_names = [str(one) for one in others if one != key.name]
+            words = (full,) if key.name in key.holds else (key.name, full, *other_names)
+            default = f"default {key.default}" if key.default.startswith("`") else key.default
+            facts = ", ".join(text for text in (default, f"allowed: {key.allowed}") if text)
             yield Entry("key", full, words, key.meaning, key.anchor, facts)
-
-
-def _other_names(model: type[BaseModel], name: str) -> list[str]:
-    """Return further names that a key may have in a file."""
-    choices = model.model_fields[name].validation_alias
-    return [str(one) for one in choices.choices if one != name] if isinstance(choices, AliasChoices) else []
-
-
-def _said(default: str) -> str:
-    return f"default {default}" if default.startswith("`") else default
 
 
 def _number(value: float) -> str:

@@ -88,7 +88,11 @@ class Chosen:
     @property
     def sensitivity_peak(self) -> float:
         """Largest max |S| of all loops at all dampings."""
-        return max(_peak(design) for design in (self.design, *self.others))
+        designs = (self.design, *self.others)
+        if not all(design.stable for design in designs):
+            return math.inf
+        both = (found for design in designs for found in (design.frequency_margins, design.amplitude_margins))
+        return max(1.0, *(found.sensitivity_peak for found in both if found is not None))
 
 
 def choose(
@@ -180,15 +184,11 @@ def _damped(plant: PlantModel) -> list[PlantModel]:
 
 
 def _suits(loop: ControlLoop, plant: PlantModel, responses: FrequencyResponseMatrix) -> bool:
-    """Whether a loop keeps all bounds: of the sensitivity, of its gain at other modes, and of its quickness."""
     if _beyond(loop, responses)[0] > MAX_GAIN_OUTSIDE or max(gains_at_half(loop).values()) > LARGEST_AT_HALF:
         return False
     bounds = (MAX_SENSITIVITY, *(OTHER_SENSITIVITY for _ in DAMPINGS[1:]))
-    if any(
-        _quick_peak(replace(loop, plant=other)) > bound for other, bound in zip(_damped(plant), bounds, strict=True)
-    ):
-        return False
-    return assess(loop).suited
+    peaks = (_quick_peak(replace(loop, plant=other)) for other in _damped(plant))
+    return all(peak <= bound for peak, bound in zip(peaks, bounds, strict=True)) and assess(loop).suited
 
 
 def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, tried: int) -> TuningError:
@@ -209,7 +209,7 @@ def _unsuited(plant: PlantModel, responses: FrequencyResponseMatrix, w: float, t
 
 
 def _phase(plant: PlantModel, w: float, noise: str) -> Chosen:
-    plants = [plant.at(damping_ratio=plant.damping_ratio * part) for part in DAMPINGS]
+    plants = _damped(plant)
     design = design_phase_law(plants, w, sensitivity_peak=MAX_PHASE_SENSITIVITY)
     if not design.suited:
         raise TuningError(f"this rig is unsuited to a phase-locked loop: {'; '.join(design.reasons)}")
@@ -249,13 +249,6 @@ def _quick_peak(loop: ControlLoop) -> float:
     both = np.concatenate([-omega[::-1], omega])
     frequency = margins(omega, loop.frequency_loop_gain(1j * omega)).sensitivity_peak
     return max(frequency, margins(both, loop.amplitude_loop_gain(1j * both)).sensitivity_peak)
-
-
-def _peak(design: Design) -> float:
-    if not design.stable:
-        return math.inf
-    amplitude = design.amplitude_margins.sensitivity_peak if design.amplitude_margins is not None else 1.0
-    return max(design.frequency_margins.sensitivity_peak, amplitude)
 
 
 def _beyond(loop: ControlLoop, responses: FrequencyResponseMatrix) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller.tuning import Design, Margins
+from controller.tuning import Design
 from rig.drawing.page import check_ending, grid, page_for
 from rig.drawing.style import MAIN, REJECTED, SECOND, say_why_empty, title, unit_text
 from rig.errors import RecordingError
@@ -45,8 +45,7 @@ def draw_on(page: "Figure", tuning: "Tuning") -> None:
     axes = grid(page, 2, 3, down_columns=True)
     _draw_plant(axes[0, 0], axes[1, 0], tuning)
     _draw_bode(axes[0, 1], axes[1, 1], designs[0])
-    _draw_lag(axes[0, 2], designs)
-    _draw_level(axes[1, 2], designs)
+    _draw_steps(axes[0, 2], axes[1, 2], designs)
     law = designs[0].loop
     title(
         page,
@@ -60,17 +59,14 @@ def _draw_plant(size: "Axes", phase: "Axes", tuning: "Tuning") -> None:
     """Draw force and drive acceleration per volt, measured and fitted, and the coherence above the phase."""
     measured, plant = tuning.test.responses, tuning.plant
     fine = np.linspace(*plant.band_hz, 4000)
-    s = 2j * np.pi * fine
     seen = phase.inset_axes((0.0, 1.12, 1.0, 0.25), sharex=phase)
-    models = (plant.force_per_v(s), plant.acceleration_per_v(s))
+    models = (plant.force_per_v(2j * np.pi * fine), plant.acceleration_per_v(2j * np.pi * fine))
     for row, (colour, model) in enumerate(zip((MAIN, SECOND), models, strict=True)):
         value, channel = measured.value[:, row, 0], measured.outputs[row]
         label = f"{channel.name}, {unit_text(f'{channel.unit}/V')}"
-        size.semilogy(measured.frequency_hz, np.abs(value), color=colour, ls="none", marker=".", mew=0.0, alpha=0.4)
+        for axis, values in ((size, np.abs(value)), (phase, np.degrees(np.angle(value)))):
+            axis.plot(measured.frequency_hz, values, color=colour, ls="none", marker=".", mew=0.0, alpha=0.4)
         size.semilogy(fine, np.abs(model), color=colour, label=label)
-        phase.plot(
-            measured.frequency_hz, np.degrees(np.angle(value)), color=colour, ls="none", marker=".", mew=0.0, alpha=0.4
-        )
         phase.plot(fine, _unbroken(np.degrees(np.angle(model))), color=colour)
         noise = measured.noise_std[:, row, 0]
         seen.plot(measured.frequency_hz, 1.0 / (1.0 + (noise / np.abs(value)) ** 2), color=colour, lw=0.9)
@@ -99,7 +95,8 @@ def _draw_bode(size: "Axes", phase: "Axes", design: Design) -> None:
         loops += [(above, design.amplitude_margins, SECOND, "-", "level loop")]
         loops += [(np.conj(below), design.amplitude_margins, SECOND, "--", "")]
     for gain, found, colour, line, name in loops:
-        label = f"{name}: {_margin_text(found)}" if name else None
+        margin = f"{20.0 * math.log10(found.gain_margin):.0f} dB" if math.isfinite(found.gain_margin) else "any gain"
+        label = f"{name}: {margin}, {found.phase_margin_deg:.0f} deg" if name else None
         size.loglog(f, np.abs(gain), line, color=colour, label=label)
         phase.semilogx(f, _unbroken(np.degrees(np.angle(gain))), line, color=colour)
         if name and found.crossover_rad_s > 0.0:
@@ -115,69 +112,31 @@ def _draw_bode(size: "Axes", phase: "Axes", design: Design) -> None:
     _legend_above(size, title="margins")
 
 
-def _margin_text(found: Margins) -> str:
-    """Return gain and phase margin in the words of a data sheet."""
-    gain = f"{20.0 * math.log10(found.gain_margin):.0f} dB" if math.isfinite(found.gain_margin) else "any gain"
-    return f"{gain}, {found.phase_margin_deg:.0f} deg"
-
-
-def _draw_lag(axis: "Axes", designs: tuple[Design, ...]) -> None:
-    """Draw the phase error after a shift of the resonance, and after a higher level."""
-    stable = [design for design in designs if design.steps is not None]
+def _draw_steps(lag: "Axes", level: "Axes", designs: tuple[Design, ...]) -> None:
+    """Draw phase error and level after steps, one line style per damping, up to twice the longest settling time."""
+    stable = [(design, design.steps) for design in designs if design.steps is not None]
     if not stable:
-        say_why_empty(axis, "the closed loop is unstable")
+        for axis in (lag, level):
+            say_why_empty(axis, "the closed loop is unstable")
         return
-    for design, line in _with_lines(stable):
-        assert design.steps is not None
-        periods = _periods(design)
-        first = line == "-"
-        after = "half a bandwidth shift" if first else None
-        axis.plot(periods, np.degrees(design.steps.lag_after_frequency_rad), ls=line, color=MAIN, label=after)
-        after = f"level +{100.0 * _STEP:.0f} %" if first else None
-        axis.plot(periods, np.degrees(_STEP * design.steps.lag_after_level_rad), ls=line, color=SECOND, label=after)
-    axis.set(xlabel="periods of vibration", ylabel="phase error, deg", xlim=(0.0, _until(stable)))
-    _legend_above(axis, title="phase error after")
-
-
-def _draw_level(axis: "Axes", designs: tuple[Design, ...]) -> None:
-    """Draw the level after a step, one line style per damping of the structure."""
-    stable = [design for design in designs if design.steps is not None]
-    if not stable:
-        say_why_empty(axis, "the closed loop is unstable")
-        return
-    for design, line in _with_lines(stable):
-        assert design.steps is not None
-        change = 100.0 * _STEP * design.steps.log_response_after_level
-        axis.plot(_periods(design), change, ls=line, color=SECOND, label=f"{_damping(design)}: {_settles(design)}")
-    axis.axhline(100.0 * _STEP, color=REJECTED, lw=0.9)
-    axis.set(xlabel="periods of vibration", ylabel="change of level, %", xlim=(0.0, _until(stable)))
-    axis.legend(loc="lower right", title="damping: settles in")
-
-
-def _with_lines(designs: list[Design]) -> list[tuple[Design, str | tuple[int, tuple[float, float]]]]:
-    return list(zip(designs, ("-", "--", (0, (1, 1.5))), strict=False))
-
-
-def _periods(design: Design) -> Float:
-    assert design.steps is not None
-    return np.asarray(design.steps.time_s * design.loop.omega_rad_s / 2.0 / np.pi)
-
-
-def _until(designs: list[Design]) -> float:
-    """Return the number of periods that are drawn: twice the longest settling time, as far as it was computed."""
-    return max(min(2.0 * design.settling.longest, float(_periods(design)[-1])) for design in designs)
-
-
-def _damping(design: Design) -> str:
-    return f"{100.0 * design.loop.plant.damping_ratio:.2g} %"
-
-
-def _settles(design: Design) -> str:
-    return f"{design.settling.longest:.0f} periods"
+    labels: tuple[str | None, str | None] = ("half a bandwidth shift", f"level +{100.0 * _STEP:.0f} %")
+    until = 0.0
+    for (design, steps), line in zip(stable, ("-", "--", (0, (1, 1.5))), strict=False):
+        periods, longest = steps.time_s * design.loop.omega_rad_s / 2.0 / np.pi, design.settling.longest
+        until = max(until, min(2.0 * longest, float(periods[-1])))
+        lag.plot(periods, np.degrees(steps.lag_after_frequency_rad), ls=line, color=MAIN, label=labels[0])
+        lag.plot(periods, np.degrees(_STEP * steps.lag_after_level_rad), ls=line, color=SECOND, label=labels[1])
+        labels = None, None
+        label = f"{100.0 * design.loop.plant.damping_ratio:.2g} %: {longest:.0f} periods"
+        level.plot(periods, 100.0 * _STEP * steps.log_response_after_level, ls=line, color=SECOND, label=label)
+    level.axhline(100.0 * _STEP, color=REJECTED, lw=0.9)
+    for axis, text in ((lag, "phase error, deg"), (level, "change of level, %")):
+        axis.set(xlabel="periods of vibration", ylabel=text, xlim=(0.0, until))
+    _legend_above(lag, title="phase error after")
+    level.legend(loc="lower right", title="damping: settles in")
 
 
 def _legend_above(axis: "Axes", columns: int = 1, title: str | None = None) -> None:
-    """Put the legend above the panel, where it hides nothing."""
     axis.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2, title=title, alignment="left"
     )

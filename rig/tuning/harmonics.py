@@ -9,6 +9,7 @@ from controller.harmonics import MOST_HARMONICS, HarmonicsSettings
 from identification import FrequencyResponseMatrix
 from rig.bench import Bench
 from rig.errors import ConfigurationError
+from rig.tuning.levels import significant
 from vibrolock.arrays import Complex, Float
 
 EXAMINED_BAND = 0.7  # of the oscillator's frequency, on both sides of a harmonic: where its loop is examined
@@ -83,7 +84,8 @@ def choose_harmonics(
             break
     unstable = [order for order, peak in peaks[gain].items() if peak > MAX_SENSITIVITY]
     if unstable:  # others need not suffer from them
-        gain = next(g for g in GAINS if all(_good(peaks, g, order) for order in known if order not in unstable))
+        others = [order for order in known if order not in unstable]
+        gain = next(g for g in GAINS if all(peaks[g][order] <= MAX_SENSITIVITY for order in others))
         reasons += [
             f"harmonic {order}: left alone: not stable at {order * lock_hz:.5g} Hz, a mode is too near"
             for order in unstable
@@ -93,21 +95,13 @@ def choose_harmonics(
         highest=highest,
         integral=gain,
         left_alone=tuple(unstable),
-        force_per_v={order: (_rounded(plant.real), _rounded(plant.imag)) for order, plant in used.items()},
+        force_per_v={order: (significant(plant.real), significant(plant.imag)) for order, plant in used.items()},
     )
     return HarmonicsChoice(settings, {order: peaks[gain][order] for order in used}, tuple(reasons))
 
 
-def _good(peaks: dict[float, dict[int, float]], gain: float, order: int) -> bool:
-    return peaks[gain][order] <= MAX_SENSITIVITY
-
-
 def _at(frequency: Float, values: Complex, at_hz: float) -> complex:
     return complex(np.interp(at_hz, frequency, values.real), np.interp(at_hz, frequency, values.imag))
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.5g}")
 
 
 def _sensitivity(

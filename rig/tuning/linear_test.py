@@ -159,7 +159,6 @@ class _Runs:
         return Seen(least >= GOOD_COHERENCE, share, max(1.3 * noise, 1.5))
 
     def _moved_m(self, name: str, _: float) -> float:
-        """Return the peak displacement of a channel, from its spectrum."""
         amplitude = self.measured.amplitude[self.measured.index(name)]
         moved = amplitude / (2.0 * np.pi * self.measured.frequency_hz) ** 2
         return MAX_CREST_FACTOR * float(np.sqrt(0.5 * np.sum(moved**2)))
@@ -176,10 +175,9 @@ def _ended_well(recording: Recording, level: float) -> None:
 
 
 def _audible(bench: Bench, level: float, seen: tuple[float, float], when: str) -> None:
-    """Raise `TuningError` if force or drive hardly follow the voltage."""
     if min(seen) >= MIN_COHERENCE:
         return
-    names = [next(c.name for c in bench.channels if c.role == role) for role in ("force", "drive")]
+    names = [bench.channels[bench.index_of(role)].name for role in ("force", "drive")]
     raise TuningError(
         f"coherence with the voltage {when}, {level:.4g} V RMS: {seen[0]:.4f} of channel {names[0]!r}, {seen[1]:.4f} of "
         f"channel {names[1]!r}, needed is {MIN_COHERENCE}: a sensor, its cable or the amplifier is dead, or the test is all "

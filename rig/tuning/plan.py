@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from textwrap import wrap
 
@@ -12,6 +11,7 @@ from rig.text.json_values import JsonValue
 from rig.tuning.design import Chosen, gains_of
 from rig.tuning.harmonics import HarmonicsChoice
 from rig.tuning.levels import LevelChoice, significant
+from rig.tuning.plant import ChannelRatios
 from rig.tuning.shifts import Window, ramp_periods, start_periods, start_voltage
 
 HARMONICS = 5  # harmonics that are evaluated; chosen
@@ -25,17 +25,14 @@ def plan_text(
     bench_name: str,
     bench: Bench,
     plant: PlantModel,
-    ratios: tuple[Mapping[str, float], ...],
+    measured: ChannelRatios,
     chosen: Chosen,
     levels: LevelChoice,
     window: Window,
     harmonics: HarmonicsChoice | None,
     recording: Path,
 ) -> str:
-    """Return a backbone plan as TOML.
-
-    ``ratios`` are the measured ratios of response channels to the drive point, their standard errors, and turns.
-    """
+    """Return a backbone plan as TOML."""
     hertz = plant.lock_frequency_rad_s() / (2.0 * math.pi)
     volts = chosen.law == "phase"
     settling = chosen.design.settling.longest
@@ -99,19 +96,16 @@ def plan_text(
         f"# The plant as measured ({recording.name}): gains and levels are checked against it before anything moves.",
     ]
     facts += ["[plant]", *(_line(key, value) for key, value in plant.to_dict().items())]
-    if ratios[0]:
+    if measured.ratios:
         facts.append("# Motion of the response channels for that of the drive point, and standard errors.")
-        for key, values in zip(("response_ratios", "response_ratio_stds", "response_turns_deg"), ratios, strict=True):
+        for key, values in zip(("response_ratios", "response_ratio_stds", "response_turns_deg"), measured, strict=True):
             listed = ", ".join(f"{name} = {significant(value)}" for name, value in values.items())
             facts += [f"{key} = {{ {listed} }}"] if values else []
-    return (
-        "\n".join([*_summary(plant, chosen), *head, *controller, *(settle if math.isfinite(settling) else []), *facts])
-        + "\n"
-    )
+    settle = settle if math.isfinite(settling) else []
+    return "\n".join([*_summary(plant, chosen), *head, *controller, *settle, *facts]) + "\n"
 
 
 def _harmonics(choice: HarmonicsChoice) -> list[str]:
-    """Return the table of the harmonics loop, with its margins and what is not controlled."""
     settings = choice.settings
     peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in choice.sensitivity_peaks.items())
     out = ["", "[controller.harmonics]", _line("highest", settings.highest)]
@@ -129,18 +123,17 @@ def _harmonics(choice: HarmonicsChoice) -> list[str]:
 
 
 def _summary(plant: PlantModel, chosen: Chosen) -> list[str]:
-    design = chosen.design
-    margins = design.frequency_margins
+    margins, response = chosen.design.frequency_margins, chosen.design.amplitude_margins
     text = [
         f"# Structure: {plant.frequency_rad_s / 2.0 / math.pi:.6g} Hz, {100.0 * plant.damping_ratio:.4g} % damping, phi_d "
         f"{plant.drive_shape:.5g} kg^-1/2; coupled pole {plant.coupled_pole_rad_s.imag / 2.0 / math.pi:.6g} Hz.",
         f"# Frequency loop: max |S| {margins.sensitivity_peak:.2f}, gain margin {margins.gain_margin:.3g}, phase margin "
         f"{margins.phase_margin_deg:.0f} deg.",
     ]
-    if design.amplitude_margins is not None:
+    if response is not None:
         text.append(
-            f"# Response loop: max |S| {design.amplitude_margins.sensitivity_peak:.2f}, gain margin "
-            f"{design.amplitude_margins.gain_margin:.3g}, phase margin {design.amplitude_margins.phase_margin_deg:.0f} deg."
+            f"# Response loop: max |S| {response.sensitivity_peak:.2f}, gain margin {response.gain_margin:.3g}, phase margin "
+            f"{response.phase_margin_deg:.0f} deg."
         )
     return text
 
@@ -156,9 +149,7 @@ COMMENTS = {
 
 
 def _gains(chosen: Chosen) -> list[str]:
-    out = []
-    if chosen.law == "frequency-error":
-        out.append(_line("force_loop", "through-response"))
+    out = [_line("force_loop", "through-response")] if chosen.law == "frequency-error" else []
     for key, value in gains_of(chosen).items():
         if key in COMMENTS:
             out.append(f"# {COMMENTS[key]}")
@@ -173,5 +164,4 @@ def _comment(text: str) -> list[str]:
 
 
 def _line(key: str, value: JsonValue) -> str:
-    """Return a TOML line: a key with a text, a number or a list of numbers."""
     return f"{key} = {json.dumps(value)}"

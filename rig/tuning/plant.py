@@ -2,9 +2,10 @@
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +34,11 @@ def coherence_of(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]
     around = near(bench, measured.frequency_hz) & measured.excited
     out = []
     for role in ("force", "drive"):
-        index = measured.index(next(c.name for c in bench.channels if c.role == role))
+        index = measured.index(bench.channels[bench.index_of(role)].name)
         power = np.mean(np.abs(measured.mean[:, index][:, around]) ** 2, axis=0)
         noise = np.mean(measured.noise_variance[:, index][:, around], axis=0)
-        signal = np.maximum(power - noise / measured.spectra.shape[1], 0.0)
-        out.append(float(np.median(signal)) / max(float(np.median(signal)) + float(np.median(noise)), 1e-300))
+        signal = float(np.median(np.maximum(power - noise / measured.spectra.shape[1], 0.0)))
+        out.append(signal / max(signal + float(np.median(noise)), 1e-300))
     return out[0], out[1]
 
 
@@ -47,10 +48,10 @@ def voltage_responses(bench: Bench, measured: PeriodicSpectra) -> FrequencyRespo
     return best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
 
 
-def near(bench: Bench, frequency_hz: Float) -> NDArray[np.bool_]:
-    """Return which lines lie in the band of the plant model."""
+def near(bench: Bench, frequency_hz: Float, band: tuple[float, float] = FIT_BAND) -> NDArray[np.bool_]:
+    """Return which lines lie in a band, given as parts of the linear frequency; by default that of the plant model."""
     linear = bench.specimen.linear_frequency_hz
-    return np.asarray((frequency_hz > FIT_BAND[0] * linear) & (frequency_hz < FIT_BAND[1] * linear))
+    return np.asarray((frequency_hz > band[0] * linear) & (frequency_hz < band[1] * linear))
 
 
 def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
@@ -60,9 +61,9 @@ def densities(bench: Bench, measured: PeriodicSpectra) -> tuple[float, float]:
     """
     around = near(bench, measured.frequency_hz)
     step = float(np.diff(measured.frequency_hz).mean())
-    rows = [measured.index(next(c.name for c in bench.channels if c.role == role)) for role in ("force", "drive")]
-    variance = [float(np.mean(measured.noise_variance[:, row][:, around])) for row in rows]
-    return 0.5 * variance[0] / step, 0.5 * variance[1] / step
+    rows = [measured.index(bench.channels[bench.index_of(role)].name) for role in ("force", "drive")]
+    force, drive = (0.5 * float(np.mean(measured.noise_variance[:, row][:, around])) / step for row in rows)
+    return force, drive
 
 
 MAX_OFFSET = 0.1  # of the linear frequency: beyond, it may be another mode
@@ -99,12 +100,20 @@ def plant_of(bench: Bench, responses: FrequencyResponseMatrix, lead_samples: flo
     for band in NARROWER:
         with suppress(ValueError):  # too few lines, or too little of the resonance
             others.append(_fitted(bench, responses, lead_samples, band))
+
+    def with_spread(std: float | None, of: Callable[[PlantModel], complex]) -> float:
+        return math.hypot(std or 0.0, max((abs(of(other) - of(plant)) for other in others), default=0.0))
+
+    def alpha(one: PlantModel) -> complex:
+        return complex(one.exciter(1j * plant.frequency_rad_s)[0])
+
+    alpha_std = UNKNOWN_STD * abs(alpha(plant)) if plant.force_v_n_std is None else plant.force_v_n_std
     return replace(
         plant,
-        frequency_std_rad_s=_with_spread("frequency_rad_s", plant.frequency_std_rad_s, plant, others),
-        damping_ratio_std=_with_spread("damping_ratio", plant.damping_ratio_std, plant, others),
-        drive_shape_std=_with_spread("drive_shape", plant.drive_shape_std, plant, others),
-        force_v_n_std=_alpha_std(plant, others),
+        frequency_std_rad_s=with_spread(plant.frequency_std_rad_s, lambda one: one.frequency_rad_s),
+        damping_ratio_std=with_spread(plant.damping_ratio_std, lambda one: one.damping_ratio),
+        drive_shape_std=with_spread(plant.drive_shape_std, lambda one: one.drive_shape),
+        force_v_n_std=with_spread(alpha_std, alpha),
     )
 
 
@@ -112,8 +121,8 @@ def _fitted(
     bench: Bench, responses: FrequencyResponseMatrix, lead_samples: float, band: tuple[float, float]
 ) -> PlantModel:
     """Fit the plant to the lines in a band, given as parts of the linear frequency; raise ValueError if that fails."""
-    linear, frequency = bench.specimen.linear_frequency_hz, responses.frequency_hz
-    around = (frequency > band[0] * linear) & (frequency < band[1] * linear)
+    frequency = responses.frequency_hz
+    around = near(bench, frequency, band)
     covariance = responses.total_covariance if responses.total_covariance is not None else responses.noise_covariance
     value = responses.value[around, :2, 0]
     noise = np.nan_to_num(responses.total_std[around, :2, 0], nan=0.0, posinf=0.0)
@@ -131,68 +140,42 @@ def _fitted(
     )
 
 
-def _with_spread(name: str, std: float | None, plant: PlantModel, others: Sequence[PlantModel]) -> float:
-    """Return the standard error of a property of the mode together with its largest difference to other fits."""
-    apart = [abs(getattr(other, name) - getattr(plant, name)) for other in others]
-    return math.hypot(std or 0.0, max(apart, default=0.0))
+class ChannelRatios(NamedTuple):
+    """Motion of the response channels for that of the drive point, by channel name."""
+
+    ratios: dict[str, float]
+    """Displacement per displacement of the drive point."""
+    stds: dict[str, float]
+    """Standard errors of the ratios."""
+    turns_deg: dict[str, float]
+    """By how much a channel stands ahead of the phase of a real mode shape, deg in (-90, 90]; left out below a degree, which
+    other modes and noise make."""
 
 
-def _alpha_std(plant: PlantModel, others: Sequence[PlantModel]) -> float:
-    """Return the standard error of alpha at the mode, V/N, together with its largest difference to other fits."""
-    s = 1j * plant.frequency_rad_s
-    found = complex(plant.exciter(s)[0])
-    apart = max((abs(complex(other.exciter(s)[0]) - found) for other in others), default=0.0)
-    std = UNKNOWN_STD * abs(found) if plant.force_v_n_std is None else plant.force_v_n_std
-    return math.hypot(std, apart)
-
-
-def measured_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
-    """Return the displacement of each response channel per displacement of the drive point at resonance, by name.
+def channel_ratios(responses: FrequencyResponseMatrix, plant: PlantModel) -> ChannelRatios:
+    """Return the motion of each response channel for that of the drive point at resonance.
 
     Each ratio is a least-squares fit of the channel's response to that of the drive point, over the lines within a bandwidth of
-    the mode. A channel that does not stand out of the noise is left out. `measured_ratio_stds` has the standard errors.
-    """
-    around = _within_bandwidth(responses, plant)
-    drive = responses.value[around, 1, 0]
-    power = float(np.sum(np.abs(drive) ** 2))
-    out = {}
-    for row, channel in list(enumerate(responses.outputs))[2:]:
-        ratio = abs(complex(np.vdot(drive, responses.value[around, row, 0]))) / power
-        error = math.sqrt(float(np.sum(np.abs(drive) ** 2 * responses.total_std[around, row, 0] ** 2))) / power
-        if ratio > MIN_SIGNIFICANCE * error:
-            out[channel.name] = ratio
-    return out
-
-
-def measured_turns_deg(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
-    """Return by how much each response channel stands ahead of the phase of a real mode shape, deg in (-90, 90], by name.
-
-    Only turns of a degree and more are returned: smaller ones are within what other modes and noise do.
-    """
-    around = _within_bandwidth(responses, plant)
-    drive = responses.value[around, 1, 0]
-    rows = {channel.name: row for row, channel in enumerate(responses.outputs)}
-    turns = {
-        name: math.degrees(cmath.phase(complex(np.vdot(drive, responses.value[around, rows[name], 0]))))
-        for name in measured_ratios(responses, plant)
-    }
-    real = {name: -((90.0 - turn) % 180.0 - 90.0) for name, turn in turns.items()}
-    return {name: turn for name, turn in real.items() if abs(turn) >= MIN_NOTED_DEG}
-
-
-def measured_ratio_stds(responses: FrequencyResponseMatrix, plant: PlantModel) -> dict[str, float]:
-    """Return the standard errors of the `measured_ratios`, by name.
-
-    They are those of noise and distortion in both channels, increased where the fit is worse than these explain, and in
-    addition the difference to the fit within half the bandwidth, where other modes contribute less. Where the covariance is
-    unknown, the noise is taken from the misfit.
+    the mode. A channel that does not stand out of the noise is left out. The standard errors are those of noise and distortion
+    in both channels, increased where the fit is worse than these explain, and in addition the difference to the fit within half
+    the bandwidth, where other modes contribute less. Where the covariance is unknown, the noise is taken from the misfit.
     """
     wide, narrow = (_within_bandwidth(responses, plant, part) for part in (1.0, 0.5))
-    rows = {channel.name: row for row, channel in enumerate(responses.outputs)}
-    out = {}
-    for name, value in measured_ratios(responses, plant).items():
-        errors = [_ratio(responses, around, rows[name]) for around in (wide, narrow)]
-        out[name] = math.hypot(errors[0][1], value - errors[1][0])
+    drive = responses.value[wide, 1, 0]
+    power = float(np.sum(np.abs(drive) ** 2))
+    out = ChannelRatios({}, {}, {})
+    for row, channel in list(enumerate(responses.outputs))[2:]:
+        product = complex(np.vdot(drive, responses.value[wide, row, 0]))
+        ratio = abs(product) / power
+        error = math.sqrt(float(np.sum(np.abs(drive) ** 2 * responses.total_std[wide, row, 0] ** 2))) / power
+        if not ratio > MIN_SIGNIFICANCE * error:
+            continue
+        out.ratios[channel.name] = ratio
+        std, apart = _ratio(responses, wide, row)[1], ratio - _ratio(responses, narrow, row)[0]
+        out.stds[channel.name] = math.hypot(std, apart)
+        turn_deg = -((90.0 - math.degrees(cmath.phase(product))) % 180.0 - 90.0)
+        if abs(turn_deg) >= MIN_NOTED_DEG:
+            out.turns_deg[channel.name] = turn_deg
     return out
 
 
@@ -227,7 +210,7 @@ def compared_with_bench(bench: Bench, plant: PlantModel) -> tuple[str, ...]:
 
     Raises `TuningError` if the mode lies so far from the bench's linear frequency that it may be another one.
     """
-    facts, out = bench.specimen, []
+    facts, out = bench.specimen, list[str]()
     measured_hz = plant.frequency_rad_s / (2.0 * math.pi)
     offset = facts.linear_frequency_hz / measured_hz - 1.0
     if abs(offset) > MAX_OFFSET:

@@ -1,10 +1,9 @@
 """Report of a tuning, as JSON and as lines for the terminal."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict
 
-from controller.tuning import Design, Margins
+from controller.tuning import Design
 from rig.text.json_values import JsonValue
 from rig.tuning.design import gains_of
 from rig.tuning.harmonics import HarmonicsChoice
@@ -73,17 +72,12 @@ def summary(tuning: Tuning) -> dict[str, JsonValue]:
 
 
 def _design(design: Design) -> dict[str, JsonValue]:
-    settling = design.settling
     return {
         "damping_ratio": design.loop.plant.damping_ratio,
         "stable": design.stable,
         "frequency_loop": asdict(design.frequency_margins),
         "response_loop": None if design.amplitude_margins is None else asdict(design.amplitude_margins),
-        "settling_periods": {
-            "frequency_shift": settling.frequency_shift,
-            "level_amplitude": settling.level_amplitude,
-            "level_lag": settling.level_lag,
-        },
+        "settling_periods": asdict(design.settling),
         "reasons": list(design.reasons),
     }
 
@@ -98,15 +92,6 @@ def _harmonics(choice: HarmonicsChoice | None) -> dict[str, JsonValue] | None:
         "force_per_v": {str(order): list(value) for order, value in choice.settings.force_per_v.items()},
         "sensitivity_peaks": {str(order): peak for order, peak in choice.sensitivity_peaks.items()},
         "reasons": list(choice.reasons),
-    }
-
-
-def _margins(found: Margins) -> dict[str, float]:
-    return {
-        "sensitivity_peak": found.sensitivity_peak,
-        "gain_margin": found.gain_margin,
-        "phase_margin_deg": found.phase_margin_deg,
-        "crossover_rad_s": found.crossover_rad_s,
     }
 
 
@@ -128,7 +113,10 @@ def lines(tuning: Tuning) -> list[str]:
         + (f"{low:.3f}" if high - low < 0.2 * abs(high) else f"could not be identified ({low:.3f} to {high:.3f})")
         + f", {1.0 / plant.volts_per_newton():.3g} N/V at resonance; model within {100.0 * plant.fit_error:.2g} %",
         f"law            {chosen.law}: {chosen.why}",
-        *(f"  {name} = {_number(value)}" for name, value in gains_of(chosen).items()),
+        *(
+            f"  {name} = {', '.join(f'{v:.5g}' for v in (value if isinstance(value, tuple) else (value,)))}"
+            for name, value in gains_of(chosen).items()
+        ),
     ]
     closed = chosen.closed_form
     out.append(
@@ -147,15 +135,11 @@ def lines(tuning: Tuning) -> list[str]:
         f"{needed_v[-1]:.3g} V on the linear plant; {tuning.levels.why}"
     )
     if tuning.harmonics is not None:
-        out += _harmonics_lines(tuning.harmonics)
+        settings, found = tuning.harmonics.settings, tuning.harmonics.sensitivity_peaks
+        peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in found.items()) or "unknown"
+        out.append(f"harmonics      2 to {settings.highest}, integral = {settings.integral:g}, max |S| {peaks}")
+        out += [f"  {reason}" for reason in tuning.harmonics.reasons]
     return [*out, *(f"note: {note}" for note in tuning.notes)]
-
-
-def _harmonics_lines(choice: HarmonicsChoice) -> list[str]:
-    peaks = ", ".join(f"{peak:.2f} at {order}" for order, peak in choice.sensitivity_peaks.items())
-    settings = choice.settings
-    out = [f"harmonics      2 to {settings.highest}, integral = {settings.integral:g}, max |S| {peaks or 'unknown'}"]
-    return [*out, *(f"  {reason}" for reason in choice.reasons)]
 
 
 def _design_lines(design: Design) -> list[str]:
@@ -175,7 +159,3 @@ def _design_lines(design: Design) -> list[str]:
 def _bound(std: float | None, scale: float = 1.0) -> str:
     """Return the 95 % bound of a standard error, as a text to follow a number."""
     return "" if std is None else f" +- {1.96 * scale * std:.2g}"
-
-
-def _number(value: float | Sequence[float]) -> str:
-    return ", ".join(f"{v:.5g}" for v in value) if isinstance(value, Sequence) else f"{value:.5g}"

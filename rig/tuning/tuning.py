@@ -29,7 +29,7 @@ from rig.tuning.levels import (
 )
 from rig.tuning.linear_test import LinearTest, measure
 from rig.tuning.plan import plan_text
-from rig.tuning.plant import compared_with_bench, measured_ratio_stds, measured_ratios, measured_turns_deg, plant_of
+from rig.tuning.plant import channel_ratios, compared_with_bench, plant_of
 from rig.tuning.shifts import frequency_window
 from vibrolock.results import Result
 
@@ -150,11 +150,9 @@ def tune(
         None if request.harmonics is None else band_for(bench, request.harmonics),
     )
     plant = plant_of(bench, test.responses, test.lead_samples)
-    notes = compared_with_bench(bench, plant)
-    measured, ratio_stds = measured_ratios(test.responses, plant), measured_ratio_stds(test.responses, plant)
-    turns_deg = measured_turns_deg(test.responses, plant)
-    notes += _turned(turns_deg)
-    ratios = bench.response_ratios | measured
+    measured = channel_ratios(test.responses, plant)
+    notes = [*compared_with_bench(bench, plant), *_turned(measured.turns_deg)]
+    ratios = bench.response_ratios | measured.ratios
     highest_m = LIMIT_FRACTION * reach_m(bench, plant, ratios)[0] if request.to_m is None else request.to_m
     lowest = lowest_force(bench, plant, highest_m, test.bits_force_n)
     densities = (test.force_density, test.acceleration_density)
@@ -169,7 +167,6 @@ def tune(
         to_m=request.to_m,
         points=request.points,
     )
-    window = frequency_window(bench, test.responses, plant)
     notes += _cautions(bench, test, levels)
     harmonics = None
     if request.harmonics is not None:
@@ -179,55 +176,44 @@ def tune(
         )
     if request.from_m is None:
         notes += _narrow(bench, levels, lowest)
+    window, path = frequency_window(bench, test.responses, plant), Path(recording)
     return Tuning(
         bench=bench,
         test=test,
-        recording=Path(recording),
+        recording=path,
         plant=plant,
-        response_ratios=measured,
-        response_ratio_stds=ratio_stds,
-        response_turns_deg=turns_deg,
+        response_ratios=measured.ratios,
+        response_ratio_stds=measured.stds,
+        response_turns_deg=measured.turns_deg,
         chosen=chosen,
         levels=levels,
         harmonics=harmonics,
-        notes=notes,
-        plan_toml=plan_text(
-            named or name,
-            bench,
-            plant,
-            (measured, ratio_stds, turns_deg),
-            chosen,
-            levels,
-            window,
-            harmonics,
-            Path(recording),
-        ),
+        notes=tuple(notes),
+        plan_toml=plan_text(named or name, bench, plant, measured, chosen, levels, window, harmonics, path),
     )
 
 
-def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> tuple[str, ...]:
+def _narrow(bench: Bench, levels: LevelChoice, lowest: LowestForce) -> list[str]:
     """Return a note on levels that span little because of a converter's last bits."""
     span, bits = levels.levels_m[-1] / levels.levels_m[0], levels.needed_v[-1] / bench.output_bit_v
     if not lowest.bound or span > NARROW_SPAN:
-        return ()
+        return []
     text = f"the levels span a factor of {span:.3g}, not {SPAN:g}: the lowest is bounded by {lowest.bound}"
     if "output" in lowest.bound:
         text += f"; the highest has an output of {bits:.0f} bits, less gain behind the converter leaves room for lower levels"
-    return (text,)
+    return [text]
 
 
-def _turned(turns_deg: Mapping[str, float]) -> tuple[str, ...]:
-    """Return a note on each response whose phase is not that of a real mode shape."""
-    return tuple(
+def _turned(turns_deg: Mapping[str, float]) -> list[str]:
+    return [
         f"channel {name} stands {abs(turn):.3g} deg {'ahead of' if turn > 0.0 else 'behind'} a real mode shape: a joint that "
         "damps, or a sensor that is late; the plan takes this as known (plant.response_turns_deg)"
         for name, turn in turns_deg.items()
         if abs(turn) >= MIN_NOTED_PHASE_DEG
-    )
+    ]
 
 
-def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str, ...]:
-    """Return notes on possible deviations from the linear plant."""
+def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> list[str]:
     out = []
     if test.distortion > MAX_DISTORTION:
         out.append(
@@ -240,4 +226,4 @@ def _cautions(bench: Bench, test: LinearTest, levels: LevelChoice) -> tuple[str,
             f"the highest level needs {highest:.3g} of {limit:g} V on the linear plant: it is out of reach where the damping "
             f"rises beyond {limit / highest:.2g} times that of the multisine"
         )
-    return tuple(out)
+    return out

@@ -9,7 +9,7 @@ import pytest
 
 from identification import Channel, FrequencyResponseMatrix
 from rig.drivers import make_daq
-from rig.tuning.plant import measured_ratio_stds, measured_ratios, measured_turns_deg, plant_of
+from rig.tuning.plant import channel_ratios, plant_of
 from simulators.analysis import frequency_response
 from tests.rig.rigs import bench_with
 
@@ -62,7 +62,7 @@ def errors(neighbour, seeds, noise=1e-3):
     true = np.array([2.0 * math.pi * HERTZ, DAMPING, SHAPE, 1.6])
     for seed in seeds:
         matrix, plant = fitted(neighbour, seed, noise)
-        ratios, stds = measured_ratios(matrix, plant), measured_ratio_stds(matrix, plant)
+        ratios, stds, _ = channel_ratios(matrix, plant)
         found = [plant.frequency_rad_s, plant.damping_ratio, plant.drive_shape, ratios["acc_magnet"]]
         std = [plant.frequency_std_rad_s, plant.damping_ratio_std, plant.drive_shape_std, stds["acc_magnet"]]
         out.append([np.array(found) / true - 1.0, np.array(std) / true])
@@ -86,5 +86,5 @@ def test_a_mode_that_the_model_lacks_is_seen_by_the_narrower_fits():
 def test_a_response_that_stands_off_a_real_mode_shape_is_measured(turn_deg, told):
     matrix, plant = fitted(6.0, 0, 1e-4)
     turned = matrix.value * np.exp(1j * np.radians([0.0, 0.0, turn_deg]))[None, :, None]
-    found = measured_turns_deg(replace(matrix, value=turned), plant)
+    found = channel_ratios(replace(matrix, value=turned), plant).turns_deg
     assert found == ({} if told is None else {"acc_magnet": pytest.approx(told, abs=0.1)})
