@@ -1,6 +1,7 @@
 """Derive the findings of a check from its recording, with or without an earlier check as reference."""
 
 from dataclasses import dataclass
+from datetime import date
 from itertools import zip_longest
 from pathlib import Path
 from typing import Literal
@@ -15,13 +16,10 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
-from rig.check.calibration import calibration_findings
-from rig.check.findings import Finding, failed
+from rig.check.findings import Finding, Verdict, failed, is_check, not_tested
 from rig.check.judging import driven_findings, latency_findings
-from rig.check.recorded import is_check
 from rig.check.reference import reference_findings
-from rig.check.responses import Mode, Responses, responses_of
-from rig.check.scale import scale_of
+from rig.check.responses import Mode, Responses, responses_of, scale_of
 from rig.check.silence import silent_findings
 from rig.errors import RecordingError
 from rig.measurements import bench_of_recording
@@ -77,27 +75,46 @@ def assess(recording: Recording, reference: Recording | None = None) -> Assessme
     plan = _plan(recording)
     findings = [
         *_how_it_ended(recording, bench),
-        *_limits(bench),
+        *(Finding("limits", "", "warn", one.value, one.unit, one.allowed, str(one)) for one in objections(bench)),
         *calibration_findings(bench, recording.started[:10]),
-        *silent_findings(bench, _silence(recording, bench, plan)),
+        *silent_findings(bench, _silence(recording, bench)),
     ]
     found = responses_in(recording)
     old = None if reference is None else responses_in(reference)
     mode = None
     if found is None:
-        findings.append(Finding("responses", "", "not tested", text=CUT_SHORT))
+        findings.append(not_tested("responses", CUT_SHORT))
     else:
         driven, mode = driven_findings(bench, found)
-        findings += [*driven, *latency_findings(bench, found, _lead_fraction(recording))]
+        lead_samples = float(recording.parts[-1].information.get("about", {}).get("lead_samples", 0.0))
+        findings += [*driven, *latency_findings(bench, found, lead_samples % 1.0)]
         dead = {f.channel for f in driven if f.name == "life" and f.verdict == "fail"}
         if old is not None:
             findings += reference_findings(bench, found, old, dead)
     if reference is None:
         text = "no reference was given: drive polarity, volts to newtons and slow changes are not seen"
-        findings.append(Finding("reference", "", "not tested", text=text))
+        findings.append(not_tested("reference", text))
     level = plan.levels_rms_v[-1] if found is not None else None
     findings += _clipping(recording, bench, level)
     return Assessment(bench, recording.path, recording.started, level, tuple(findings), found, mode, old)
+
+
+def calibration_findings(bench: Bench, day: str) -> list[Finding]:
+    """Return a finding for each channel that states when its calibration is due; ``day`` of the check is YYYY-MM-DD.
+
+    An overdue calibration is a warning; with ``[arming] require_calibration`` it fails.
+    """
+    overdue: Verdict = "fail" if bench.arming.require_calibration else "warn"
+    out = []
+    for channel in bench.channels:
+        if not channel.calibration_due:
+            continue
+        left = (date.fromisoformat(channel.calibration_due) - date.fromisoformat(day)).days
+        sensor = f", of sensor {channel.serial_number}" if channel.serial_number else ""
+        text = f"was due on {channel.calibration_due}{sensor}: have it calibrated" if left < 0 else ""
+        verdict: Verdict = overdue if left < 0 else "ok"
+        out.append(Finding("calibration", channel.name, verdict, float(left), "days left", "from 0", text))
+    return out
 
 
 def checked_scale(path: Path, bench: Bench) -> CheckedScale:
@@ -114,11 +131,6 @@ def checked_scale(path: Path, bench: Bench) -> CheckedScale:
     if found.scale is None:
         raise RecordingError(f"{path}: the check does not tell the scale of force and motion: no mode was found in it")
     return found.scale
-
-
-def _limits(bench: Bench) -> list[Finding]:
-    """Warn of entries of the bench that are inconsistent."""
-    return [Finding("limits", "", "warn", one.value, one.unit, one.allowed, str(one)) for one in objections(bench)]
 
 
 def _clipping(recording: Recording, bench: Bench, level_rms_v: float | None) -> list[Finding]:
@@ -157,7 +169,7 @@ def _plan(recording: Recording) -> MultisinePlan:
     return plan
 
 
-def _silence(recording: Recording, bench: Bench, plan: MultisinePlan) -> Float:
+def _silence(recording: Recording, bench: Bench) -> Float:
     """Return the readings before the first realisation, [n, n_channels]."""
     first = recording.plans[0].plan
     samples = round(float(first.get("silent_s", 0.0)) * bench.sample_rate_hz)
@@ -176,8 +188,3 @@ def _how_it_ended(recording: Recording, bench: Bench) -> list[Finding]:
     name = next((c.name for c in bench.channels if f"channel {c.name} " in f"{end['text']} "), "")
     label = "life" if end["reason"] == EndReason.SENSOR_STUCK.name.lower() else "run"
     return [Finding(label, name, "fail", text=end["text"])]
-
-
-def _lead_fraction(recording: Recording) -> float:
-    lead = float(recording.parts[-1].information.get("about", {}).get("lead_samples", 0.0))
-    return lead - float(np.floor(lead))

@@ -79,19 +79,15 @@ def _draw_ending(page: "Figure", found: Assessment) -> None:
 
 
 def _limited(found: Assessment) -> list[tuple[int, str]]:
-    """Return index and name of every channel that has a limit."""
     return [(i, channel.name) for i, channel in enumerate(found.bench.channels) if channel.role != "monitor"]
 
 
 def _share(found: Assessment, values: Float, index: int) -> Float:
-    """Return readings of a channel over their limit, %."""
-    limits = found.bench.limits
-    force = found.bench.channels[index].role == "force"
+    limits, force = found.bench.limits, found.bench.channels[index].role == "force"
     return np.asarray(100.0 * values / (limits.force_n if force else limits.acceleration_m_s2))
 
 
 def _largest(found: Assessment, values: Float, index: int) -> float:
-    """Return the largest reading over its limit, %; NaN if the last one is not a number."""
     if not values.size or not np.isfinite(values[-1]):
         return float("nan")
     return float(np.nanmax(np.abs(_share(found, values, index))))
@@ -135,7 +131,6 @@ def _draw_accelerances(size: "Axes", phase: "Axes", found: Assessment) -> None:
 
 
 def _dead(found: Assessment) -> set[str]:
-    """Return the channels that do not follow the excitation."""
     return {finding.channel for finding in found.findings if (finding.name, finding.verdict) == ("life", "fail")}
 
 
@@ -157,12 +152,8 @@ def _draw_force(axis: "Axes", found: Assessment) -> None:
         return
     index = found.bench.index_of("force")
     frequency, name = found.responses.frequency_hz, found.responses.names[index]
-    axis.semilogy(
-        frequency,
-        np.abs(found.responses.per_volt[index]),
-        color=MAIN,
-        label=f"{name}: dead" if name in _dead(found) else "now",
-    )
+    label = f"{name}: dead" if name in _dead(found) else "now"
+    axis.semilogy(frequency, np.abs(found.responses.per_volt[index]), color=MAIN, label=label)
     if found.reference is not None and name in found.reference.names:
         known = on_lines_of(frequency, found.reference)[found.reference.names.index(name)]
         axis.semilogy(frequency, np.abs(known), "--", color=SECOND, label="reference")

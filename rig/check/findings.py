@@ -1,8 +1,10 @@
-"""`Finding`: the result of one test of a check."""
+"""The result of one test of a check, and which recordings are those of a check."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
+
+from rig.recording.reader import Recording
 
 Verdict = Literal["ok", "warn", "fail", "not tested"]
 
@@ -32,6 +34,11 @@ class Finding:
         return f"{self.name} {self.channel}".strip()
 
 
+def not_tested(name: str, text: str, channel: str = "") -> Finding:
+    """Return the finding that something was not tested, and why."""
+    return Finding(name, channel, "not tested", text=text)
+
+
 def graded(value: float, ok: tuple[float, float], tolerated: tuple[float, float]) -> Verdict:
     """Return ``ok`` within the inner range, ``warn`` within the outer range, otherwise ``fail``; NaN fails."""
     if ok[0] <= value <= ok[1]:
@@ -42,3 +49,11 @@ def graded(value: float, ok: tuple[float, float], tolerated: tuple[float, float]
 def failed(findings: Iterable[Finding]) -> tuple[str, ...]:
     """Return the labels of the findings that failed."""
     return tuple(finding.label for finding in findings if finding.verdict == "fail")
+
+
+PURPOSE = "check"  # purpose of the recording of a check, in the facts of its parts
+
+
+def is_check(recording: Recording) -> bool:
+    """Return whether a recording is that of a check."""
+    return bool(recording.parts) and recording.parts[0].information.get("about", {}).get("purpose") == PURPOSE

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from rig.bench import Bench
-from rig.check.findings import Finding, graded
+from rig.check.findings import Finding, Verdict, graded, not_tested
 from rig.check.responses import BAND, MAX_MISFIT, Mode, Responses, fit_mode
 from vibrolock.arrays import Float
 
@@ -48,21 +49,16 @@ def latency_findings(bench: Bench, responses: Responses, delay_fraction: float) 
 
     ``delay_fraction`` is the fraction of a sample by which the rows' outputs and inputs are not aligned.
     """
-    rows = [i for i, channel in enumerate(bench.channels) if channel.loopback]
-    if not rows:
-        text = "no channel is declared with loopback = true"
-        return [Finding("latency", "", "not tested", text=text)]
-    return [_delay(bench, responses, row, delay_fraction) for row in rows]
-
-
-def _delay(bench: Bench, responses: Responses, row: int, delay_fraction: float) -> Finding:
-    value, omega = responses.per_volt[row], 2.0 * math.pi * responses.frequency_hz / bench.sample_rate_hz
-    phase = np.unwrap(np.angle(value))
-    late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - delay_fraction
-    bad = abs(late) > MAX_DELAY_SAMPLES
-    text = "more than the driver says: its queue or filter delay, or this channel's skew_samples" if bad else ""
-    name = bench.channels[row].name
-    return Finding("latency", name, "fail" if bad else "ok", late, "samples", f"+-{MAX_DELAY_SAMPLES:g}", text)
+    omega, allowed = 2.0 * math.pi * responses.frequency_hz / bench.sample_rate_hz, f"+-{MAX_DELAY_SAMPLES:g}"
+    out = []
+    for channel, value in zip(bench.channels, responses.per_volt, strict=True):
+        if channel.loopback:
+            phase = np.unwrap(np.angle(value))
+            late = -float(np.polyfit(omega, phase, 1, w=np.abs(value))[0]) - delay_fraction
+            bad = abs(late) > MAX_DELAY_SAMPLES
+            text = "more than the driver says: its queue or filter delay, or this channel's skew_samples" if bad else ""
+            out.append(Finding("latency", channel.name, "fail" if bad else "ok", late, "samples", allowed, text))
+    return out or [not_tested("latency", "no channel is declared with loopback = true")]
 
 
 MIN_COHERENCE, GOOD_COHERENCE = 0.5, 0.98  # coherence below which a channel is dead, and from which it is good; chosen
@@ -81,29 +77,27 @@ def driven_findings(bench: Bench, responses: Responses) -> tuple[list[Finding], 
     dead = {finding.channel for finding in coherences if finding.verdict == "fail"}
     out = [*coherences, *_distortion(bench, responses, dead)]
     force, drive = bench.index_of("force"), bench.index_of("drive")
-    names = responses.names
+    names, linear_hz = responses.names, bench.specimen.linear_frequency_hz
     if names[force] in dead or names[drive] in dead:
-        text = "force or drive channel is dead"
-        return [*out, Finding("power", names[drive], "not tested", text=text)], None
-    alive = [i for i in _accelerations(bench) if names[i] not in dead]
-    mode = fit_mode(responses.frequency_hz, responses.per(force)[alive], bench.specimen.linear_frequency_hz)
+        return [*out, not_tested("power", "force or drive channel is dead", names[drive])], None
+    accelerations = [drive, *(i for i, channel in enumerate(bench.channels) if channel.role == "response")]
+    alive = [i for i in accelerations if names[i] not in dead]
+    mode = fit_mode(responses.frequency_hz, responses.per(force)[alive], linear_hz)
     out.append(_power(bench, responses))
-    if mode is None or mode.misfit > MAX_MISFIT or not _near(bench, mode):
+    verdict = "fail" if mode is None else graded(mode.frequency_hz / linear_hz, FREQUENCY_OK, FREQUENCY_TOLERATED)
+    if mode is None or mode.misfit > MAX_MISFIT or verdict == "fail":
         text = (
             "the accelerations per force show no single mode near specimen.linear_frequency_hz: force and drive swapped, "
             "another specimen, or wrong facts"
         )
         value = None if mode is None else mode.frequency_hz
-        low, high = (part * bench.specimen.linear_frequency_hz for part in FREQUENCY_TOLERATED)
+        low, high = (part * linear_hz for part in FREQUENCY_TOLERATED)
         return [*out, Finding("frequency", "", "fail", value, "Hz", f"{low:.4g} to {high:.4g}", text)], None
-    out.append(_frequency(bench, mode))
+    text = "" if verdict == "ok" else "correct specimen.linear_frequency_hz, or see what has changed"
+    low, high = (part * linear_hz for part in FREQUENCY_OK)
+    out.append(Finding("frequency", "", verdict, mode.frequency_hz, "Hz", f"{low:.4g} to {high:.4g}", text))
     out += _shapes(bench, responses, alive, mode)
     return [*out, *_delays(bench, alive, mode)], mode
-
-
-def _accelerations(bench: Bench) -> list[int]:
-    drive = bench.index_of("drive")
-    return [drive, *(i for i, channel in enumerate(bench.channels) if channel.role == "response")]
 
 
 def _coherence(bench: Bench, responses: Responses) -> list[Finding]:
@@ -142,36 +136,20 @@ def _power(bench: Bench, responses: Responses) -> Finding:
     velocity = responses.per_volt[drive] / (2j * math.pi * responses.frequency_hz)
     power = np.real(responses.per_volt[force].conj() * velocity)[around]
     share = float(power.sum() / max(np.abs(power).sum(), 1e-300))
-    name, allowed = responses.names[drive], f"from {MIN_POWER:g}"
-    if share >= MIN_POWER:
-        return Finding("power", name, "ok", share, "into specimen", allowed)
-    if share > -MIN_POWER:
-        text = "goes in at some frequencies and out at others: the drive channel is not at the drive point"
-        return Finding("power", name, "warn", share, "into specimen", allowed, text)
-    text = "power comes out of the specimen: force or drive is reversed, or the two are swapped"
-    return Finding("power", name, "fail", share, "into specimen", allowed, text)
-
-
-def _near(bench: Bench, mode: Mode) -> bool:
-    ratio = mode.frequency_hz / bench.specimen.linear_frequency_hz
-    return FREQUENCY_TOLERATED[0] <= ratio <= FREQUENCY_TOLERATED[1]
-
-
-def _frequency(bench: Bench, mode: Mode) -> Finding:
-    linear = bench.specimen.linear_frequency_hz
-    verdict = graded(mode.frequency_hz / linear, FREQUENCY_OK, FREQUENCY_TOLERATED)
-    text = "" if verdict == "ok" else "correct specimen.linear_frequency_hz, or see what has changed"
-    allowed = f"{FREQUENCY_OK[0] * linear:.4g} to {FREQUENCY_OK[1] * linear:.4g}"
-    return Finding("frequency", "", verdict, mode.frequency_hz, "Hz", allowed, text)
+    verdict: Verdict = "ok" if share >= MIN_POWER else "warn" if share > -MIN_POWER else "fail"
+    text = {
+        "warn": "goes in at some frequencies and out at others: the drive channel is not at the drive point",
+        "fail": "power comes out of the specimen: force or drive is reversed, or the two are swapped",
+    }.get(verdict, "")
+    return Finding("power", responses.names[drive], verdict, share, "into specimen", f"from {MIN_POWER:g}", text)
 
 
 def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode) -> list[Finding]:
     """Judge sizes, signs and places of the accelerations by the mode shape in the bench."""
     drive_shape = bench.specimen.drive_mode_shape
-    names, channels = responses.names, bench.channels
+    names, channels = list(responses.names), bench.channels
     if drive_shape is None:
-        text = "the bench knows no drive_mode_shape: a reference check would tell"
-        return [Finding("place", "", "not tested", text=text)]
+        return [not_tested("place", "the bench knows no drive_mode_shape: a reference check would tell")]
     shapes = {
         i: drive_shape if channels[i].role == "drive" else shape
         for i in alive
@@ -182,63 +160,55 @@ def _shapes(bench: Bench, responses: Responses, alive: Sequence[int], mode: Mode
     expected = drive_shape * np.array([shapes[i] or 0.0 for i in known])
     volts = np.array([abs(channels[i].sensitivity_v_per_unit) for i in known])
     swapped = best_assignment(by_magnitude(np.abs(residues) * volts, np.abs(expected) * volts))
-    out = [
-        Finding(
-            "place", names[i], "not tested", text="the bench knows no mode_shape of it: a reference check would tell"
-        )
-        for i in alive
-        if i not in known
-    ]
+    text = "the bench knows no mode_shape of it: a reference check would tell"
+    out = [not_tested("place", text, names[i]) for i in alive if i not in known]
+    names = [names[i] for i in known]
     if swapped is not None:
-        return [*out, *_misplaced([names[i] for i in known], swapped)]
-    out += _look_alike([names[i] for i in known], np.abs(expected))
-    out += _polarities(bench, known, np.sign(residues.real * expected))
-    return [*out, *(_size(names[i], float(r)) for i, r in zip(known, np.abs(residues / expected), strict=True))]
+        return [*out, *_misplaced(names, swapped)]
+    out += _look_alike(names, np.abs(expected))
+    out += _polarities(bench, names, np.sign(residues.real * expected))
+    text = "per force, against the mode's shape: a sensitivity, its place, or the shape is wrong"
+    ratios = np.abs(residues / expected).tolist()
+    return [*out, *(sized("size", n, r, "of expected", text) for n, r in zip(names, ratios, strict=True))]
 
 
-def _polarities(bench: Bench, known: Sequence[int], signs: Float) -> list[Finding]:
+def _polarities(bench: Bench, names: Sequence[str], signs: Float) -> list[Finding]:
     """Judge the signs of the accelerations relative to the force. If most are wrong, the force is reversed."""
     force = bench.channels[bench.index_of("force")].name
-    names = [bench.channels[i].name for i in known]
-    turned = len(known) > 2 and int(np.sum(signs < 0.0)) > len(known) / 2
+    turned = len(names) > 2 and int(np.sum(signs < 0.0)) > len(names) / 2
     against = signs > 0.0 if turned else signs < 0.0
-    text = "reversed against the accelerations: turn the sign of its sensitivity" if turned else ""
-    out = [Finding("polarity", force, "fail" if turned else "ok", -1.0 if turned else 1.0, "sign", "1", text)]
-    unsure = "" if len(known) > 2 else ", or the force is"
-    for name, wrong in zip(names, against, strict=True):
-        text = f"reversed{unsure}: turn the sign of its sensitivity" if wrong else ""
+    unsure = "" if len(names) > 2 else ", or the force is"
+    whys = (" against the accelerations", *(unsure for _ in names))
+    out = []
+    for name, wrong, why in zip((force, *names), (turned, *against), whys, strict=True):
+        text = f"reversed{why}: turn the sign of its sensitivity" if wrong else ""
         out.append(Finding("polarity", name, "fail" if wrong else "ok", -1.0 if wrong else 1.0, "sign", "1", text))
     return out
 
 
 def _misplaced(names: Sequence[str], swapped: tuple[int, ...]) -> list[Finding]:
-    return [
-        Finding("place", name, "fail", text=f"reads what {names[really]} should: the two are swapped")
-        if swapped[really] == place
-        else Finding("place", name, "fail", text=f"reads what {names[really]} should: channels are swapped")
-        for place, (name, really) in enumerate(zip(names, swapped, strict=True))
-        if place != really
-    ]
+    out = []
+    for place, (name, really) in enumerate(zip(names, swapped, strict=True)):
+        if place != really:
+            who = "the two" if swapped[really] == place else "channels"
+            out.append(Finding("place", name, "fail", text=f"reads what {names[really]} should: {who} are swapped"))
+    return out
 
 
 def _look_alike(names: Sequence[str], expected: Float) -> list[Finding]:
     text = "moves like {other} in this mode: whether the two are swapped, only a reference check tells"
     return [
-        Finding("place", names[j], "not tested", text=text.format(other=names[i]))
-        for i in range(len(names))
-        for j in range(i + 1, len(names))
+        not_tested("place", text.format(other=names[i]), names[j])
+        for i, j in combinations(range(len(names)), 2)
         if abs(math.log(expected[i] / expected[j])) < MIN_LOG_RATIO
     ]
 
 
-def _size(name: str, ratio: float) -> Finding:
+def sized(name: str, channel: str, ratio: float, unit: str, text: str) -> Finding:
+    """Judge the size of a response over the expected one; ``text`` says what to do unless it is ok."""
     verdict = graded(ratio, SIZE_OK, SIZE_TOLERATED)
-    text = (
-        ""
-        if verdict == "ok"
-        else "per force, against the mode's shape: a sensitivity, its place, or the shape is wrong"
-    )
-    return Finding("size", name, verdict, ratio, "of expected", f"{SIZE_OK[0]:g} to {SIZE_OK[1]:g}", text)
+    allowed = f"{SIZE_OK[0]:g} to {SIZE_OK[1]:g}"
+    return Finding(name, channel, verdict, ratio, unit, allowed, "" if verdict == "ok" else text)
 
 
 def _delays(bench: Bench, alive: Sequence[int], mode: Mode) -> list[Finding]:

@@ -4,20 +4,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.bench import Bench
-from rig.check.findings import Finding, graded
-from rig.check.judging import SIZE_OK, SIZE_TOLERATED, best_assignment, by_shape
+from rig.check.findings import Finding, not_tested
+from rig.check.judging import best_assignment, by_shape, sized
 from rig.check.responses import Responses
 from vibrolock.arrays import Complex
 
 
 def on_lines_of(frequency_hz: NDArray[np.float64], reference: Responses) -> Complex:
     """Interpolate the responses per volt of the reference: complex[n_channels, n_lines]."""
-    parts = [
-        np.interp(frequency_hz, reference.frequency_hz, part(row))
-        for row in reference.per_volt
-        for part in (np.real, np.imag)
-    ]
-    return np.asarray(np.array(parts[0::2]) + 1j * np.array(parts[1::2]))
+    return np.array([np.interp(frequency_hz, reference.frequency_hz, row) for row in reference.per_volt])
 
 
 def reference_findings(bench: Bench, found: Responses, reference: Responses, dead: set[str]) -> list[Finding]:
@@ -25,7 +20,7 @@ def reference_findings(bench: Bench, found: Responses, reference: Responses, dea
     both = [i for i, name in enumerate(found.names) if name in reference.names and name not in dead]
     both = [i for i in both if bench.channels[i].role != "monitor"]
     if not both:
-        return [Finding("reference", "", "not tested", text="the reference has no channel in common with this bench")]
+        return [not_tested("reference", "the reference has no channel in common with this bench")]
     inside = (found.frequency_hz >= reference.frequency_hz[0]) & (found.frequency_hz <= reference.frequency_hz[-1])
     known = on_lines_of(found.frequency_hz[inside], reference)
     known = known[[reference.names.index(found.names[i]) for i in both]]
@@ -48,6 +43,5 @@ def _compared(name: str, now: Complex, known: Complex) -> list[Finding]:
     turned = alike < 0.0
     text = "reversed since the reference (if all channels are: the drive is)" if turned else ""
     sign = Finding("polarity", name, "fail" if turned else "ok", alike, "likeness", "above 0", text)
-    verdict = graded(ratio, SIZE_OK, SIZE_TOLERATED)
-    text = "" if verdict == "ok" else "per volt, against the reference: amplifier, sensitivity, or the rig has changed"
-    return [sign, Finding("gain", name, verdict, ratio, "of reference", f"{SIZE_OK[0]:g} to {SIZE_OK[1]:g}", text)]
+    text = "per volt, against the reference: amplifier, sensitivity, or the rig has changed"
+    return [sign, sized("gain", name, ratio, "of reference", text)]

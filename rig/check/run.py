@@ -1,6 +1,7 @@
 """Check of a bench: an ordinary run with silence, then a multisine, raised from a thousandth of the largest voltage."""
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 
 from rig.arming.bench_memory import RememberedCheck, fingerprint, now, remember
@@ -10,7 +11,7 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.running.level_search import LevelSearch, MultisineSeries, Seen, share_of_limits
 from rig.check.assessment import Assessment, assess, responses_in
-from rig.check.recorded import PURPOSE
+from rig.check.findings import PURPOSE
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.reader import Recording
 from rig.tick.safety.layout import EndReason
@@ -18,9 +19,8 @@ from rig.tick.safety.layout import EndReason
 BAND = (0.4, 2.5)  # of the linear frequency: band of the multisine
 LINES = 200.0  # number of lines up to the linear frequency
 ENOUGH = 0.999  # coherence of the worst channel that suffices
-CLEAR_COHERENCE = (
-    0.9999  # coherence of the best channel above which a dead one will not appear at a higher level either
-)
+CLEAR_COHERENCE = 0.9999
+"""Coherence of the best channel above which a dead one will not appear at a higher level either."""
 DEAD_COHERENCE = 0.1  # coherence below which a channel is dead at a level; chosen
 SILENT_S = 3.0  # silence before the multisine, s; chosen
 SEARCH = LevelSearch(safe_share=0.1, least_rise=1.2, most_levels=5)
@@ -64,12 +64,8 @@ def check(
 
 
 def _assessed(bench: Bench, path: Path, reference: str | Path | None) -> Assessment:
-    with Recording(path) as recorded:
-        if reference is None:
-            found = assess(recorded)
-        else:
-            with Recording(reference) as known:
-                found = assess(recorded, known)
+    with Recording(path) as recorded, nullcontext() if reference is None else Recording(reference) as known:
+        found = assess(recorded, known)
         facts = recorded.parts[0].information["about"]
         virtual, identity = facts["armed"]["how"] == "virtual", facts["device"]
     if not virtual:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from rig.bench import Bench
-from rig.check.findings import Finding, graded
+from rig.check.findings import Finding, Verdict, graded
 from rig.daq import Channel
 from vibrolock.arrays import Float
 
@@ -23,9 +23,8 @@ def silent_findings(bench: Bench, readings: Float) -> list[Finding]:
     for index, channel in enumerate(bench.channels):
         values = readings[:, index].astype(float)
         if not np.isfinite(values).all():
-            out.append(
-                Finding("samples", channel.name, "warn", text="samples were lost or are no numbers; see the wire")
-            )
+            text = "samples were lost or are no numbers; see the wire"
+            out.append(Finding("samples", channel.name, "warn", text=text))
             values = values[np.isfinite(values)]
         stopping = bench.emergency_stop is not None and bench.emergency_stop.channel == channel.name
         if values.size < 10 or stopping:
@@ -39,59 +38,46 @@ def _of_channel(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
     offset_v = float(values.mean()) * scale
     highest_v = bench.limits.overload_fraction * channel.range_v
     at_range = float(np.abs(values).max()) * scale >= highest_v
-    verdict = "fail" if at_range else graded(abs(offset_v), (0.0, MAX_OFFSET * channel.range_v), (0.0, highest_v))
-    offset = Finding(
-        "offset",
-        channel.name,
-        verdict,
-        offset_v,
-        "V",
-        f"+-{MAX_OFFSET * channel.range_v:g}",
-        {"ok": "", "warn": "see the sensor's supply and its warm-up"}.get(
-            verdict, "at the end of its range: short or open?"
-        ),
-    )
+    largest_v = MAX_OFFSET * channel.range_v
+    verdict = "fail" if at_range else graded(abs(offset_v), (0.0, largest_v), (0.0, highest_v))
+    texts = {"ok": "", "warn": "see the sensor's supply and its warm-up"}
+    text = texts.get(verdict, "at the end of its range: short or open?")
+    offset = Finding("offset", channel.name, verdict, offset_v, "V", f"+-{largest_v:g}", text)
     return [offset, _noise(channel, values), *_hum(bench, channel, values)]
 
 
-def floor(channel: Channel) -> float:
+def expected_rms(channel: Channel) -> float:
     """RMS that the bench expects of a channel at rest, from its declared noise and the converter's steps, in its unit."""
-    bit = channel.resolution_in_unit
-    return math.hypot(channel.noise_rms, bit / math.sqrt(12.0))
+    return math.hypot(channel.noise_rms, channel.resolution_in_unit / math.sqrt(12.0))
 
 
 def _noise(channel: Channel, values: Float) -> Finding:
-    bit = channel.resolution_in_unit
-    found, expected = float(values.std()), floor(channel)
-    if np.ptp(values) < 0.5 * bit:
-        if channel.noise_rms < 0.5 * bit:
-            text = "below one bit, as the bench expects; whether it lives is told under drive"
-            return Finding("noise", channel.name, "ok", found, channel.unit, f"up to {MAX_NOISE * expected:.3g}", text)
+    bit, found, expected = channel.resolution_in_unit, float(values.std()), expected_rms(channel)
+    verdict: Verdict = "warn"
+    allowed = f"from {MIN_NOISE * expected:.3g}"
+    if np.ptp(values) < 0.5 * bit and channel.noise_rms >= 0.5 * bit:
         text = "does not change at all: cable, supply or sensor may be dead"
-        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {MIN_NOISE * expected:.3g}", text)
-    if channel.noise_rms == 0.0 and found > MAX_NOISE * expected:
-        text = "the bench declares no noise_rms to compare with"
-        return Finding("noise", channel.name, "not tested", found, channel.unit, "", text)
-    if found < MIN_NOISE * channel.noise_rms and channel.noise_rms > bit:
+    elif np.ptp(values) < 0.5 * bit:
+        verdict, allowed = "ok", f"up to {MAX_NOISE * expected:.3g}"
+        text = "below one bit, as the bench expects; whether it lives is told under drive"
+    elif channel.noise_rms == 0.0 and found > MAX_NOISE * expected:
+        verdict, allowed, text = "not tested", "", "the bench declares no noise_rms to compare with"
+    elif found < MIN_NOISE * channel.noise_rms and channel.noise_rms > bit:
         text = "much quieter than the sensor can be: is it connected?"
-        return Finding("noise", channel.name, "warn", found, channel.unit, f"from {MIN_NOISE * expected:.3g}", text)
-    noisy = found > MAX_NOISE * expected
-    text = "more than sensor and converter make: ambient vibration, cable or earth loop" if noisy else ""
-    return Finding(
-        "noise", channel.name, "warn" if noisy else "ok", found, channel.unit, f"up to {MAX_NOISE * expected:.3g}", text
-    )
+    else:
+        noisy, allowed = found > MAX_NOISE * expected, f"up to {MAX_NOISE * expected:.3g}"
+        verdict = "warn" if noisy else "ok"
+        text = "more than sensor and converter make: ambient vibration, cable or earth loop" if noisy else ""
+    return Finding("noise", channel.name, verdict, found, channel.unit, allowed, text)
 
 
 def _hum(bench: Bench, channel: Channel, values: Float) -> list[Finding]:
-    found, at_hz = 0.0, 0.0
-    for mains in MAINS_HZ:
-        amplitude = hum(values, mains, bench.sample_rate_hz)
-        if amplitude > found:
-            found, at_hz = amplitude, mains
-    if found <= floor(channel):
+    found, at_hz = max((hum(values, mains, bench.sample_rate_hz), -mains) for mains in MAINS_HZ)
+    allowed = expected_rms(channel)
+    if found <= allowed:
         return []
-    text = f"mains hum of {at_hz:g} Hz and its harmonics: earth loop, or a cable beside the amplifier's"
-    return [Finding("mains hum", channel.name, "warn", found, channel.unit, f"up to {floor(channel):.3g}", text)]
+    text = f"mains hum of {-at_hz:g} Hz and its harmonics: earth loop, or a cable beside the amplifier's"
+    return [Finding("mains hum", channel.name, "warn", found, channel.unit, f"up to {allowed:.3g}", text)]
 
 
 def hum(values: Float, mains_hz: float, sample_rate_hz: float) -> float:

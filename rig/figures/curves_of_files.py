@@ -21,7 +21,7 @@ from rig.campaigns.multisine.points import recorded_response_matrices
 from rig.campaigns.stepped_phase.figure import asked_lags, gaps
 from rig.campaigns.stepped_sine.figure import jumps
 from rig.campaigns.sweep.points import recorded_sweeps
-from rig.check.recorded import is_check
+from rig.check.findings import is_check
 from rig.drawing.curves import (
     FORCE,
     FREQUENCY,

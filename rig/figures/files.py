@@ -9,7 +9,7 @@ from identification import IdentificationError
 from rig.campaigns.evaluation.figure import draw_failure
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.check.recorded import is_check
+from rig.check.findings import is_check
 from rig.drawing.curves import View
 from rig.drawing.page import check_ending, check_replaceable, page_for
 from rig.errors import RecordingError

@@ -11,7 +11,7 @@ import numpy as np
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
-from rig.check.recorded import is_check
+from rig.check.findings import is_check
 from rig.drawing.style import MAIN, REJECTED, SECOND, title, unit_text
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.campaigns.evaluation.point import Point, point_name
-from rig.check.recorded import is_check
+from rig.check.findings import is_check
 from rig.recording.reader import Recording
 from rig.report.document import Block, Chapter, Section, Table, Text, blocks_of
 from rig.report.facts import (

@@ -3,7 +3,7 @@
 import pytest
 
 import rig
-from rig.check.calibration import calibration_findings
+from rig.check.assessment import calibration_findings
 from rig.report.report import write_report
 from rig.show.summary import summarise
 from rig.show.tables import print_summary

@@ -6,9 +6,8 @@ import pytest
 from rig.arming.checked_scale import CheckedScale
 from rig.arming.run_options import RunOptions
 from rig.check.assessment import checked_scale
-from rig.check.responses import Mode, Responses
+from rig.check.responses import Mode, Responses, scale_of
 from rig.check.run import check
-from rig.check.scale import scale_of
 from rig.errors import RecordingError
 from simulators import VirtualRig
 from simulators.analysis import frequency_response
