@@ -31,10 +31,9 @@ from rig.recording.reader import Recording
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge, collect_knowledge
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
-from rig.rehearsal.statistics import Quantiles
 from rig.rehearsal.trial import run_trial
 from rig.rehearsal.twins import draw_twin
-from rig.rehearsal.verdict import verdict_of
+from rig.rehearsal.verdict import Quantiles, verdict_of
 from rig.tuning import tune
 
 BENCHES = ("magnet-beam", "friction-beam", "magnet-beam-symmetric")

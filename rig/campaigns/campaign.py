@@ -19,10 +19,11 @@ class Campaign:
     result: type[object]
     """Class of `Point.result`: the results that only points of this kind have."""
     measure: Callable[..., Point[object]] | None = None
-    """``(bench, plan, target, rows, settling) -> point``: evaluates the rows of one point, including the quality."""
+    """``(bench, plan, target, rows, settling) -> point``: evaluates the rows of one point, including the quality; ``settling``
+    is the outcome record of the segment before. Rows without a result raise `IdentificationError` or `ArithmeticError`."""
     measure_batch: Callable[..., list[Point[object]]] | None = None
     """``(bench, plan, targets, rows, passages, ended) -> points``: evaluates the points that are measured together, in place of
-    ``measure``."""
+    ``measure``, whose errors it raises."""
     columns: tuple[Column, ...]
     """Columns that tables show of a point."""
     draw: str

@@ -12,9 +12,8 @@ from rig.cli.options import Json, Overwrite, keep_existing
 if TYPE_CHECKING:
     from rig.bench import Bench
     from rig.campaigns.planning.plan import Plan
-    from rig.rehearsal.comparison import Comparison
-    from rig.rehearsal.effect import Effect
-    from rig.rehearsal.rehearsal import Draw
+    from rig.rehearsal.forecast import Comparison
+    from rig.rehearsal.rehearsal import Draw, Effect
     from rig.results.rehearsal.rehearse import Listener, Subject
 
 

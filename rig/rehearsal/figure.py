@@ -40,12 +40,10 @@ def draw_rehearsal(page: "Figure", rehearsal: Rehearsal) -> None:
 def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) -> None:
     from matplotlib.ticker import LogLocator
 
-    drawn = False
     for draw in rehearsal.draws:
         points = [p for p in draw.trial.points if p.accepted and np.isfinite(p.modal_frequency_hz)]
         if not points:
             continue
-        drawn = True
         amplitude = np.array([1e3 * p.amplitude_m for p in points])
         colour = MAIN if draw.trial.completed else REJECTED if not draw.trial.tripped else SECOND
         for axis, y in (
@@ -53,7 +51,7 @@ def _draw_backbones(frequency: "Axes", damping: "Axes", rehearsal: Rehearsal) ->
             (damping, [100.0 * p.damping_ratio for p in points]),
         ):
             axis.semilogx(amplitude, y, "-", lw=0.7, alpha=0.45, color=colour)
-    if not drawn:
+    if not frequency.get_lines():
         for axis in (frequency, damping):
             say_why_empty(axis, "no accepted point has modal properties")
         return
@@ -84,14 +82,12 @@ def _draw_points(axis: "Axes", verdict: Verdict) -> None:
 
 
 def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
-    shown = list(verdict.margins.items())[:MAX_LIMITS][::-1]
+    shown, count = list(verdict.margins.items())[:MAX_LIMITS][::-1], len(verdict.margins)
     if not shown:
         say_why_empty(axis, "nothing moved")
         return
     for row, (_, quantiles) in enumerate(shown):
-        axis.plot(
-            [100.0 * quantiles.low, 100.0 * quantiles.high], [row, row], color=MAIN, lw=4.0, solid_capstyle="butt"
-        )
+        axis.hlines(row, 100.0 * quantiles.low, 100.0 * quantiles.high, color=MAIN, lw=4.0)
         axis.plot(100.0 * quantiles.middle, row, "o", color="w", mec=MAIN)
         axis.plot(100.0 * quantiles.largest, row, "|", color=SECOND, mew=2.0)
     axis.axvline(100.0, color=SECOND, lw=0.8, ls="--")
@@ -108,15 +104,9 @@ def _draw_margins(axis: "Axes", verdict: Verdict) -> None:
         handlelength=1.0,
         columnspacing=0.8,
         borderaxespad=0.2,
-        title=_closest(verdict),
+        title=f"the closest {MAX_LIMITS} of {count} limits" if count > MAX_LIMITS else "",
         alignment="left",
     )
-
-
-def _closest(verdict: Verdict) -> str:
-    """Say how many of the limits are drawn, if not all."""
-    count = len(verdict.margins)
-    return f"the closest {MAX_LIMITS} of {count} limits" if count > MAX_LIMITS else ""
 
 
 def _draw_times(axis: "Axes", rehearsal: Rehearsal) -> None:

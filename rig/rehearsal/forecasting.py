@@ -6,9 +6,9 @@ from dataclasses import asdict
 import numpy as np
 
 from rig.arming.rehearsed import Rehearsed
-from rig.rehearsal.forecast import GRID, Forecast, PointForecast
+from rig.rehearsal.forecast import GRID, QUANTITIES, Forecast, PointForecast
 from rig.rehearsal.rehearsal import Rehearsal
-from rig.rehearsal.verdict import QUANTITIES, verdict_of
+from rig.rehearsal.verdict import verdict_of
 
 MIN_DRAWS = 10  # least number of draws with a value for which quantiles are forecast; chosen
 

@@ -1,4 +1,4 @@
-"""What is known of a rig before a rehearsal, collect_knowledge from recordings, models and the plan."""
+"""What is known of a rig before a rehearsal, collected from recordings, models and the plan."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -8,14 +8,7 @@ import scipy
 from numpy.typing import NDArray
 
 from controller.tuning import PlantModel
-from identification import (
-    Exciter,
-    FrequencyResponseMatrix,
-    LinearModes,
-    ModalAnalysis,
-    NonlinearMode,
-    best_linear_approximation,
-)
+from identification import Exciter, LinearModes, ModalAnalysis, NonlinearMode, best_linear_approximation
 from rig.bench import Bench
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
@@ -55,7 +48,7 @@ class Knowledge:
 
 @dataclass
 class _Evidence:
-    """What has been collect_knowledge so far."""
+    """What has been collected so far."""
 
     responses: Responses | None = None
     priors: dict[str, Prior] = field(default_factory=dict)
@@ -77,10 +70,31 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
     """
     found = _Evidence()
     for name, source in sources.items():
-        _add(found, bench, name, source)
+        match source:
+            case Recording():
+                _recording(found, bench, name, source)
+            case ModalAnalysis():
+                _linear_modes(found, bench, name, source.modes)
+            case LinearModes():
+                _linear_modes(found, bench, name, source)
+            case Exciter():
+                _exciter(found, name, source)
+            case NonlinearMode():
+                found.mode = source
+                found.sources.append(
+                    f"{name}: frequency and damping over the amplitude, {source.amplitude_m.size} levels"
+                )
+            case _:
+                raise ConfigurationError(
+                    f"holds a {type(source).__name__}",
+                    field="sources",
+                    value=name,
+                    allowed="a recording of a multisine, linear modes, an exciter, a nonlinear mode",
+                )
     plant = plan.known_plant
     if found.responses is None and plant is not None:
-        _plant(found, bench, plant, _ratios(plan, bench))
+        ratios = plan.ratios_to_drive(bench) if isinstance(plan, Levels) else bench.response_ratios
+        _plant(found, bench, plant, ratios)
     if found.responses is None and not (found.exciter and found.shape):
         raise ConfigurationError(
             f"nothing tells of the exciter and the structure of the bench {bench.name}: give a recording of "
@@ -105,42 +119,24 @@ def collect_knowledge(bench: Bench, plan: Plan, sources: Mapping[str, object]) -
     )
 
 
-def _add(found: _Evidence, bench: Bench, name: str, source: object) -> None:
-    if isinstance(source, Recording):
-        _recording(found, bench, name, source)
-    elif isinstance(source, ModalAnalysis | LinearModes):
-        _linear_modes(found, bench, name, source.modes if isinstance(source, ModalAnalysis) else source)
-    elif isinstance(source, Exciter):
-        _exciter(found, name, source)
-    elif isinstance(source, NonlinearMode):
-        found.mode = source
-        found.sources.append(f"{name}: frequency and damping over the amplitude, {source.amplitude_m.size} levels")
-    else:
-        raise ConfigurationError(
-            f"holds a {type(source).__name__}",
-            field="sources",
-            value=name,
-            allowed="a recording of a multisine, linear modes, an exciter, a nonlinear mode",
-        )
-
-
 def _recording(found: _Evidence, bench: Bench, name: str, recording: Recording) -> None:
     if recording.kind != "multisine":
         raise ConfigurationError(
             f"is a recording of kind {recording.kind}", field="sources", value=name, allowed="a multisine"
         )
-    by_level = spectra(recording)
-    level = list(by_level)[-1]
-    measured = by_level[level]
+    level, measured = list(spectra(recording).items())[-1]
     names = _names(bench)
     if missing := [one for one in names if one not in [channel.name for channel in measured.channels]]:
         raise ConfigurationError(
             f"has no channel {missing[0]!r} of the bench {bench.name}", field="sources", value=name
         )
     matrix = best_linear_approximation(measured, outputs=names, inputs=("voltage",), specimen=bench.specimen.name)
+    total, noise = matrix.total_std[:, :, 0], matrix.noise_std[:, :, 0]
+    variance = np.nan_to_num(np.where(np.isfinite(total), total, noise)) ** 2
+    std = np.sqrt(scipy.ndimage.uniform_filter1d(variance, AVERAGED_LINES, axis=0, mode="nearest"))
     inside = _inside(bench, matrix.frequency_hz)
     found.responses = _thinned(
-        Responses(matrix.frequency_hz[inside], matrix.value[inside, :, 0], _std(matrix)[inside], bench.sample_rate_hz)
+        Responses(matrix.frequency_hz[inside], matrix.value[inside, :, 0], std[inside], bench.sample_rate_hz)
     )
     step = float(np.diff(measured.frequency_hz).mean())
     for one in names:
@@ -164,12 +160,6 @@ def _inside(bench: Bench, frequency_hz: Float) -> NDArray[np.bool_]:
     return np.asarray((frequency_hz > BAND[0] * linear) & (frequency_hz < BAND[1] * linear))
 
 
-def _std(matrix: FrequencyResponseMatrix) -> Float:
-    total, noise = matrix.total_std[:, :, 0], matrix.noise_std[:, :, 0]
-    variance = np.nan_to_num(np.where(np.isfinite(total), total, noise)) ** 2
-    return np.asarray(np.sqrt(scipy.ndimage.uniform_filter1d(variance, AVERAGED_LINES, axis=0, mode="nearest")))
-
-
 def _thinned(responses: Responses) -> Responses:
     """Keep at most `LINES` lines: half of them the nearest to the mode, the others spread over the band."""
     frequency = responses.frequency_hz
@@ -183,7 +173,6 @@ def _thinned(responses: Responses) -> Responses:
 
 
 def _start_from(found: _Evidence, bench: Bench, responses: Responses) -> None:
-    """Take start values from a fit of the plant, which needs none."""
     try:
         plant = PlantModel.from_frequency_responses(
             responses.frequency_hz,
@@ -238,12 +227,7 @@ def _plant(found: _Evidence, bench: Bench, plant: PlantModel, ratios: Mapping[st
     found.sources.append(f"the plan's [plant]: {low:.4g} to {high:.4g} Hz, within {100.0 * plant.fit_error:.2g} %")
 
 
-def _ratios(plan: Plan, bench: Bench) -> Mapping[str, float]:
-    return plan.ratios_to_drive(bench) if isinstance(plan, Levels) else bench.response_ratios
-
-
 def _linear_modes(found: _Evidence, bench: Bench, name: str, modes: LinearModes) -> None:
-    """Take frequency, damping and shape of the tested mode, with their standard errors."""
     tested = int(np.argmin(np.abs(modes.frequency_hz - bench.specimen.linear_frequency_hz)))
     drive = next(i for i, channel in enumerate(modes.channels) if channel.role == "drive")
     facts = {
@@ -266,16 +250,11 @@ def _linear_modes(found: _Evidence, bench: Bench, name: str, modes: LinearModes)
 
 
 def _exciter(found: _Evidence, name: str, exciter: Exciter) -> None:
-    """Take the exciter's parameters, with their standard errors."""
     std = exciter.std
-    damping, damping_std = exciter.damping_n_s_m
-    values = {
-        "force_per_volt_n_v": (abs(exciter.force_per_volt_n_v), std["force_per_volt_n_v"]),
-        "coil_time_constant_s": (exciter.coil_time_constant_s, std["coil_time_constant_s"]),
-        "moving_mass_kg": (exciter.moving_mass_kg, std["moving_mass_kg"]),
-        "exciter_damping_n_s_m": (damping, damping_std),
-        "suspension_stiffness_n_m": (exciter.suspension_stiffness_n_m, std["suspension_stiffness_n_m"]),
-    }
+    names = ("force_per_volt_n_v", "coil_time_constant_s", "moving_mass_kg", "suspension_stiffness_n_m")
+    values = {name: (getattr(exciter, name), std[name]) for name in names}
+    values["force_per_volt_n_v"] = (abs(exciter.force_per_volt_n_v), std["force_per_volt_n_v"])
+    values["exciter_damping_n_s_m"] = exciter.damping_n_s_m
     for key, (value, error) in values.items():
         if value > 0.0:
             relative = error / value if np.isfinite(error) and error > 0.0 else 0.02

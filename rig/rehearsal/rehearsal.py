@@ -3,7 +3,8 @@
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,7 +16,6 @@ from rig.arming.rehearsed import subject_digest
 from rig.bench import Bench
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
-from rig.rehearsal.effect import Effect
 from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
 from rig.rehearsal.trial import Trial, not_computed, run_trial
@@ -43,10 +43,28 @@ class Draw:
 
 
 _DRAWS = TypeAdapter(list[Draw])  # reader of a journal's draws; keys of other versions are ignored
-
-
 Table = dict[str, JsonValue]
 """Keys of a plan, a bench or hypotheses, as in JSON."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a remedy did on the twins on which it was tried."""
+
+    name: str
+    """The remedy."""
+    changes: Table
+    """Keys of the plan with their new values."""
+    ends_well: tuple[float, float]
+    """Probability that the plan ends well, without and with it."""
+    trips: tuple[float, float]
+    """Probability of a trip, without and with it."""
+    points: tuple[float, float]
+    """Accepted points over those of the plan as it was given, in the mean, without and with it; at most 1."""
+    draws: int
+    """Number of twins on which it was tried."""
+    taken: bool = False
+    """Whether it is part of the improved plan."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,6 +155,7 @@ class RehearsalRequest:
     def __call__(self, number: int) -> Draw:
         """Draw a twin and run the plan on it. A twin that cannot be computed is a result too: the others go on."""
         unknowns: Mapping[str, float] = {}
+        truth = NOT_BALANCED
         try:
             twin = self.twin(number)
             unknowns = twin.unknowns
@@ -144,11 +163,11 @@ class RehearsalRequest:
         except (OSError, MemoryError):  # of the machine, not of the twin
             raise
         except Exception as error:  # whatever a drawn rig does to the numbers
-            return Draw(number=number, unknowns=unknowns, trial=not_computed(error), truth=NOT_BALANCED)
-        truth = (
-            true_backbone(twin.bench, trial, twin.number, self.plan.law.harmonics) if self.balanced else NOT_BALANCED
-        )
-        return Draw(number=number, unknowns=twin.unknowns, trial=trial, truth=truth)
+            trial = not_computed(error)
+        else:
+            if self.balanced:
+                truth = true_backbone(twin.bench, trial, twin.number, self.plan.law.harmonics)
+        return Draw(number=number, unknowns=unknowns, trial=trial, truth=truth)
 
     @property
     def facts(self) -> RehearsalFacts:
@@ -271,12 +290,14 @@ def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool)
         lines = journal.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{journal}: cannot be read ({error})") from None
-    tables = list(_complete_lines(lines))
-    if begin_anew and tables[:1] != [head]:
-        discard_draws(journal)
-        _append(journal, head)
-        return {}
-    if not tables or tables[0] != head:
+    tables: list[Mapping[str, object]] = []
+    with suppress(json.JSONDecodeError):  # from a last line that was cut off
+        tables.extend(json.loads(line) for line in lines)
+    if tables[:1] != [head]:
+        if begin_anew:
+            discard_draws(journal)
+            _append(journal, head)
+            return {}
         raise RecordingError(
             f"{journal}: holds the draws of another rehearsal (another plan, bench, knowledge, seed or version); "
             "`overwrite` to begin anew"
@@ -287,14 +308,6 @@ def _completed_draws(journal: Path, request: RehearsalRequest, begin_anew: bool)
             _append(journal, table)
     draws = _DRAWS.validate_python(tables[1:])
     return {draw.number: draw for draw in draws if draw.number < request.draws}
-
-
-def _complete_lines(lines: Iterable[str]) -> Iterator[Mapping[str, object]]:
-    for line in lines:
-        try:
-            yield json.loads(line)
-        except json.JSONDecodeError:
-            return
 
 
 def _append(journal: Path, table: Mapping[str, object]) -> None:

@@ -12,17 +12,10 @@ from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan
 from rig.campaigns.plans import plan_from
 from rig.errors import RigError
-from rig.rehearsal.effect import Effect
-from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, Table
+from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalRequest, Table
 from simulators.ensemble import ensemble
 
-GAINS = (
-    "k1",
-    "k2",
-    "frequency_integral_per_s",
-    "response_integral_per_s",
-    "reference_integral_per_s",
-)
+GAINS = ("k1", "k2", "frequency_integral_per_s", "response_integral_per_s", "reference_integral_per_s")
 """Gains of a loop that a remedy scales."""
 MAX_EACH = 24
 """Draws that failed, and draws that ended well, on which a remedy is tried; chosen: a compromise with the time it takes."""
@@ -56,13 +49,8 @@ class Improvement:
 def remedies_for(plan: Plan, bench: Bench, draws: Sequence[Draw]) -> list[Remedy]:
     """Return the changes that may help this kind of plan on this bench."""
     table = plan.model_dump(mode="json")
-    return (
-        list(_ramps(table))
-        + list(_windows(table, bench))
-        + list(_levels(plan, draws))
-        + list(_gains(table))
-        + list(_waiting_times(table))
-    )
+    levels = _levels(plan, draws) if isinstance(plan, Levels) else ()
+    return [*_ramps(table), *_windows(table, bench), *levels, *_gains(table), *_waiting_times(table)]
 
 
 def _ramps(table: Table) -> Iterator[Remedy]:
@@ -87,16 +75,14 @@ def _windows(table: Table, bench: Bench) -> Iterator[Remedy]:
             yield Remedy(f"a frequency window {times:g} times as wide", {"controller": wider})
 
 
-def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
-    if not isinstance(plan, Levels):
-        return
+def _levels(plan: Levels, draws: Sequence[Draw]) -> Iterator[Remedy]:
     key, levels, start = plan.levels_key, sorted(plan.levels), plan.start_v
     lower: Table = {key: [levels[0] / 3.0, *levels]}
     if start is not None:
         lower["start_v"] = start / 3.0
     yield Remedy("a first level of a third", lower)
     if len(levels) > 1:
-        higher: Table = {key: levels[1:]}
+        higher: Table = {key: [*levels[1:]]}
         if start is not None:
             higher["start_v"] = start * levels[1] / levels[0]
         yield Remedy("without the lowest level", higher)
@@ -105,16 +91,15 @@ def _levels(plan: Plan, draws: Sequence[Draw]) -> Iterator[Remedy]:
     tripped = [draw.trial.level for draw in draws if draw.trial.tripped and np.isfinite(draw.trial.level)]
     below = [level for level in levels if not tripped or level < min(tripped) * (1.0 - 1e-9)]
     if below and len(below) < len(levels):
-        yield Remedy(f"levels up to {below[-1]:.3g} {plan.level_unit}", {key: below})
+        yield Remedy(f"levels up to {below[-1]:.3g} {plan.level_unit}", {key: [*below]})
 
 
 def _gains(table: Table) -> Iterator[Remedy]:
     controller = _section(table, "controller")
     gains = {name: gain for name in GAINS if isinstance(gain := controller.get(name), int | float) and gain}
-    for words, times in (("half", 0.5), ("twice", 2.0)):
-        if gains:
-            scaled: Table = {name: times * gain for name, gain in gains.items()}
-            yield Remedy(f"{words} the gains", {"controller": scaled})
+    for words, times in (("half", 0.5), ("twice", 2.0)) if gains else ():
+        scaled: Table = {name: times * gain for name, gain in gains.items()}
+        yield Remedy(f"{words} the gains", {"controller": scaled})
 
 
 def _waiting_times(table: Table) -> Iterator[Remedy]:
@@ -127,7 +112,6 @@ def _waiting_times(table: Table) -> Iterator[Remedy]:
 
 
 def _section(table: Table, key: str) -> Table:
-    """Return a table within a table; empty without one."""
     section = table.get(key)
     return section if isinstance(section, dict) else {}
 
@@ -148,9 +132,11 @@ def improve(
     """
     failed = [draw for draw in rehearsal.draws if draw.trial.computed and not draw.trial.completed]
     well = [draw for draw in rehearsal.draws if draw.trial.completed]
-    sample = [*_evenly_chosen(failed), *_evenly_chosen(well)]
-    weights = {d.number: len(failed) / max(len(_evenly_chosen(failed)), 1) for d in failed}
-    weights |= {d.number: len(well) / max(len(_evenly_chosen(well)), 1) for d in well}
+    sample, weights = list[Draw](), dict[int, float]()
+    for draws in (failed, well):
+        chosen = _evenly_chosen(draws)
+        sample += chosen
+        weights |= {draw.number: len(draws) / len(chosen) for draw in chosen}
     plan, effects = request.plan, list[Effect]()
     changes: Mapping[str, object] = {}
     asked = len(request.plan.targets())
@@ -171,7 +157,8 @@ def improve(
             effect = Effect(remedy.name, remedy.changes, both[0], both[1], both[2], len(sample))
             effects.append(effect)
             progress(effect)
-            tried.append((_score(after) - _score(before), -_duration_s(found), remedy, changed, found))
+            duration_s = float(np.nanmedian([draw.trial.duration_s for draw in found]))
+            tried.append((_score(after) - _score(before), -duration_s, remedy, changed, found))
         if not tried:
             break
         rise, _, remedy, changed, found = max(tried, key=lambda entry: (round(entry[0], 6), entry[1]))
@@ -182,13 +169,9 @@ def improve(
         ]
         plan, now = changed, found
         changes = merged(changes, remedy.changes)
-        candidates = [one for one in remedies_for(plan, request.bench, found) if not _same_kind(one, remedy)]
+        taken = set(_paths(remedy.changes))  # what changes the same keys is not tried again
+        candidates = [one for one in remedies_for(plan, request.bench, found) if taken.isdisjoint(_paths(one.changes))]
     return Improvement(plan, changes, tuple(effects))
-
-
-def _same_kind(one: Remedy, taken: Remedy) -> bool:
-    """Whether a remedy changes what another has changed."""
-    return set(_paths(one.changes)) & set(_paths(taken.changes)) != set()
 
 
 def _paths(changes: Mapping[str, object], prefix: str = "") -> Iterator[str]:
@@ -200,7 +183,6 @@ def _paths(changes: Mapping[str, object], prefix: str = "") -> Iterator[str]:
 
 
 def _evenly_chosen(draws: Sequence[Draw]) -> list[Draw]:
-    """Return at most `MAX_EACH` draws, spread evenly."""
     if len(draws) <= MAX_EACH:
         return list(draws)
     return [draws[i] for i in np.linspace(0, len(draws) - 1, MAX_EACH).round().astype(int)]
@@ -216,18 +198,12 @@ def _rates(draws: Sequence[Draw], weights: Mapping[int, float], asked: int) -> t
     return well, trips, points
 
 
-def _duration_s(draws: Sequence[Draw]) -> float:
-    """Median test time; of remedies that help equally, the quickest is taken."""
-    return float(np.nanmedian([draw.trial.duration_s for draw in draws]))
-
-
 def _score(rates: tuple[float, float, float]) -> float:
     """Value of a plan: points that it gives, less its trips. Fewer levels are no gain by themselves."""
     return rates[2] - TRIP_WEIGHT * rates[1]
 
 
 def _changed(plan: Plan, changes: Table, bench: Bench) -> Plan | None:
-    """Return the changed plan; None if it is not allowed."""
     try:
         changed = plan_from(merged(plan.model_dump(mode="json", exclude_none=True), changes), "changed plan")
         changed.check(bench)
@@ -237,5 +213,4 @@ def _changed(plan: Plan, changes: Table, bench: Bench) -> Plan | None:
 
 
 def _rerun(request: RehearsalRequest, sample: Sequence[Draw], jobs: int | None) -> list[Draw]:
-    """Run a changed plan on some of the twins of the rehearsal."""
     return [draw for _, draw in ensemble({str(d.number): d.number for d in sample}, request, n_jobs=jobs)]

@@ -4,10 +4,8 @@ import math
 
 from pydantic import JsonValue
 
-from rig.rehearsal.effect import Effect
-from rig.rehearsal.rehearsal import Rehearsal
-from rig.rehearsal.statistics import Proportion, Statistic
-from rig.rehearsal.verdict import Verdict, verdict_of
+from rig.rehearsal.rehearsal import Effect, Rehearsal
+from rig.rehearsal.verdict import Proportion, Statistic, Verdict, verdict_of
 
 MAX_LIMITS, MAX_REASONS, MAX_INFLUENCES = 5, 3, 6
 """Limits, reasons of one refusal, and influences that are printed; chosen: the page fits on a screen."""
@@ -66,13 +64,12 @@ def summary(rehearsal: Rehearsal) -> Summary:
 
 def verdict_in_one_line(found: Summary) -> str:
     """Return how probably the plan ends well and trips, on how many twins, and what to do if that is not enough."""
-    verdict = found.verdict
-    well, trips = verdict.ends_well, verdict.trips
+    well, trips = found.verdict.ends_well, found.verdict.trips
     out = (
         f"on {found.draws} twins of what was measured, by the default hypotheses, it ends well in {_proportion(well)} and "
         f"trips in {_proportion(trips)}"
     )
-    if missing := not_computed_in_one_line(verdict):
+    if missing := not_computed_in_one_line(found.verdict):
         out += f"; {missing}"
     if well.value < GOOD_ENDS_WELL or trips.count:
         out += "; rig rehearse --improve tries what would help"
@@ -106,7 +103,7 @@ def lines(found: Summary) -> list[str]:
         levels = ", ".join(f"{one.count} at {one.level:.4g}" for one in way.levels if not math.isnan(one.level))
         on = f" on channel {way.channel}" if way.channel else ""
         at = f" ({levels} {found.level_unit})" if levels else ""
-        out.append(f"                {_cause(way.cause)}{on}: {way.count} of {way.of}{at}")
+        out.append(f"                {way.cause.lower().replace('_', ' ')}{on}: {way.count} of {way.of}{at}")
     out.append(f"loses the lock  {_proportion(verdict.lost_lock)}")
     out += _point_lines(found)
     time = verdict.duration_s
@@ -114,11 +111,22 @@ def lines(found: Summary) -> list[str]:
     for name, quantiles in list(verdict.margins.items())[:MAX_LIMITS]:
         most = f"95 % below {_percent(quantiles.high)}, most {_percent(quantiles.largest)}"
         out.append(f"of its limit    {name}: {_percent(quantiles.middle)}, {most}")
-    out += _accuracy(verdict)
+    frequency, damping = verdict.frequency_error, verdict.damping_error
+    if frequency.n:
+        text = f"accuracy        against harmonic balance ({frequency.n} points): frequency {_ppm(frequency.middle)}"
+        text += f", 95 % below {_ppm(frequency.high)}"
+        if damping.n:
+            text += f"; damping {_percent(damping.middle)}, 95 % below {_percent(damping.high)}"
+        out.append(text)
     for one in verdict.influences[:MAX_INFLUENCES]:
         advice = f"; {one.advice}" if one.advice else ""
         out.append(f"matters         {one.unknown} for {one.outcome} (rank correlation {one.correlation:+.2f}){advice}")
-    out += [_tried(one) for one in found.tried]
+    for tried in found.tried:
+        (well, then), (trips, later) = tried.ends_well, tried.trips
+        out.append(
+            f"{'taken' if tried.taken else 'tried'}           {tried.name}: ends well {_percent(well)} -> {_percent(then)}, "
+            f"trips {_percent(trips)} -> {_percent(later)} ({tried.draws} twins)"
+        )
     out.append(f"digest          {found.digest}, plan and bench {found.tests}, {found.finished}")
     return out
 
@@ -140,26 +148,6 @@ def _point_lines(found: Summary) -> list[str]:
     return out
 
 
-def _accuracy(verdict: Verdict) -> list[str]:
-    frequency, damping = verdict.frequency_error, verdict.damping_error
-    if not frequency.n:
-        return []
-    text = f"accuracy        against harmonic balance ({frequency.n} points): frequency {_ppm(frequency.middle)}"
-    text += f", 95 % below {_ppm(frequency.high)}"
-    if damping.n:
-        text += f"; damping {_percent(damping.middle)}, 95 % below {_percent(damping.high)}"
-    return [text]
-
-
-def _tried(one: Effect) -> str:
-    (well, then), (trips, later) = one.ends_well, one.trips
-    taken = "taken          " if one.taken else "tried          "
-    return (
-        f"{taken} {one.name}: ends well {_percent(well)} -> {_percent(then)}, trips {_percent(trips)} -> {_percent(later)} "
-        f"({one.draws} twins)"
-    )
-
-
 def _proportion(found: Proportion) -> str:
     interval = f"{_percent(found.interval[0])} to {_percent(found.interval[1])}"
     return f"{_percent(found.value)} ({interval}; {found.count} of {found.of})"
@@ -175,7 +163,3 @@ def _ppm(value: float) -> str:
 
 def _time(seconds: float) -> str:
     return "-" if math.isnan(seconds) else f"{seconds:.3g} s" if seconds < 120.0 else f"{seconds / 60.0:.3g} min"
-
-
-def _cause(name: str) -> str:
-    return name.lower().replace("_", " ")

@@ -1,7 +1,7 @@
 """Trial of a rehearsal: the plan on one virtual rig, by the same runner, loop and evaluation as a test."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
 from itertools import count
 
 import numpy as np
@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from rig.arming.run_options import Silent
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point
-from rig.campaigns.evaluation.stored_point import point_from
-from rig.campaigns.kinds import KINDS
+from rig.campaigns.evaluation.stored_point import point_from, value_of
 from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.attempts import MeasuredBefore
 from rig.campaigns.running.execution import Execution
-from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.runner import tick_settings
 from rig.errors import RigError
 from rig.loop.session import open_session
@@ -70,6 +69,10 @@ class TrialPoint:
     def accepted(self) -> bool:
         """Whether the point is used."""
         return self.quality in ("good", "warned")
+
+
+MEASURED = tuple(one.name for one in fields(TrialPoint) if one.type is float and one.default is not MISSING)
+"""Names of the measured quantities of a point."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,14 +189,13 @@ def run_trial(plan: Plan, bench: Bench, seed: int = 0) -> Trial:
         plan.check(bench)
     except RigError as error:
         return Trial(end=REFUSED, text=str(error), duration_s=0.0)
-    journal = _MemoryJournal()
-    execution, samples = _part(plan, bench, seed, journal, None)
-    for number in count(1):
+    journal, samples, before = _MemoryJournal(), 0, MeasuredBefore()
+    for number in count():
+        execution, more = _part(plan, bench, seed + number * FURTHER_PART, journal, before)
+        samples += more
         if not execution.to_repeat:
             break
         before = execution.measured_before_repeat(journal.points)
-        execution, more = _part(plan, bench, seed + number * FURTHER_PART, journal, before)
-        samples += more
     return _trial(bench, execution, samples, journal)
 
 
@@ -206,12 +208,12 @@ def _without_harmonic_plant(plan: Plan) -> Plan:
 
 
 def _part(
-    plan: Plan, bench: Bench, seed: int, journal: _MemoryJournal, before: MeasuredBefore | None
+    plan: Plan, bench: Bench, seed: int, journal: _MemoryJournal, before: MeasuredBefore
 ) -> tuple[Execution, int]:
-    """Run a part of the test: all of the plan, or again what was refused for something that passes."""
-    done = frozenset[int]() if before is None else before.done | before.given_up
+    """Run what ``before`` has left of a plan; return its execution and the number of samples."""
     with open_session(bench, seed) as session:
-        settings = tick_settings(plan, bench, plan.segments(bench.sample_rate_hz, done))
+        segments = plan.segments(bench.sample_rate_hz, before.done | before.given_up)
+        settings = tick_settings(plan, bench, segments)
         loop = session.start(settings)
         journal.peaks = journal.peaks or _Peaks(bench, loop.tick.arrays.limits)
         execution = Execution(plan, bench, loop, journal, Silent(), before)
@@ -222,6 +224,7 @@ def _part(
 def _trial(bench: Bench, execution: Execution, samples: int, journal: _MemoryJournal) -> Trial:
     end, tripped = journal.ended, bool(journal.ended["tripped"])
     at, channel = end.get("tripped_at"), int(execution.tick.guard["channel"][0])
+    latest = {table["number"]: table for table in journal.points}
     return Trial(
         end=str(end["reason"]).upper(),
         text=str(end["text"]),
@@ -231,7 +234,7 @@ def _trial(bench: Bench, execution: Execution, samples: int, journal: _MemoryJou
         level=float(at["level"]) if isinstance(at, Mapping) else float("nan"),
         duration_s=samples / bench.sample_rate_hz,
         shares=journal.peaks.shares() if journal.peaks is not None else {},
-        points=tuple(_points(execution.plan, journal.points)),
+        points=tuple(_point(point_from(table, execution.kind.result)) for table in latest.values()),
     )
 
 
@@ -241,29 +244,15 @@ def not_computed(error: Exception) -> Trial:
     return Trial(end=NOT_COMPUTED, text=text, duration_s=float("nan"))
 
 
-def _points(plan: Plan, stored: Sequence[Mapping[str, object]]) -> list[TrialPoint]:
-    result = KINDS[plan.kind].result
-    latest = {table["number"]: table for table in stored}
-    return [_point(point_from(table, result)) for table in latest.values()]
-
-
 def _point(point: Point[object]) -> TrialPoint:
-    found: dict[str, float | None] = {"settle_periods": point.settle_periods}
-    if point.vibration is not None:
-        for name in ("frequency_hz", "force_n", "amplitude_m", "voltage_v"):
-            found[name] = getattr(point.vibration, name)
-    if point.modal is not None:
-        found["modal_frequency_hz"] = point.modal.modal_frequency_hz
-        found["frequency_std_hz"] = point.modal.modal_frequency_std_hz
-        found["damping_ratio"] = point.modal.damping_ratio
-        found["damping_ratio_std"] = point.modal.damping_ratio_std
-    if point.lock is not None:
-        found["phase_error_deg"] = point.lock.phase_error_deg
+    values = {
+        name: value_of(point, {"frequency_std_hz": "modal_frequency_std_hz"}.get(name, name)) for name in MEASURED
+    }
     return TrialPoint(
         number=point.number,
         level=point.level,
         quality=str(point.quality),
         reason=point.reason,
-        refused_before=len(point.refused_before or ()),
-        **{name: float(value) for name, value in found.items() if value is not None},
+        refused_before=len(point.refused_before),
+        **{name: float(value) for name, value in values.items() if value is not None},
     )

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification import NonlinearMode
 from rig.bench import Bench
 from rig.bench.bench import DriverChoice
 from rig.campaigns.planning.plan import Plan
@@ -74,9 +73,8 @@ class _Sample:
         values = dict(rig.values)
         self._drift(values)
         self.linear = LinearRig(values, rig.channels)
-        for name in ("frequency_hz", "damping_ratio", "drive_shape"):
+        for name in ("frequency_hz", "damping_ratio", "drive_shape", "moving_mass_kg"):
             self.unknowns[name] = values[name]
-        self.unknowns["moving_mass_kg"] = values["moving_mass_kg"]
         self.omega = 2.0 * math.pi * values["frequency_hz"]
         self.highest_m = highest_displacement_m(bench, plan, self.linear)
         self.elements: list[Element] = []
@@ -88,9 +86,14 @@ class _Sample:
         return bool(self.generator.random() < probability)
 
     def _log_uniform(self, bounds: tuple[float, float]) -> float:
-        """Draw a number between two bounds, evenly in its logarithm."""
         low, high = bounds
         return float(low * (high / low) ** self.generator.random())
+
+    def _property(
+        self, probability: float, first: tuple[float, float], second: tuple[float, float]
+    ) -> tuple[bool, float, float]:
+        """Draw whether the twin has a property, and its two sizes."""
+        return self._happens(probability), self._log_uniform(first), self._log_uniform(second)
 
     def _drift(self, values: dict[str, float]) -> None:
         hypotheses, normal = self.hypotheses, self.generator.standard_normal
@@ -109,20 +112,10 @@ class _Sample:
         kind, place = self.generator.random(), self.generator.random()
         shift = self._log_uniform(hypotheses.shift)
         growth = self._log_uniform(hypotheses.damping_growth)
-        joint, joint_shift, slip = (
-            self._happens(hypotheses.joint),
-            self._log_uniform(hypotheses.joint_shift),
-            self._log_uniform(hypotheses.joint_slip),
-        )
-        stop, gap, stiffness = (
-            self._happens(hypotheses.stop),
-            self._log_uniform(hypotheses.stop_gap),
-            self._log_uniform(hypotheses.stop_stiffness),
-        )
-        second, at, shape = (
-            self._happens(hypotheses.second_mode),
-            self._log_uniform(hypotheses.second_mode_at),
-            self._log_uniform(hypotheses.second_mode_shape),
+        joint, joint_shift, slip = self._property(hypotheses.joint, hypotheses.joint_shift, hypotheses.joint_slip)
+        stop, gap, stiffness = self._property(hypotheses.stop, hypotheses.stop_gap, hypotheses.stop_stiffness)
+        second, at, shape = self._property(
+            hypotheses.second_mode, hypotheses.second_mode_at, hypotheses.second_mode_shape
         )
         points = ["drive", *self.linear.channels]
         self.at = points[int(place * len(points))]
@@ -134,14 +127,14 @@ class _Sample:
             self._velocity_damping(growth)
             self._joint(joint_shift if joint else 0.0, slip)
         else:
-            self._measured_mode(self.knowledge.mode)
+            self.elements.extend(elements_of(self.knowledge.mode, self.linear, self.generator))
+            self.unknowns |= {"shift": 0.0, "damping_growth": 1.0, "joint_shift": 0.0, "joint_slip": 0.0}
         self._stop(gap if stop else 0.0, stiffness)
         self.unknowns["second_mode"] = at if second and abs(at - 1.0) > 0.05 else 0.0
         if self.unknowns["second_mode"]:
             self.extra_mode = (at * self.linear.of("frequency_hz"), shape * self.linear.of("drive_shape"))
 
     def _modal_stiffness(self, at_ratio: float) -> float:
-        """Stiffness of the tested mode seen at a point, N/m."""
         return self.omega**2 / (at_ratio * self.linear.of("drive_shape")) ** 2
 
     def _spring(self, shift: float) -> None:
@@ -186,11 +179,6 @@ class _Sample:
                     "contact_stiffness_n_m": stiffness * self._modal_stiffness(self.ratio),
                 }
             )
-
-    def _measured_mode(self, mode: NonlinearMode) -> None:
-        """Add springs and dampers that give frequency and damping over the amplitude as measured."""
-        self.elements.extend(elements_of(mode, self.linear, self.generator))
-        self.unknowns |= {"shift": 0.0, "damping_growth": 1.0, "joint_shift": 0.0, "joint_slip": 0.0}
 
     def twin_bench(self, number: int) -> Bench:
         """Return the bench with this rig behind its driver."""
@@ -287,12 +275,8 @@ class _Sample:
         bench, hypotheses = self.bench, self.hypotheses
         faults = {name: getattr(hypotheses, name) for name in ("late_per_s", "held_per_s", "lost_per_s")}
         if bench.driver.name == "virtual":
-            own = VirtualDAQ(bench)
-            converter = own.rig.converter.model_dump()
-            kept = {
-                key: value for key, value in bench.driver.options.items() if key in ("queue_blocks", "delay_samples")
-            }
-            return {"converter": converter, **kept, "faults": faults}
+            kept = {k: v for k, v in bench.driver.options.items() if k in ("queue_blocks", "delay_samples")}
+            return {"converter": VirtualDAQ(bench).rig.converter.model_dump(), **kept, "faults": faults}
         rate = bench.sample_rate_hz
         bits = round(math.log2(2.0 * bench.output_range_v / min(c.resolution_v for c in bench.channels)))
         converter = {

@@ -2,20 +2,70 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import scipy
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, SerializerFunctionWrapHandler, model_serializer
 
+from rig.rehearsal.forecast import QUANTITIES
 from rig.rehearsal.rehearsal import Draw, Rehearsal
-from rig.rehearsal.statistics import Proportion, Quantiles, Statistic
-from vibrolock.arrays import Float
+
+
+class Statistic(BaseModel):
+    """Base of all parts of a verdict; JSON has the names of its fields or their aliases."""
+
+    model_config = ConfigDict(frozen=True, populate_by_name=True)
+
+
+class Proportion(Statistic):
+    """Probability estimated from a number of draws, with its 95 % interval (Wilson's score interval)."""
+
+    count: int
+    """Number of draws in which it happened."""
+    of: int
+    """Number of draws."""
+
+    @property
+    def value(self) -> float:
+        """The estimate; NaN without draws."""
+        return self.count / self.of if self.of else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Lower and upper end."""
+        if not self.of:
+            return 0.0, 1.0
+        found = scipy.stats.binomtest(self.count, self.of).proportion_ci(0.95, method="wilson")
+        return float(found.low), float(found.high)
+
+    @model_serializer(mode="wrap")
+    def _with_interval(self, fields: SerializerFunctionWrapHandler) -> dict[str, JsonValue]:
+        low, high = self.interval
+        return {**fields(self), "value": self.value, "low": low, "high": high}
+
+
+class Quantiles(Statistic):
+    """Quantiles of a quantity over the draws: 5 %, 50 % and 95 %, and the largest; NaN if no draw has one."""
+
+    low: float = Field(float("nan"), alias="5 %")
+    middle: float = Field(float("nan"), alias="50 %")
+    high: float = Field(float("nan"), alias="95 %")
+    largest: float = float("nan")
+    n: int = 0
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> "Quantiles":
+        """Return the quantiles of the finite values."""
+        finite = np.array([v for v in values if np.isfinite(v)])
+        if not finite.size:
+            return cls()
+        low, middle, high = np.quantile(finite, [0.05, 0.5, 0.95]).tolist()
+        return cls(low=low, middle=middle, high=high, largest=float(finite.max()), n=finite.size)
+
 
 SIGNIFICANCE = 0.01  # probability, over all tests together, that an influence is found by chance; chosen
 MIN_DRAWS = 8  # least number of draws with a finite value for which an influence is tested; chosen
-QUANTITIES = ("frequency_hz", "force_n", "amplitude_m", "voltage_v", "damping_ratio")
-"""Quantities of a point that a rehearsal evaluates."""
 ADVICE = {
     "frequency_hz": "measure the frequency again just before the test (`rig check`)",
     "damping_ratio": "measure the damping with finer lines (`rig tune`)",
@@ -124,6 +174,9 @@ def verdict_of(rehearsal: Rehearsal) -> Verdict:
     missing = [draw.trial.text for draw in rehearsal.draws if not draw.trial.computed]
     n = len(draws)
     errors = [_errors(draw) for draw in draws]
+    levels = {point.number: point.level for draw in draws for point in draw.trial.points}
+    limits = {name for draw in draws for name in draw.trial.shares}
+    margins = {name: Quantiles.of(d.trial.shares[name] for d in draws if name in d.trial.shares) for name in limits}
     return Verdict(
         not_computed=Proportion(count=len(missing), of=len(rehearsal.draws)),
         why_not_computed=dict(Counter(map(without_numbers, missing)).most_common()),
@@ -131,9 +184,9 @@ def verdict_of(rehearsal: Rehearsal) -> Verdict:
         trips=Proportion(count=sum(d.trial.tripped for d in draws), of=n),
         lost_lock=Proportion(count=sum(d.trial.lost_lock for d in draws), of=n),
         ways_to_trip=_ways(draws),
-        points=_points(draws),
+        points=tuple(_point(number, levels[number], draws) for number in sorted(levels)),
         duration_s=Quantiles.of(d.trial.duration_s for d in draws),
-        margins=_margins(draws),
+        margins=dict(sorted(margins.items(), key=lambda entry: (-entry[1].high, entry[0]))),
         frequency_error=Quantiles.of(e for found in errors for e in found[0]),
         damping_error=Quantiles.of(e for found in errors for e in found[1]),
         influences=_influences(draws),
@@ -142,13 +195,12 @@ def verdict_of(rehearsal: Rehearsal) -> Verdict:
 
 def _errors(draw: Draw) -> tuple[list[float], list[float]]:
     """Sizes of the relative errors of frequency and damping of a draw's points."""
-    by_number = {point.number: point for point in draw.trial.points}
-    truth = draw.truth
-    frequency, damping = [], []
-    for number, hertz, ratio in zip(truth.numbers, truth.frequency_hz, truth.damping_ratio, strict=True):
-        frequency.append(abs(by_number[number].modal_frequency_hz / hertz - 1.0))
-        damping.append(abs(by_number[number].damping_ratio / ratio - 1.0))
-    return frequency, damping
+    truth, by_number = draw.truth, {point.number: point for point in draw.trial.points}
+    points = [by_number[number] for number in truth.numbers]
+    return (
+        [abs(point.modal_frequency_hz / hertz - 1.0) for point, hertz in zip(points, truth.frequency_hz, strict=True)],
+        [abs(point.damping_ratio / ratio - 1.0) for point, ratio in zip(points, truth.damping_ratio, strict=True)],
+    )
 
 
 def _ways(draws: Sequence[Draw]) -> tuple[TripVerdict, ...]:
@@ -167,13 +219,6 @@ def _ways(draws: Sequence[Draw]) -> tuple[TripVerdict, ...]:
         for (cause, channel), levels in found.items()
     ]
     return tuple(sorted(ways, key=lambda way: -way.count))
-
-
-def _points(draws: Sequence[Draw]) -> tuple[PointVerdict, ...]:
-    levels: dict[int, float] = {}
-    for draw in draws:
-        levels |= {point.number: point.level for point in draw.trial.points}
-    return tuple(_point(number, levels[number], draws) for number in sorted(levels))
 
 
 def _point(number: int, level: float, draws: Sequence[Draw]) -> PointVerdict:
@@ -198,12 +243,6 @@ def without_numbers(text: str) -> str:
     return re.sub(r"(?<![A-Za-z_])[-+]?\d[\d.]*(?:e[-+]?\d+)?", "…", text)
 
 
-def _margins(draws: Sequence[Draw]) -> dict[str, Quantiles]:
-    names = {name for draw in draws for name in draw.trial.shares}
-    bands = {name: Quantiles.of(d.trial.shares[name] for d in draws if name in d.trial.shares) for name in names}
-    return dict(sorted(bands.items(), key=lambda entry: (-entry[1].high, entry[0])))
-
-
 OUTCOMES: dict[str, Callable[[Draw], float]] = {
     "ends well": lambda draw: float(draw.trial.completed),
     "trip": lambda draw: float(draw.trial.tripped),
@@ -224,24 +263,16 @@ def _influences(draws: Sequence[Draw]) -> tuple[Influence, ...]:
         values = np.array([value(draw) for draw in draws])
         for name in names:
             drawn = np.array([draw.unknowns.get(name, np.nan) for draw in draws])
-            for of, x in _transforms(name, drawn):
+            tests = [(name, drawn), (f"size of {name}", np.abs(drawn))] if name == "shift" else [(name, drawn)]
+            for of, x in tests:
                 kept = np.isfinite(values) & np.isfinite(x)
                 if kept.sum() < MIN_DRAWS or np.ptp(values[kept]) == 0.0 or np.ptp(x[kept]) == 0.0:
                     continue
                 found = scipy.stats.spearmanr(x[kept], values[kept])
-                if found.pvalue < SIGNIFICANCE / tested:
+                correlation, p_value = float(found.statistic), float(found.pvalue)
+                if p_value < SIGNIFICANCE / tested:
+                    advice = ADVICE.get(name, "")
                     out.append(
-                        Influence(
-                            outcome=outcome,
-                            unknown=of,
-                            correlation=float(found.statistic),
-                            p_value=float(found.pvalue),
-                            advice=ADVICE.get(name, ""),
-                        )
+                        Influence(outcome=outcome, unknown=of, correlation=correlation, p_value=p_value, advice=advice)
                     )
     return tuple(sorted(out, key=lambda one: -abs(one.correlation)))
-
-
-def _transforms(name: str, drawn: Float) -> list[tuple[str, Float]]:
-    """Return the transforms of an unknown that are tested: of a shift, its value and its magnitude."""
-    return [(name, drawn), (f"size of {name}", np.abs(drawn))] if name == "shift" else [(name, drawn)]

@@ -14,14 +14,14 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.campaigns.plans import plan_from
 from rig.campaigns.running.continuation import changed_keys
-from rig.check.recorded import is_check
+from rig.check.findings import is_check
 from rig.check.report import summary
 from rig.recording.arrays import kind_of
 from rig.recording.layout import file_integrity
 from rig.recording.parts import Part
 from rig.recording.reader import Recording
 from rig.recording.stored import End, StoredTable
-from rig.rehearsal.comparison import compare, read_forecast
+from rig.rehearsal.forecast import compare, read_forecast
 from rig.results.files import load, understood
 from rig.results.kinds import KINDS
 from rig.text.message_pages import page_of

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from controller.harmonics import MOST_HARMONICS, check_wanted
 from rig.bench import Bench
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target, with_first_repeated
+from rig.campaigns.planning.plan import Target, passes, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 from vibrolock.errors import InputError
@@ -66,19 +66,12 @@ class BackbonePlan(SettledPlan):
 
     def targets(self) -> tuple[Target, ...]:
         """Return all points in the order of measurement."""
-        rising = sorted(self.levels)
-        falling = rising[::-1]
-        passes: dict[str, list[tuple[float, Literal["up", "down"]]]] = {
-            "up": [(level, "up") for level in rising],
-            "down": [(level, "down") for level in falling],
-            "up-down": [(level, "up") for level in rising] + [(level, "down") for level in falling[1:]],
-        }
         targets = tuple(
             Target(number=number, level=level, direction=direction, repeat=repeat, harmonics=harmonics)
             for number, (repeat, level, direction, harmonics) in enumerate(
                 (repeat, level, direction, harmonics)
                 for repeat in range(1, self.repeats + 1)
-                for level, direction in passes[self.direction]
+                for level, direction in passes(self.levels, self.direction)
                 for harmonics in self.force_harmonics or (None,)
             )
         )
@@ -151,8 +144,8 @@ class BackbonePlan(SettledPlan):
         """Return the level from which a point is approached: the previous one if it is on the correct side; None: from rest."""
         if target.number == 0:
             return None
-        before = targets[target.number - 1]
-        rises = target.level > before.level
-        if target.level == before.level:  # with other harmonics of the force
-            return before.level
-        return before.level if rises == (target.direction == "up") else None
+        before = targets[target.number - 1].level
+        as_recorded = (target.level > before) == (target.direction == "up")
+        return (
+            before if as_recorded or target.level == before else None
+        )  # the same level has other harmonics of the force

@@ -1,62 +1,39 @@
 """Points of a backbone: their contents, their evaluation from recorded rows, and the backbone made of them."""
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import (
-    Backbone,
-    IdentificationError,
-    ShortPoint,
-    SlowFlow,
-    short_point,
-)
+from identification import Backbone, short_point
 from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
     first_of,
+    modal_point,
     nonharmonic_objection,
     phase_objection,
-    settled_point,
     std_objection,
     with_settling,
 )
-from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.lost_samples import lost_objection, lost_rows
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Modal, Point, Quality, planned_point
-from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
+from rig.campaigns.evaluation.recorded import settled_backbone
 from rig.campaigns.evaluation.recorded_flow import SAMPLES_LOST, flagged, recorded_flow
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
-from rig.campaigns.evaluation.vibrations import (
-    channels_from,
-    measured_with,
-    modal_part,
-    not_evaluated,
-    recorded_vibration,
-    vibration_from,
-    within_periods,
-)
-from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, shared_columns, vibration_part
+from rig.campaigns.evaluation.vibrations import measured_with, recorded_vibration, within_periods
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
-from rig.recording.stored import StoredTable
-from rig.text.column import Column
 
 NEAR = 0.1  # a point counts as reached within this distance of its final amplitude, as a logarithm
 
 BACKBONE_COLUMNS = (
-    Column("force_n", "force", "N", ".4f", plain=True),
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
-    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
-    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
-    Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
-    Column("phase_error_deg", "phase error", "deg", ".2f"),
+    *shared_columns("force_n", "frequency_hz", "damping_ratio", "damping_ratio_std", "amplitude_m", "phase_error_deg"),
     *PURITY_COLUMNS,
 )
 
@@ -76,37 +53,37 @@ class ShortPointResult:
 def measure_backbone_point(
     bench: Bench, plan: BackbonePlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[object]:
-    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment.
-
-    A point whose fundamental is too far from the wanted phase is kept but not accepted. For a slow-flow point, the rows begin
-    with the ramp to the point.
-    """
+    """Evaluate a recorded point and its quality. For a slow-flow point, the rows begin with the ramp to the point."""
     if plan.evaluation == "slow-flow":
         return _short_point(bench, plan, target, rows)
     rows = rows[within_periods(rows, plan.record_periods)]
-    try:
-        vibration = recorded_vibration(
-            bench, rows, plan.harmonics, phase_lag_target_deg=plan.controller.phase_lag_deg + 180.0
-        )
-        modal = modal_part(vibration, drive_shape(bench, plan.plant))
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=True)
-    point = settled_point(plan, target, bench, vibration, rows)
-    return with_settling(replace(point, modal=modal), settling)
+    vibration = recorded_vibration(bench, rows, plan.harmonics, plan.displacement_lag_deg)
+    return with_settling(modal_point(plan, target, bench, vibration, rows), settling)
 
 
 def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -> Point[object]:
-    """Evaluate a point from its ramp and the time at the point, whether or not the vibration settled."""
-    try:
-        flow = recorded_flow(bench, rows, plan.harmonics, plan.plant, other_modes=False)
-        found = short_point(flow, start_s=_arrival_s(flow))
-        vibration = found.vibration
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=False)
-    error_deg = (plan.controller.phase_lag_deg + 180.0 - found.phase_lag_deg + 180.0) % 360.0 - 180.0
+    flow = recorded_flow(bench, rows, plan.harmonics, plan.plant, other_modes=False)
+    away = np.abs(np.log(flow.amplitude_m / flow.amplitude_m[-1])) > NEAR
+    arrival = int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0
+    found = short_point(flow, start_s=float(flow.time_s[min(arrival, flow.time_s.size - 1)]))
+    error_deg = (plan.displacement_lag_deg - found.phase_lag_deg + 180.0) % 360.0 - 180.0
     nonharmonic, shape = nonharmonic_force(bench, [rows]), drive_shape(bench, plan.plant)
-    reason = _short_objection(plan, found, error_deg, nonharmonic)
-    reason = reason or _flagged_objection(bench, rows, flow)
+    lost = int(np.count_nonzero(lost_rows(rows)))
+    at_limit = {why: at for why, at in flagged(bench, rows, flow).items() if why != SAMPLES_LOST}
+    reason = first_of(
+        (
+            phase_objection(error_deg, plan.accepted_phase_error_deg),
+            std_objection(
+                found.modal_frequency_std_hz / found.modal_frequency_hz,
+                plan.accepted_frequency_std,
+                found.damping_ratio_std / abs(found.damping_ratio),
+                plan.accepted_damping_std,
+            ),
+            nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force),
+            *(why for why, at in at_limit.items() if at.any()),
+            lost_objection(lost, rows.size),
+        )
+    )
     turned = np.unwrap(rows["theta_rad"].astype(float))
     grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz
     return replace(
@@ -114,9 +91,9 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -
         settled=abs(error_deg) <= plan.settle.phase_deg and abs(grown) <= plan.settle.amplitude,
         reason=reason,
         quality=Quality.of(reason),
-        warnings=quality_warnings(bench, vibration, rows, held=False),
+        warnings=quality_warnings(bench, found.vibration, rows, held=False),
         nonharmonic_force=nonharmonic,
-        vibration=vibration_part(vibration, rows),
+        vibration=vibration_part(found.vibration, rows),
         modal=Modal(
             modal_frequency_hz=found.modal_frequency_hz,
             damping_ratio=found.damping_ratio,
@@ -133,57 +110,10 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -
     )
 
 
-def _flagged_objection(bench: Bench, rows: Rows, flow: SlowFlow) -> str:
-    """Object if anything was at a limit at any instant, or too many samples of the whole record were lost."""
-    at_limit = {why: at for why, at in flagged(bench, rows, flow).items() if why != SAMPLES_LOST}
-    lost = int(np.count_nonzero(lost_rows(rows)))
-    return first_of((*(why for why, at in at_limit.items() if at.any()), lost_objection(lost, rows.size)))
-
-
-def _arrival_s(flow: SlowFlow) -> float:
-    """Time from which the amplitude stays near its final value, s."""
-    away = np.abs(np.log(flow.amplitude_m / flow.amplitude_m[-1])) > NEAR
-    last = int(np.flatnonzero(away)[-1]) + 1 if away.any() else 0
-    return float(flow.time_s[min(last, flow.time_s.size - 1)])
-
-
-def _short_objection(plan: BackbonePlan, found: ShortPoint, error_deg: float, nonharmonic: float) -> str:
-    """Return why a slow-flow point is not accepted; an empty string if it is accepted."""
-    frequency = found.modal_frequency_std_hz / found.modal_frequency_hz
-    damping = found.damping_ratio_std / abs(found.damping_ratio)
-    return first_of(
-        (
-            phase_objection(error_deg, plan.accepted_phase_error_deg),
-            std_objection(frequency, plan.accepted_frequency_std, damping, plan.accepted_damping_std),
-            nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force),
-        )
-    )
-
-
-def backbone_of(
-    points: Iterable[Point[object]],
-    channels: Sequence[StoredTable],
-    shape: DriveShape,
-    phase_lag_target_deg: float,
-) -> Backbone:
-    """Return the accepted points of a recording as a backbone; raise `IdentificationError` if no point was accepted."""
-    accepted = [point for point in without_repetition(points) if point.accepted]
-    IdentificationError.raise_if(not accepted, "none of the recording was accepted", field="points")
-    kinds = channels_from(channels)
-    vibrations = tuple(vibration_from(point, kinds, phase_lag_target_deg) for point in accepted)
-    return shape.backbone(vibrations, [point.direction for point in accepted], [point.repeat for point in accepted])
-
-
 def recorded_backbone(recording: Recording) -> Backbone:
     """Return the accepted points of the current plan as a backbone, in the order of the plan."""
-    points = points_of(recording)
     plan = validated(BackbonePlan, recording.configuration["plan"], "plan of the recording")
-    return backbone_of(
-        points,
-        recording.channels,
-        recorded_drive_shape(recording, points),
-        plan.controller.phase_lag_deg + 180.0,
-    )
+    return settled_backbone(recording, plan.displacement_lag_deg)
 
 
 BACKBONE = Campaign(

@@ -1,14 +1,15 @@
 """Figure of a continuous backbone: the results of the way up and of the way down, their mean, and its 95 % band."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult, OneWay
+from rig.campaigns.continuous_backbone.points import ContinuousBackboneResult
 from rig.campaigns.evaluation.figure import draw_failure, draw_history, heading, why_nothing_is_drawn
-from rig.campaigns.evaluation.point import Modal, Point, result_of, vibration_of
+from rig.campaigns.evaluation.point import Point, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
+from rig.campaigns.evaluation.stored_point import value_of
 from rig.drawing.axes import log_axis, widen
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, engineering, say_why_empty
@@ -29,43 +30,20 @@ class _Quantity(NamedTuple):
 
     label: str
     scale: float
-    mean: Callable[[Modal], float | None]
-    std: Callable[[Modal], float | None]
-    way: Callable[[OneWay], float]
+    name: str
+    """Name of the field of a point, and of one way."""
+    std: str
+    """Name of the field with the standard error."""
     least_span: float
     """Smallest part of the value that its axis spans: less would show scatter as if it were a change."""
 
 
 _QUANTITIES = (
-    _Quantity(
-        "modal frequency, Hz",
-        1.0,
-        lambda modal: modal.modal_frequency_hz,
-        lambda modal: modal.modal_frequency_std_hz,
-        lambda way: way.modal_frequency_hz,
-        1e-3,
-    ),
-    _Quantity(
-        "modal damping ratio, %",
-        100.0,
-        lambda modal: modal.damping_ratio,
-        lambda modal: modal.damping_ratio_std,
-        lambda way: way.damping_ratio,
-        0.1,
-    ),
+    _Quantity("modal frequency, Hz", 1.0, "modal_frequency_hz", "modal_frequency_std_hz", 1e-3),
+    _Quantity("modal damping ratio, %", 100.0, "damping_ratio", "damping_ratio_std", 0.1),
 )
-
-
-class _Way(NamedTuple):
-    """How one way (up or down) is drawn."""
-
-    name: str
-    colour: str
-    marker: str
-    of: Callable[[ContinuousBackboneResult], OneWay | None]
-
-
-_WAYS = (_Way("up", SECOND, "^", lambda found: found.up), _Way("down", THIRD, "v", lambda found: found.down))
+_WAYS = {"up": (SECOND, "^"), "down": (THIRD, "v")}
+"""Colour and marker of each way, by the name of its field."""
 
 
 def draw(page: "Figure", recording: Recording) -> None:
@@ -107,9 +85,7 @@ def draw_detuning(axis: "Axes", points: Sequence[Measured], accepted: float) -> 
 
 def _detuning(point: Measured) -> float:
     """Return the largest relative detuning of a point; NaN if it has none."""
-    if point.lock is None or point.modal is None:
-        return np.nan
-    lag, damping = point.lock.phase_error_deg, point.modal.damping_ratio
+    lag, damping = value_of(point, "phase_error_deg"), value_of(point, "damping_ratio")
     return np.nan if lag is None or damping is None else float(np.tan(np.radians(lag)) * damping)
 
 
@@ -120,25 +96,16 @@ def draw_ways(axes: Sequence["Axes"], points: Sequence[Measured]) -> None:
     """
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
         for some, scale_m, said in _repeats(axis, points, quantity.label):
-            for way in _WAYS:
-                there = [(point, found) for point in some if (found := way.of(result_of(point))) is not None]
-                _line(
-                    axis,
-                    [point for point, _ in there],
-                    scale_m,
-                    [quantity.scale * quantity.way(found) for _, found in there],
-                    f"way {way.name}" if said else None,
-                    marker=way.marker,
-                    mfc="none",
-                    ls=":",
-                    color=way.colour,
-                )
+            for way, (colour, marker) in _WAYS.items():
+                there = [point for point in some if value_of(point, way) is not None]
+                values, label = quantity.scale * _of_way(there, way, quantity), f"way {way}" if said else None
+                _line(axis, there, scale_m, values, label, marker=marker, mfc="none", ls=":", color=colour)
             good = [point for point in some if point.accepted]
-            mean, half = _values(good, quantity.mean, quantity.scale), _values(good, quantity.std, quantity.scale)
+            mean, half = _values(good, quantity.name, quantity.scale), _values(good, quantity.std, quantity.scale)
             _band(axis, good, scale_m, mean, half)
             _line(axis, good, scale_m, mean, "mean, 95 % band" if said else None, marker="o", color=MAIN)
             out = [point for point in some if not point.accepted]
-            values = _values(out, quantity.mean, quantity.scale)
+            values = _values(out, quantity.name, quantity.scale)
             _line(axis, out, scale_m, values, "not accepted" if said else None, marker="x", ls="", color=REJECTED)
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
         widen(axis, quantity.least_span)
@@ -150,20 +117,23 @@ def draw_differences(axes: Sequence["Axes"], points: Sequence[Measured]) -> None
     """Draw the differences of both ways from their mean, in per cent of the mean, with the 95 % band of the mean."""
     for axis, quantity in zip(axes, _QUANTITIES, strict=True):
         for some, scale_m, _said in _repeats(axis, points, f"{quantity.label.split(',')[0]}, way minus mean, %"):
-            both = [point for point in some if all(way.of(result_of(point)) is not None for way in _WAYS)]
-            mean, std = _values(both, quantity.mean), _values(both, quantity.std)
+            both = [point for point in some if all(value_of(point, way) is not None for way in _WAYS)]
+            mean, std = _values(both, quantity.name), _values(both, quantity.std)
             _band(axis, both, scale_m, np.zeros(len(both)), 100.0 * std / np.abs(mean))
-            for way in _WAYS:
-                found = [one for point in both if (one := way.of(result_of(point))) is not None]
-                values = 100.0 * (np.array([quantity.way(one) for one in found]) / mean - 1.0)
-                _line(axis, both, scale_m, values, None, marker=way.marker, mfc="none", ls=":", color=way.colour)
+            for way, (colour, marker) in _WAYS.items():
+                values = 100.0 * (_of_way(both, way, quantity) / mean - 1.0)
+                _line(axis, both, scale_m, values, None, marker=marker, mfc="none", ls=":", color=colour)
         least = 10.0 * quantity.least_span
         axis.set_ylim(min(-least, axis.get_ylim()[0]), max(least, axis.get_ylim()[1]))
 
 
-def _values(points: Sequence[Measured], of: Callable[[Modal], float | None], scale: float = 1.0) -> np.ndarray:
+def _values(points: Sequence[Measured], name: str, scale: float = 1.0) -> np.ndarray:
     """Return a modal property of every point, float[n]; NaN where the point has none."""
-    return scale * np.array([np.nan if point.modal is None else of(point.modal) for point in points], float)
+    return scale * np.array([value_of(point, name) for point in points], float)
+
+
+def _of_way(points: Sequence[Measured], way: str, quantity: _Quantity) -> np.ndarray:
+    return np.array([getattr(value_of(point, way), quantity.name) for point in points], float)
 
 
 def _repeats(axis: "Axes", points: Sequence[Measured], label: str) -> Iterator[tuple[list[Measured], float, bool]]:

@@ -1,5 +1,6 @@
 """The continuous backbone campaign: ramp the response level up and down without waiting, and evaluate every instant."""
 
+from itertools import product
 from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -61,7 +62,7 @@ class ContinuousBackbonePlan(LockedPlan):
 
     def targets(self) -> tuple[Target, ...]:
         """Return the levels of every repeat, rising."""
-        pairs = ((repeat, level) for repeat in range(1, self.repeats + 1) for level in sorted(self.levels))
+        pairs = product(range(1, self.repeats + 1), sorted(self.levels))
         return tuple(Target(number=n, level=level, repeat=repeat) for n, (repeat, level) in enumerate(pairs))
 
     def together(self, number: int) -> frozenset[int]:

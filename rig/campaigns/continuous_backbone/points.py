@@ -1,23 +1,16 @@
 """Points of a continuous backbone: their contents, their evaluation from rows of ramps, and the backbones made of them."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from identification import (
-    Backbone,
-    Channel,
-    ContinuousBackbone,
-    IdentificationError,
-    SlowFlow,
-    continuous_backbone,
-)
+from identification import Backbone, Channel, ContinuousBackbone, SlowFlow, continuous_backbone
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
-from rig.campaigns.continuous_backbone.ways import WAYS, Way, both_ways, rows_near
+from rig.campaigns.continuous_backbone.ways import WAYS, both_ways, rows_near
 from rig.campaigns.evaluation.acceptance import first_of, nonharmonic_objection, std_objection
 from rig.campaigns.evaluation.measured_together import Passage
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
@@ -32,24 +25,22 @@ from rig.campaigns.evaluation.point import (
     result_of,
     vibration_of,
 )
-from rig.campaigns.evaluation.recorded import points_of, recorded_drive_shape
+from rig.campaigns.evaluation.recorded import accepted_points, points_of, recorded_drive_shape
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
-from rig.campaigns.evaluation.vibrations import channels_from, measured_with, not_evaluated, vibration_from
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, shared_columns, vibration_part
+from rig.campaigns.evaluation.vibrations import channels_from, measured_with, vibration_from
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
-from rig.recording.stored import StoredTable
 from rig.text.column import Column
 
 CONTINUOUS_BACKBONE_COLUMNS = (
-    Column("force_n", "force", "N", ".4f", plain=True),
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
+    *shared_columns("force_n", "frequency_hz"),
     Column("modal_frequency_std_hz", "+-", "Hz", ".4f", 1.96),
-    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    *shared_columns("damping_ratio"),
     Column("damping_ratio_std", "+-", "%", ".4f", 196.0),
-    Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
+    *shared_columns("amplitude_m"),
     Column("phase_error_deg", "off resonance", "deg", ".1f"),
     *PURITY_COLUMNS,
 )
@@ -112,57 +103,37 @@ def measure_continuous_backbone(
     A level that was passed on one way only gets the results of that way and is not accepted. A level that was not passed at all
     has failed.
     """
-    try:
-        flow = recorded_flow(bench, rows, plan.harmonics, plan.plant)
-        ways = both_ways(bench, plan, rows, passages, flow, ended)
-        points = _measured(bench, plan, targets, ways, rows)
-    except (IdentificationError, ArithmeticError) as error:
-        return [replace(not_evaluated(plan, target, error, settled=False), direction="both") for target in targets]
-    return [points[target.number] for target in targets]
-
-
-def _measured(
-    bench: Bench,
-    plan: ContinuousBackbonePlan,
-    targets: Sequence[Target],
-    ways: Mapping[str, Way],
-    rows: np.ndarray,
-) -> dict[int, Point[object]]:
-    """Return the points by number: evaluated from both ways, from one way, or failed."""
+    flow = recorded_flow(bench, rows, plan.harmonics, plan.plant)
+    ways = both_ways(bench, plan, rows, passages, flow, ended)
     groups: dict[tuple[str, ...], list[Target]] = {}
     for target in targets:
         covered = tuple(name for name in WAYS if ways[name].covers(target.level))
         groups.setdefault(covered, []).append(target)
     out: dict[int, Point[object]] = {}
     for covered, some in groups.items():
-        missing = _together({name: ways[name].why for name in WAYS if name not in covered})
+        missing = _joined({name: ways[name].why for name in WAYS if name not in covered})
         if not covered:
-            out |= {target.number: _failed(plan, target, f"not passed: {missing}") for target in some}
+            for target in some:
+                point = replace(planned_point(plan, target), direction="both", settled=False)
+                out[target.number] = point.refused(f"not passed: {missing}")
             continue
         flows = [way.flow for way in map(ways.__getitem__, covered) if way.flow is not None]
+        levels_m = [target.level for target in some]
         found = continuous_backbone(
-            flows[0],
-            flows[-1],
-            levels_m=[t.level for t in some],
-            bandwidth=plan.bandwidth,
-            specimen=bench.specimen.name,
+            flows[0], flows[-1], levels_m=levels_m, bandwidth=plan.bandwidth, specimen=bench.specimen.name
         )
         together = _Together(covered, found, tuple(flows), missing)
         for index, target in enumerate(some):
             near = [rows_near(bench, rows, ways[name], target.level) for name in covered]
             out[target.number] = _point(bench, plan, target, together, index, near)
-    return out
+    return [out[target.number] for target in targets]
 
 
-def _together(reasons: Mapping[str, str]) -> str:
+def _joined(reasons: Mapping[str, str]) -> str:
     """Join the reasons of the ways into one line. A reason that both ways share is given once."""
     if len(reasons) == 2 and len(set(reasons.values())) == 1:
         return next(iter(reasons.values()))
     return "; ".join(f"way {name}: {why}" for name, why in reasons.items())
-
-
-def _failed(plan: ContinuousBackbonePlan, target: Target, reason: str) -> Point[object]:
-    return replace(planned_point(plan, target), direction="both", settled=False).refused(reason)
 
 
 def _point(
@@ -197,7 +168,10 @@ def _point(
     momentary = np.concatenate([flow.frequency_hz for flow in together.flows])[near]
     # The lag oscillates while the level is ramped. Report the lag that a settled vibration at this detuning would have.
     lags = np.degrees(np.arctan((momentary / frequency - 1.0) / abs(damping)))
-    ways = {name: _one_way(found, WAYS.index(name) if len(covered) == 2 else 0, index) for name in covered}
+    ways = {}
+    for name in covered:
+        place = WAYS.index(name) if len(covered) == 2 else 0, index
+        ways[name] = OneWay(**{one.name: float(getattr(found, one.name)[place]) for one in fields(OneWay)})
     rows = np.concatenate(pieces)
     point = replace(
         planned_point(plan, target),
@@ -220,39 +194,16 @@ def _point(
     return with_plausible_ways(bench, point, pieces)
 
 
-def _one_way(found: ContinuousBackbone, way: int, index: int) -> OneWay:
-    """Return the results of one way at a level."""
-    return OneWay(
-        modal_frequency_hz=float(found.modal_frequency_hz[way, index]),
-        damping_ratio=float(found.damping_ratio[way, index]),
-        stiffness=float(found.stiffness[way, index]),
-        damping_1_s=float(found.damping_1_s[way, index]),
-        stiffness_std=float(found.stiffness_std[way, index]),
-        damping_std_1_s=float(found.damping_std_1_s[way, index]),
-    )
-
-
-def continuous_backbones_of(
-    points: Iterable[Point[ContinuousBackboneResult]],
-    channels: Sequence[StoredTable],
-    shape: DriveShape,
-) -> tuple[ContinuousBackbone, ...]:
-    """Return the accepted points as one continuous backbone per repeat; raise `IdentificationError` if there are none."""
-    kinds = channels_from(channels)
-    repeats: dict[int, list[Point[ContinuousBackboneResult]]] = {}
-    for point in points:
-        if point.accepted:
-            repeats.setdefault(point.repeat, []).append(point)
-    IdentificationError.raise_if(not repeats, "none of the recording was accepted", field="points")
-    return tuple(_from_points(accepted, kinds, shape) for accepted in repeats.values())
-
-
 def _from_points(
     points: Sequence[Point[ContinuousBackboneResult]],
     channels: tuple[Channel, ...],
     shape: DriveShape,
 ) -> ContinuousBackbone:
     ways = [_both_ways(point) for point in points]
+
+    def property_of(name: str) -> np.ndarray:
+        return np.array([[getattr(way, name) for way in both] for both in ways]).T
+
     # Points of a resumed recording may have been evaluated with another mode shape: the damping goes with its square.
     used = [(None if point.modal is None else point.modal.drive_mode_shape) or shape.fact for point in points]
     times = np.array([((shape.value or 1.0) / (one or shape.value or 1.0)) ** 2 for one in used])
@@ -260,16 +211,15 @@ def _from_points(
     return ContinuousBackbone(
         backbone=shape.backbone(vibrations),
         amplitude_m=np.array([vibration_of(point).amplitude_m for point in points]),
-        stiffness=np.array([[way.stiffness for way in both] for both in ways]).T,
-        damping_1_s=times * np.array([[way.damping_1_s for way in both] for both in ways]).T,
-        stiffness_std=np.array([[way.stiffness_std for way in both] for both in ways]).T,
-        damping_std_1_s=times * np.array([[way.damping_std_1_s for way in both] for both in ways]).T,
+        stiffness=property_of("stiffness"),
+        damping_1_s=times * property_of("damping_1_s"),
+        stiffness_std=property_of("stiffness_std"),
+        damping_std_1_s=times * property_of("damping_std_1_s"),
         periods=result_of(points[0]).periods_of_both_ways,
     )
 
 
 def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
-    """Return the results of the ways up and down at an accepted level."""
     result = result_of(point)
     if result.up is None or result.down is None:
         raise RecordingError(f"{point_name(point.number)}: is accepted, but holds one way only")
@@ -277,9 +227,16 @@ def _both_ways(point: Point[ContinuousBackboneResult]) -> tuple[OneWay, OneWay]:
 
 
 def recorded_continuous_backbones(recording: Recording) -> tuple[ContinuousBackbone, ...]:
-    """Return the accepted points as one backbone per repeat, with the results of the way up and of the way down."""
-    points = points_of(recording, ContinuousBackboneResult)
-    return continuous_backbones_of(points, recording.channels, recorded_drive_shape(recording, points))
+    """Return the accepted points as one backbone per repeat, with the results of the way up and of the way down.
+
+    Raises `IdentificationError` if no point was accepted.
+    """
+    shape = recorded_drive_shape(recording, points_of(recording))
+    repeats: dict[int, list[Point[ContinuousBackboneResult]]] = {}
+    for point in accepted_points(recording, ContinuousBackboneResult):
+        repeats.setdefault(point.repeat, []).append(point)
+    channels = channels_from(recording.channels)
+    return tuple(_from_points(accepted, channels, shape) for accepted in repeats.values())
 
 
 def recorded_mean_backbone(recording: Recording) -> Backbone:

@@ -1,5 +1,6 @@
 """Figure of decays: their modal properties over the amplitude beside the settled points, and the amplitude over time."""
 
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,10 +25,11 @@ def draw(page: "Figure", recording: Recording) -> None:
         return
     axes = grid(page, 2, 2)
     frequency, damping = axes[0]
-    largest = np.concatenate([settled.amplitude_m, *(found.mode().amplitude_m for found in decays.values())])
-    factor, unit = engineering(largest)[0] / largest, engineering(largest)[1]
-    scale = float(factor[0])
-    for colour, (number, found) in zip(_colours(len(decays)), decays.items(), strict=True):
+    amplitude_m = np.concatenate([settled.amplitude_m, *(found.mode().amplitude_m for found in decays.values())])
+    scaled, unit = engineering(amplitude_m)
+    scale = float(scaled[0] / amplitude_m[0])
+    colours = cycle(colour for colour in COLOURS if colour != MAIN)
+    for colour, (number, found) in zip(colours, decays.items(), strict=False):
         mode, label = found.mode(), f"decay of point {number + 1}"
         x = scale * mode.amplitude_m
         style = {"fmt": "o-", "ms": 3.0, "color": colour, "capsize": 2.0}
@@ -46,8 +48,3 @@ def draw(page: "Figure", recording: Recording) -> None:
     frequency.legend()
     draw_history(axes[1, 0], axes[1, 1], recording)
     heading(page, recording)
-
-
-def _colours(count: int) -> list[str]:
-    others = [colour for colour in COLOURS if colour != MAIN]
-    return [others[n % len(others)] for n in range(count)]

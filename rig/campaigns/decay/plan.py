@@ -1,6 +1,7 @@
 """The decay campaign: settle at phase resonance, then take the output to 0 V at once and record how the vibration decays."""
 
 from dataclasses import replace
+from itertools import product
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -48,11 +49,8 @@ class DecayPlan(SettledPlan):
 
     def targets(self) -> tuple[Target, ...]:
         """Return all points in the order of measurement, the levels rising."""
-        rising = [level for _ in range(self.repeats) for level in sorted(self.levels)]
-        count = len(self.levels)
-        return tuple(
-            Target(number=number, level=level, repeat=1 + number // count) for number, level in enumerate(rising)
-        )
+        pairs = product(range(1, self.repeats + 1), sorted(self.levels))
+        return tuple(Target(number=n, level=level, repeat=repeat) for n, (repeat, level) in enumerate(pairs))
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
         """Return the segments that measure all points except those in ``done``: each is approached from rest."""

@@ -10,28 +10,18 @@ from rig.bench import Bench
 from rig.bench.configuration import validated
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.decay.plan import DecayPlan
-from rig.campaigns.evaluation.acceptance import settled_point
+from rig.campaigns.evaluation.acceptance import modal_point
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.recorded import (
     accepted_points,
     bench_of_recording,
     point_rows,
-    points_of,
-    recorded_drive_shape,
-    specimen_of,
+    settled_backbone,
 )
 from rig.campaigns.evaluation.recorded_flow import recorded_flow
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
-from rig.campaigns.evaluation.vibrations import (
-    channels_from,
-    channels_of,
-    modal_part,
-    not_evaluated,
-    recorded_vibration,
-    vibration_from,
-    within_periods,
-)
+from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, shared_columns
+from rig.campaigns.evaluation.vibrations import channels_of, recorded_vibration, within_periods
 from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
@@ -42,10 +32,7 @@ _EARLY = 8  # instants of a decay from which its frequency is taken
 _BEFORE_PERIODS = 15.0  # of the settled record that the slow flow takes in, so that its ends are away from the decay
 
 DECAY_COLUMNS = (
-    Column("force_n", "force", "N", ".4f", plain=True),
-    Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
-    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    *shared_columns("force_n", "amplitude_m", "frequency_hz", "damping_ratio"),
     Column("decay_from_m", "decay from", "mm", ".4f", 1e3),
     Column("decay_to_m", "to", "mm", ".4f", 1e3),
     Column("decay_frequency_hz", "frequency", "Hz", ".4f", plain=True),
@@ -85,13 +72,8 @@ def measure_decay(bench: Bench, plan: DecayPlan, target: Target, rows: Rows, set
     first, release = _stretches(taken)
     held = taken[first:release]
     held = held[within_periods(held, plan.record_periods)]
-    try:
-        lag_deg = plan.controller.phase_lag_deg + 180.0
-        vibration = recorded_vibration(bench, held, plan.harmonics, phase_lag_target_deg=lag_deg)
-        modal = modal_part(vibration, drive_shape(bench, plan.plant))
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=True)
-    point = replace(settled_point(plan, target, bench, vibration, held), modal=modal)
+    vibration = recorded_vibration(bench, held, plan.harmonics, plan.displacement_lag_deg)
+    point = modal_point(plan, target, bench, vibration, held)
     try:
         mode = _decay_of(bench, plan, taken).mode()
     except (IdentificationError, ArithmeticError) as error:
@@ -126,9 +108,8 @@ def _decay_of(bench: Bench, plan: DecayPlan, rows: np.ndarray) -> DecayBackbone:
     flow = recorded_flow(bench, rows[begin:], plan.harmonics, plan.plant)
     shape = drive_shape(bench, plan.plant)
     start_s = (release - begin) / bench.sample_rate_hz
-    if (
-        plan.plant is not None
-    ):  # the exciter may have pulled the frequency to where the other modes contribute more or less
+    if plan.plant is not None:
+        # The exciter may have pulled the frequency to where the other modes contribute more or less.
         decaying = flow.frequency_hz[flow.time_s > start_s + 3.0 / float(np.median(flow.frequency_hz))]
         residual = plan.plant.residual_at(float(np.median(decaying[:_EARLY])))
         flow = recorded_flow(bench, rows[begin:], plan.harmonics, plan.plant, residual_m_n=residual)
@@ -159,17 +140,8 @@ def recorded_decays(recording: Recording) -> dict[int, DecayBackbone]:
 
 def recorded_settled(recording: Recording) -> Backbone:
     """Return the settled points from which the decays began, as a backbone."""
-    accepted = accepted_points(recording, DecayResult)
     plan = validated(DecayPlan, recording.configuration["plan"], "plan of the recording")
-    kinds = channels_from(recording.channels)
-    vibrations = tuple(vibration_from(point, kinds, plan.controller.phase_lag_deg + 180.0) for point in accepted)
-    shape = recorded_drive_shape(recording, points_of(recording))
-    backbone = shape.backbone(vibrations, [point.direction for point in accepted], [point.repeat for point in accepted])
-    return replace(backbone, specimen=specimen_of(recording))
-
-
-def _exchanged(recording: Recording) -> list[object]:
-    return [recorded_settled(recording)]
+    return settled_backbone(recording, plan.displacement_lag_deg)
 
 
 DECAY = Campaign(
@@ -181,5 +153,5 @@ DECAY = Campaign(
     identity=("controller.phase_lag_deg",),
     fixed=("harmonics", "decay_levels"),
     measurements={Backbone: recorded_settled, DecayBackbone: recorded_decays},
-    exchanged=_exchanged,
+    exchanged=lambda recording: [recorded_settled(recording)],
 )

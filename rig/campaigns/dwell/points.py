@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,15 @@ from identification import IdentificationError
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.dwell.plan import DwellPlan
-from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point
+from rig.campaigns.evaluation.acceptance import level_error, modal_point
 from rig.campaigns.evaluation.drift import relative_change
 from rig.campaigns.evaluation.lost_samples import rms_of_force
-from rig.campaigns.evaluation.point import PART, Point, vibration_of
+from rig.campaigns.evaluation.point import PART, Point
 from rig.campaigns.evaluation.recorded import accepted_points, specimen_of
 from rig.campaigns.evaluation.rows import Rows, turned_rad
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
-from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
-from rig.campaigns.planning.drive_shape import drive_shape
+from rig.campaigns.evaluation.stored_point import value_of
+from rig.campaigns.evaluation.vibration_quality import FINE_AMPLITUDE, PURITY_COLUMNS, shared_columns
+from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Target
 from rig.recording.reader import Recording
 from rig.text.column import Column
@@ -27,13 +27,11 @@ from rig.text.contents import Contents
 
 DWELL_COLUMNS = (
     Column("cycles", "cycles", "", ".0f"),
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
+    *shared_columns("frequency_hz"),
     Column("frequency_change", "frequency change", "%", "+.3f", 100.0),
-    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
-    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
-    Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
-    Column("force_n", "force", "N", ".4f", plain=True),
-    Column("phase_error_deg", "phase error", "deg", ".2f"),
+    *shared_columns("damping_ratio", "damping_ratio_std"),
+    FINE_AMPLITUDE,
+    *shared_columns("force_n", "phase_error_deg"),
     *PURITY_COLUMNS,
 )
 
@@ -91,18 +89,17 @@ def measure_mean(bench: Bench, plan: DwellPlan, target: Target, rows: Rows, sett
     cycles = turned_rad(rows) / (2.0 * math.pi) * rows.size / max(1, rows.size - 1)
     length = Length(cycles_in_mean=cycles, seconds_in_mean=rows.size / bench.sample_rate_hz)
     rows = rows[within_periods(rows, int(cycles))]
-    try:
-        lag_deg = plan.controller.phase_lag_deg + 180.0
-        vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg)
-        modal = modal_part(vibration, drive_shape(bench, plan.plant))
-    except (IdentificationError, ArithmeticError) as error:
-        return replace(not_evaluated(plan, target, error, settled=True), result=DwellResult(length=length))
     force_rms_n = rms_of_force(bench, rows)
-    missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
-    off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
-    point = settled_point(plan, target, bench, vibration, rows, off_level)
+    try:
+        vibration = recorded_vibration(bench, rows, plan.harmonics, plan.displacement_lag_deg)
+        missed, off_level = level_error(
+            plan.amplitude_law, target.level, vibration, force_rms_n, plan.accepted_level_error
+        )
+        point = modal_point(plan, target, bench, vibration, rows, off_level)
+    except (IdentificationError, ArithmeticError) as error:  # its length counts all the same
+        return replace(not_evaluated(plan, target, error), result=DwellResult(length=length))
     held = HeldLevel(force_rms_n=force_rms_n, level_error=missed)
-    return replace(point, modal=modal, result=DwellResult(length=length, held=held))
+    return replace(point, result=DwellResult(length=length, held=held))
 
 
 def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[object]) -> tuple[Point[object], str]:
@@ -118,38 +115,23 @@ def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[ob
     result = replace(_result(point) or DwellResult(), cycles=cycles, time_s=seconds)
     if not point.accepted:
         return replace(point, result=result), ""
-    first = next((one for one in known if one.accepted), point)
-    before, now = _watched(plan, first), _watched(plan, point)
-    alike = (one for one in known if one.accepted and _mode_shape(one) == _mode_shape(point))
-    before["damping"] = _watched(plan, next(alike, point))["damping"]
-    changes = {name: relative_change(before[name], now[name]) for name in now}
-    result = replace(
-        result,
-        changes=Changes(
-            frequency_change=changes["frequency"],
-            damping_change=changes["damping"],
-            amplitude_change=changes["amplitude"],
-        ),
-    )
+    accepted, shape = [one for one in known if one.accepted], value_of(point, "drive_mode_shape")
+    first = next(iter(accepted), point)
+    alike = next((one for one in accepted if value_of(one, "drive_mode_shape") == shape), point)
+    not_held = "force_n" if plan.level_unit == "m" else "amplitude_m"
+    changes = {
+        name: relative_change(value_of(before, quantity), value_of(point, quantity))
+        for name, before, quantity in (
+            ("frequency", first, "modal_frequency_hz"),
+            ("damping", alike, "damping_ratio"),
+            ("amplitude", first, not_held),
+        )
+    }
+    result = replace(result, changes=Changes(**{f"{name}_change": change for name, change in changes.items()}))
     point = replace(point, result=result)
     alarms = [f"alarm: {text}" for text in _beyond(plan, "alarm", changes)]
     abort = next(_beyond(plan, "abort", changes), "")
     return point.warned(*alarms) if alarms else point, f"{abort}, after {cycles:.0f} cycles" if abort else ""
-
-
-def _watched(plan: DwellPlan, point: Point[object]) -> dict[str, float | None]:
-    """Return the monitored quantities of a mean, keyed as in the limits. Of force and displacement, it is the one not held."""
-    modal, vibration = point.modal, point.vibration
-    amplitude = None if vibration is None else vibration.force_n if plan.level_unit == "m" else vibration.amplitude_m
-    return {
-        "frequency": None if modal is None else modal.modal_frequency_hz,
-        "damping": None if modal is None else modal.damping_ratio,
-        "amplitude": amplitude,
-    }
-
-
-def _mode_shape(point: Point[object]) -> float | None:
-    return None if point.modal is None else point.modal.drive_mode_shape
 
 
 def _result(point: Point[object]) -> DwellResult | None:
@@ -157,7 +139,6 @@ def _result(point: Point[object]) -> DwellResult | None:
 
 
 def _length(point: Point[object]) -> Length:
-    """Return the length of a mean; 0 if nothing was recorded."""
     result = _result(point)
     return (None if result is None else result.length) or Length(cycles_in_mean=0.0, seconds_in_mean=0.0)
 
@@ -207,24 +188,15 @@ class DwellCourse:
 def recorded_course(recording: Recording) -> DwellCourse:
     """Return the accepted means of a recording; raise `identification.IdentificationError` if there are none."""
     points = accepted_points(recording, DwellResult)
-    vibrations = [vibration_of(point) for point in points]
-    results, modal = [point.result for point in points], [point.modal for point in points]
-    return DwellCourse(
-        cycles=np.array([None if result is None else result.cycles for result in results], float),
-        time_s=np.array([None if result is None else result.time_s for result in results], float),
-        frequency_hz=np.array([vibration.frequency_hz for vibration in vibrations], float),
-        modal_frequency_hz=np.array([None if one is None else one.modal_frequency_hz for one in modal], float),
-        damping_ratio=np.array([None if one is None else one.damping_ratio for one in modal], float),
-        amplitude_m=np.array([vibration.amplitude_m for vibration in vibrations], float),
-        force_n=np.array([vibration.force_n for vibration in vibrations], float),
-        specimen=specimen_of(recording),
-    )
+    names = [one.name for one in fields(DwellCourse) if one.name != "specimen"]
+    values = {name: np.array([value_of(point, name) for point in points], float) for name in names}
+    return DwellCourse(**values, specimen=specimen_of(recording))
 
 
 def _table(recording: Recording) -> Contents:
-    course = vars(recorded_course(recording))
-    arrays = {name: values for name, values in course.items() if name != "specimen"}
-    return Contents("dwell", course["specimen"], arrays, {"specimen": course["specimen"]}, dict.fromkeys(arrays, 0))
+    arrays = dict(vars(recorded_course(recording)))
+    specimen = arrays.pop("specimen")
+    return Contents("dwell", specimen, arrays, {"specimen": specimen}, dict.fromkeys(arrays, 0))
 
 
 DWELL = Campaign(

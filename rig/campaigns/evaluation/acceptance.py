@@ -16,7 +16,8 @@ from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Lock, Point, Quality, planned_point
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibration_quality import lag_scatter_deg, quality_warnings, vibration_part
-from rig.campaigns.evaluation.vibrations import frequency_scatter
+from rig.campaigns.evaluation.vibrations import frequency_scatter, modal_part
+from rig.campaigns.planning.drive_shape import drive_shape
 from rig.campaigns.planning.locked import SettledPlan
 from rig.campaigns.planning.plan import Target
 
@@ -37,22 +38,24 @@ def phase_objection(error_deg: float, accepted_deg: float) -> str:
     return f"phase error {error_deg:.2f} deg, accepted up to {accepted_deg:g} deg"
 
 
-def level_error(law: AmplitudeLaw, level: float, vibration: PeriodicVibration, force_rms_n: float) -> float | None:
-    """Relative error of the held quantity over the record; None if the level is a voltage, which no loop holds."""
+def level_error(
+    law: AmplitudeLaw, level: float, vibration: PeriodicVibration, force_rms_n: float, accepted: float
+) -> tuple[float | None, str]:
+    """Return the relative error of the held quantity over the record, and the objection if it is above ``accepted``.
+
+    The error is None if the level is a voltage, which no loop holds.
+    """
     measured = {
         AmplitudeLaw.FORCE: vibration.force_n,
         AmplitudeLaw.FORCE_RMS: force_rms_n,
         AmplitudeLaw.RESPONSE: vibration.amplitude_m,
     }.get(law)
-    return None if measured is None else float(measured / level - 1.0)
-
-
-def level_objection(law: AmplitudeLaw, error: float | None, accepted: float) -> str:
-    """Object if the held force or displacement is too far from its level."""
-    if error is None or abs(error) <= accepted:
-        return ""
+    if measured is None:
+        return None, ""
+    error = float(measured / level - 1.0)
     held = "displacement" if law is AmplitudeLaw.RESPONSE else "force"
-    return f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
+    text = f"the {held} is {100.0 * error:+.2f} % off its level, accepted up to {100.0 * accepted:g} %"
+    return error, text if abs(error) > accepted else ""
 
 
 def nonharmonic_objection(nonharmonic: float, accepted: float, output_bits: float = math.inf) -> str:
@@ -118,10 +121,7 @@ def std_objection(frequency: float, accepted_frequency: float, damping: float, a
 def settled_point(
     plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: Rows, level: str = ""
 ) -> Point[object]:
-    """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level.
-
-    All campaigns that settle and record at a held lag use this function.
-    """
+    """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level."""
     scatter, nonharmonic = frequency_scatter(rows), nonharmonic_force(bench, [rows])
     vibrating = vibration_part(vibration, rows)
     reason = first_of(
@@ -149,6 +149,14 @@ def settled_point(
             frequency_scatter=scatter,
         ),
     )
+
+
+def modal_point(
+    plan: SettledPlan, target: Target, bench: Bench, vibration: PeriodicVibration, rows: Rows, level: str = ""
+) -> Point[object]:
+    """Judge a point as `settled_point` does, and add the modal properties of its vibration."""
+    modal = modal_part(vibration, drive_shape(bench, plan.plant))
+    return replace(settled_point(plan, target, bench, vibration, rows, level), modal=modal)
 
 
 def with_settling(point: Point[object], settling: np.void) -> Point[object]:

@@ -71,9 +71,15 @@ def misfit_sentence(misfits: Sequence[Misfit], drive: str) -> str:
             f"channel {worst.channel} and channel {worst.swapped_with} seem swapped, for the sizes fit the mode shapes with "
             "these two exchanged: look at both cables"
         )
-    bound = _bound_of(worst)
-    alike = [one for one in misfits if one.by is worst.by and (one.turn_deg is None) is (worst.turn_deg is None)]
-    alike = [one for one in alike if not one.swapped_with]
+    limit = f"{REFUSED_DEG if worst.refused else WARNED_DEG:g} deg"
+    if worst.turn_deg is None:
+        limit = f"a factor {REFUSED if worst.refused else worst.trusted:g}"
+    bound = f"refused from {limit}" if worst.refused else f"trusted up to {limit}"
+    alike = [
+        one
+        for one in misfits
+        if one.by is worst.by and (one.turn_deg is None) is (worst.turn_deg is None) and not one.swapped_with
+    ]
     off = [misfit for misfit in alike if misfit.warned]
     if len({misfit.channel for misfit in off}) > 1 and len(off) == len(alike) and _share_one_cause(off):
         names = ", ".join(misfit.channel for misfit in off)
@@ -89,15 +95,7 @@ def misfit_sentence(misfits: Sequence[Misfit], drive: str) -> str:
     return f"{_what_was_seen(worst)} {worst.by.value}, {bound}: {_where_to_look(worst)}"
 
 
-def _bound_of(worst: Misfit) -> str:
-    """Return the bound that the misfit is beyond, in words."""
-    if worst.turn_deg is not None:
-        return f"refused from {REFUSED_DEG:g} deg" if worst.refused else f"trusted up to {WARNED_DEG:g} deg"
-    return f"refused from a factor {REFUSED:g}" if worst.refused else f"trusted up to a factor {worst.trusted:g}"
-
-
 def _share_one_cause(off: Sequence[Misfit]) -> bool:
-    """Whether the channels are off by the same factor, or turned by the same angle."""
     turns = [misfit.turn_deg for misfit in off if misfit.turn_deg is not None]
     if turns:
         return max(turns) - min(turns) < 2.0 * ALIKE_DEG

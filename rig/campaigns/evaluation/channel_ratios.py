@@ -7,8 +7,8 @@ import numpy as np
 
 from rig.bench import Bench
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
+from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.planning.plant import KnownPlant
 
 DETUNED = 20.0  # growth of the allowance per relative deviation of the squared frequency
 
@@ -48,7 +48,7 @@ def shapes_of(bench: Bench, plan: Plan) -> np.ndarray | None:
     drive = bench.index_of("drive")
     known = [at_drive if i == drive else channel.mode_shape for i, channel in enumerate(bench.channels)]
     ratios = np.array([math.nan if shape is None else shape for shape in known]) / at_drive
-    plant = plan.plant if isinstance(plan, KnownPlant) else None
+    plant = plan.plant if isinstance(plan, LockedPlan) else None
     measured: dict[str, float] = {} if plant is None else plant.response_ratios
     sizes = [measured.get(channel.name, size) for channel, size in zip(bench.channels, np.abs(ratios), strict=True)]
     turns: dict[str, float] = {} if plant is None else plant.response_turns_deg

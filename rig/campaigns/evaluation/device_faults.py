@@ -51,9 +51,7 @@ def why_disturbed(faults: DeviceFaults, course: str = "", *, final: bool = True)
     ``course``: how far off phase and amplitude were, in brackets. ``final``: as of `DeviceFaults.text`.
     """
     said = faults.text(final=final)
-    if faults.spoil:
-        return said + course
-    return DISTURBED + course + (f"; {said}" if said else "")
+    return said + course if faults.spoil else DISTURBED + course + (f"; {said}" if said else "")
 
 
 def pages_on(reason: str) -> list[str]:

@@ -1,9 +1,11 @@
 """Drift of a specimen over a run: compare the first point with its repetition at the end of the run."""
 
 from collections.abc import Iterable
-from typing import TypedDict, TypeVar, cast
+from operator import attrgetter
+from typing import TypedDict, TypeVar
 
 from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.stored_point import value_of
 
 Result = TypeVar("Result")
 
@@ -34,27 +36,21 @@ def drift_of(points: Iterable[Point[object]]) -> Drift | None:
     """
     known = list(points)
     again = next((point for point in known if point.repeats_first), None)
-    first = None if again is None else next((p for p in without_repetition(known) if _same(p, again)), None)
+    alike = attrgetter("level", "direction", "repeat", "asked_phase_lag_deg")
+    first = None if again is None else next((p for p in without_repetition(known) if alike(p) == alike(again)), None)
     if first is None or again is None or not (first.accepted and again.accepted):
         return None
-    before, now = _quantities(first), _quantities(again)
-    changes = {name: relative_change(before.get(name), now.get(name)) for name in ("frequency", "damping", "amplitude")}
-    return cast(Drift, {"first": first.number, "again": again.number, **changes})
 
+    def change(quantity: str) -> float | None:
+        return relative_change(value_of(first, quantity), value_of(again, quantity))
 
-def _quantities(point: Point[object]) -> dict[str, float | None]:
-    out: dict[str, float | None] = {}
-    if point.modal is not None:
-        out |= {"frequency": point.modal.modal_frequency_hz, "damping": point.modal.damping_ratio}
-    if point.vibration is not None:
-        out["amplitude"] = point.vibration.amplitude_m
-    return out
-
-
-def _same(point: Point[object], again: Point[object]) -> bool:
-    """Whether the plan asks for the same vibration in both points."""
-    wanted, found = ((one.level, one.direction, one.repeat, one.asked_phase_lag_deg) for one in (again, point))
-    return wanted == found
+    return Drift(
+        first=first.number,
+        again=again.number,
+        frequency=change("modal_frequency_hz"),
+        damping=change("damping_ratio"),
+        amplitude=change("amplitude_m"),
+    )
 
 
 def relative_change(first: float | None, again: float | None) -> float | None:

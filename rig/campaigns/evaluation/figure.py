@@ -120,7 +120,6 @@ def _label_error(error: "Axes", largest: float) -> None:
 
 
 def _shade_ramp(axis: "Axes", seconds: np.ndarray, running: np.ndarray) -> None:
-    """Shade the end of a part from where the plan no longer runs."""
     if running.size and not running[-1]:
         begin = int(np.flatnonzero(running)[-1]) if running.any() else 0
         axis.axvspan(seconds[begin], seconds[-1], color=REJECTED, alpha=0.25, lw=0, label="ramp-down")

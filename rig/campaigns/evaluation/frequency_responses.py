@@ -10,45 +10,37 @@ from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
 from rig.recording.reader import Recording
-from rig.recording.stored import StoredTable
 
 CONTROLLED: dict[str, Controlled] = {"V": "voltage", "N": "force", "N RMS": "none", "m": "response"}
 """The controlled quantity, by the unit of the levels."""
 
 
 def recorded_frequency_responses(recording: Recording) -> tuple[FrequencyResponse, ...]:
-    """Return the accepted points of a recording, one response per level and pass, in the order of measurement."""
-    return frequency_responses_of(points_of(recording), recording.channels, specimen_of(recording))
-
-
-def frequency_responses_of(
-    points: Iterable[Point[object]], channels: Sequence[StoredTable], specimen: str
-) -> tuple[FrequencyResponse, ...]:
-    """Return the accepted points of a recording as one frequency response per level and pass.
+    """Return the accepted points of a recording as one frequency response per level and pass, in the order of measurement.
 
     If the RMS of the force was held, no fundamental is constant and ``controlled`` is ``"none"``. Raises `IdentificationError`
     if no point was accepted.
     """
-    roles = [channel["role"] for channel in channels]
+    roles = [channel["role"] for channel in recording.channels]
     force, drive = roles.index("force"), roles.index("drive")
     out = []
-    for label, accepted in passes_of(points):
+    for label, accepted in passes_of(points_of(recording)):
         level, unit = accepted[0].level, accepted[0].level_unit
         frequency_hz = np.array([vibration_of(point).frequency_hz for point in accepted])
         fundamentals = np.array([spectrum_of(point).harmonics[:, 1] for point in accepted])
-        to_displacement = -1.0 / (2.0 * np.pi * frequency_hz) ** 2
+        response = fundamentals[:, drive]
+        if unit == "m":
+            response = response * (-1.0 / (2.0 * np.pi * frequency_hz) ** 2)
         out.append(
             FrequencyResponse(
                 frequency_hz=frequency_hz,
                 force=fundamentals[:, force],
-                response=np.asarray(
-                    fundamentals[:, drive] * to_displacement if unit == "m" else fundamentals[:, drive]
-                ),
+                response=response,
                 kind="displacement" if unit == "m" else "acceleration",
                 controlled=CONTROLLED[unit],
                 level=level,
                 label=label,
-                specimen=specimen,
+                specimen=specimen_of(recording),
             )
         )
     return tuple(out)

@@ -9,9 +9,8 @@ from rig.campaigns.evaluation.rows import Rows, std_of, stretches
 from rig.tick.layout import SAMPLE_LOST
 from rig.tick.sequencer.repetition import LARGEST_LOST
 
-LARGEST_LOST_WITHIN = (
-    0.02  # of the window of an instant: a gap is filled from the periods beside it, which are in the window
-)
+LARGEST_LOST_WITHIN = 0.02
+"""Of the window of an instant: a gap is filled from the periods beside it, which are in the window."""
 
 
 def lost_rows(rows: Rows) -> np.ndarray:
@@ -39,6 +38,13 @@ def lost_objection(lost: int, size: int) -> str:
     return f"{lost} of {size} samples were lost on their way, allowed is up to {LARGEST_LOST:.0%}"
 
 
+def windows(time_s: np.ndarray, half_s: np.ndarray, rate_hz: float, n_rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first row of each instant's window, and the row after its last one, int[n] each."""
+    ends = np.stack([time_s - half_s, time_s + half_s])
+    first, end = np.clip(np.rint(ends * rate_hz), 0, n_rows).astype(int)
+    return first, end
+
+
 def too_many_lost(lost: np.ndarray, first: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return bool[n]: windows ``first`` to ``end`` (int[n]) of which more than 2 % is lost; ``lost`` is bool[n_rows]."""
     count = np.concatenate([[0], np.cumsum(lost)])
@@ -57,33 +63,28 @@ def rms_of_force(bench: Bench, rows: Rows) -> float:
     return std_of(bridged(stretch, slice(channel, channel + 1))[:, 0] for stretch in stretches(rows[: rows.size - 1]))
 
 
-def _turns(theta_rad: np.ndarray) -> np.ndarray:
-    """Turns of the oscillator, interpolated linearly over rows missing in a damaged journal."""
-    known = np.flatnonzero(np.isfinite(theta_rad))
-    return np.asarray(np.interp(np.arange(theta_rad.size), known, np.unwrap(theta_rad[known]) / (2.0 * math.pi)))
-
-
 def bridged(rows: Rows, channels: slice = slice(None)) -> np.ndarray:
     """Return the inputs of all or some channels, float64[n, n_channels], with gaps filled.
 
-    A gap is filled by the mean of the readings one period before and after.
-
-    Both readings are taken at the same phase by linear interpolation. The error for a vibration that grows or drifts steadily
-    is therefore of second order. Use this for windows and spectra, which need signals without gaps; the caller must leave out
-    results within reach of a gap. Inputs without lost samples are returned as recorded.
+    A gap is filled by the mean of the readings one period before and after, both taken at the same phase by linear
+    interpolation. The error for a vibration that grows or drifts steadily is therefore of second order. Use this for windows
+    and spectra, which need signals without gaps; the caller must leave out results within reach of a gap. Inputs without lost
+    samples are returned as recorded.
     """
     columns = [stretch["inputs"][:, channels].astype(float) for stretch in stretches(rows)]
     inputs = np.concatenate(columns) if columns else rows["inputs"][:, channels].astype(float)
     lost = lost_rows(rows)
     if not lost.any() or lost.all():
         return inputs
-    turns = _turns(rows["theta_rad"].astype(float))
+    theta_rad = rows["theta_rad"].astype(float)
+    known = np.flatnonzero(np.isfinite(theta_rad))  # rows may be missing in a damaged journal
+    turns = np.interp(np.arange(theta_rad.size), known, np.unwrap(theta_rad[known]) / (2.0 * math.pi))
     there, at = turns[~lost], turns[lost]
     before, after = at - 1.0 >= there[0], at + 1.0 <= there[-1]
     for column in inputs.T:
-        known = column[~lost]
-        earlier, later = np.interp(at - 1.0, there, known), np.interp(at + 1.0, there, known)
+        read = column[~lost]
+        earlier, later = np.interp(at - 1.0, there, read), np.interp(at + 1.0, there, read)
         column[lost] = np.select(
-            [before & after, before, after], [0.5 * (earlier + later), earlier, later], np.interp(at, there, known)
+            [before & after, before, after], [0.5 * (earlier + later), earlier, later], np.interp(at, there, read)
         )
     return inputs

@@ -94,11 +94,10 @@ def start_refusal(bench: Bench, plan: Plan, point: Point[object]) -> str:
 def _judged(bench: Bench, point: Point[object], misfits: Sequence[Misfit]) -> Point[object]:
     if not misfits:
         return point
-    worst = max(misfit.factor for misfit in misfits)
-    point = replace(point, misfit=max(worst, _misfit_of(point)))
-    if not any(misfit.warned for misfit in misfits):
-        return point
+    point = replace(point, misfit=max(*(misfit.factor for misfit in misfits), _misfit_of(point)))
     names = {misfit.channel for misfit in misfits if misfit.warned}
+    if not names:
+        return point
     point = replace(point, misfit_channels=tuple(sorted(names)))
     text = misfit_sentence(misfits, bench.channels[bench.index_of("drive")].name)
     if not any(misfit.refused for misfit in misfits) or not point.accepted:
@@ -131,7 +130,8 @@ def _of_a_tone(bench: Bench, plan: Plan, point: Point[object], before: Sequence[
         off = [abs(math.log(vibration_of(one).frequency_hz / frequency_hz)) for one in before]
         before = [before[i] for i in np.argsort(off, kind="stable")[:FEW] if off[i] < NEAR]
     usual = np.median([ratios_of(one, drive) for one in before[-MANY:]], axis=0) if before else None
-    shapes = shapes_of(bench, plan) if locked or _near_the_mode(bench, point) else None
+    near = abs(math.log(vibration_of(point).frequency_hz / bench.specimen.linear_frequency_hz)) < NEAR
+    shapes = shapes_of(bench, plan) if locked or near else None
     out = []
     for index, channel in enumerate(bench.channels):
         if channel.role != "response" or spread is None:
@@ -154,11 +154,11 @@ def _of_the_force(
     Damping may change with the square root of the level. Over several levels it may change so much that it hides a fault.
     Therefore a point does not fit if it agrees with a nearer point whose force did not fit.
     """
-    force = bench.channels[bench.index_of("force")].name
+    force, lag_deg = bench.channels[bench.index_of("force")].name, point.asked_phase_lag_deg or 0.0
     nearest, misfitting = (
         min(
             (one for one in some if one.level_unit == point.level_unit),
-            key=lambda one: (_apart(point, one), _lags_apart(point, one)),
+            key=lambda one: (_apart(point, one), abs(lag_deg - (one.asked_phase_lag_deg or 0.0))),
             default=None,
         )
         for some in (usual, [one for one in before if force in one.misfit_channels])
@@ -255,15 +255,5 @@ def _swapped(bench: Bench, sizes: np.ndarray, shapes: np.ndarray) -> list[Misfit
     return [Misfit(names[0], float(sizes[one]), float(shapes[one]), WARNED, Reference.SHAPES, swapped_with=names[1])]
 
 
-def _near_the_mode(bench: Bench, point: Point[object]) -> bool:
-    return abs(math.log(vibration_of(point).frequency_hz / bench.specimen.linear_frequency_hz)) < NEAR
-
-
 def _apart(one: Point[object], other: Point[object]) -> float:
-    """Distance between the levels of two points, as a logarithm."""
     return abs(math.log(one.level / other.level))
-
-
-def _lags_apart(one: Point[object], other: Point[object]) -> float:
-    """Distance between the requested lags of two points, deg."""
-    return abs((one.asked_phase_lag_deg or 0.0) - (other.asked_phase_lag_deg or 0.0))

@@ -5,11 +5,13 @@ from typing import Any, TypeVar, overload
 
 import numpy as np
 
-from identification import IdentificationError
+from identification import Backbone, IdentificationError
 from rig.bench import Bench
 from rig.bench.configuration import validated
+from rig.campaigns.evaluation.drift import without_repetition
 from rig.campaigns.evaluation.point import Point, point_name
 from rig.campaigns.evaluation.stored_point import point_from
+from rig.campaigns.evaluation.vibrations import channels_from, vibration_from
 from rig.campaigns.planning.drive_shape import DriveShape, drive_shape
 from rig.campaigns.planning.plant import PlantFacts
 from rig.errors import RecordingError
@@ -61,6 +63,19 @@ def accepted_points(recording: Recording, result: type[Result]) -> list[Point[Re
     accepted = [point for point in points_of(recording, result) if point.accepted]
     IdentificationError.raise_if(not accepted, "none of the recording was accepted", field="points")
     return accepted
+
+
+def settled_backbone(recording: Recording, phase_lag_target_deg: float) -> Backbone:
+    """Return the accepted points of the current plan as a backbone, in the order of the plan.
+
+    Raises `IdentificationError` if no point was accepted.
+    """
+    points = points_of(recording)
+    accepted = [point for point in without_repetition(points) if point.accepted]
+    IdentificationError.raise_if(not accepted, "none of the recording was accepted", field="points")
+    channels, shape = channels_from(recording.channels), recorded_drive_shape(recording, points)
+    vibrations = tuple(vibration_from(point, channels, phase_lag_target_deg) for point in accepted)
+    return shape.backbone(vibrations, [point.direction for point in accepted], [point.repeat for point in accepted])
 
 
 def point_rows(recording: Recording, number: int) -> np.ndarray:

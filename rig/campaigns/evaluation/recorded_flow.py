@@ -4,7 +4,7 @@ import numpy as np
 
 from identification import SlowFlow, slow_flow
 from rig.bench import Bench
-from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, too_many_lost
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, too_many_lost, windows
 from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.vibrations import channels_of
 from rig.campaigns.planning.drive_shape import drive_shape
@@ -52,11 +52,7 @@ def flagged(bench: Bench, rows: Rows, flow: SlowFlow) -> dict[str, np.ndarray]:
     An instant is unusable if, within its window, the output, the frequency or a sensor was at a limit, or more than 2 % of the
     samples were lost; fewer are filled in.
     """
-    half = HALF_WINDOW_PERIODS / flow.frequency_hz
-    first, end = (
-        np.clip(np.rint((flow.time_s + side * half) * bench.sample_rate_hz), 0, rows.size).astype(int)
-        for side in (-1, 1)
-    )
+    first, end = windows(flow.time_s, HALF_WINDOW_PERIODS / flow.frequency_hz, bench.sample_rate_hz, rows.size)
     out = {}
     for reason, bit in (
         (AT_VOLTAGE_LIMIT, SATURATED),

@@ -6,7 +6,7 @@ from io import FileIO
 from pathlib import Path
 from tempfile import TemporaryFile
 from threading import Lock
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -125,34 +125,24 @@ def turned_rad(rows: Rows) -> float:
     return last - first
 
 
-class _Moments:
-    """Number, mean and sum of squared deviations of values that come in stretches."""
-
-    def __init__(self) -> None:
-        self.count, self.mean, self.squares = 0, 0.0, 0.0
-
-    def add(self, values: np.ndarray) -> Self:
-        """Add values; those of one stretch alone give the mean and the deviation of `numpy.std` to the last bit."""
-        if values.size:
-            mean = float(values.mean())
-            total, away = self.count + values.size, mean - self.mean
-            self.squares += float(((values - mean) ** 2).sum()) + away**2 * self.count * values.size / total
-            self.mean += away * (values.size / total)
-            self.count = total
-        return self
-
-
 def mean_of(parts: Iterable[np.ndarray]) -> float:
     """Mean of values that come in stretches; NaN without any."""
-    found = _Moments()
-    for values in parts:
-        found.add(values)
-    return found.mean if found.count else math.nan
+    return _moments(parts)[0]
 
 
 def std_of(parts: Iterable[np.ndarray]) -> float:
     """Standard deviation of values that come in stretches; NaN without any."""
-    found = _Moments()
+    return _moments(parts)[1]
+
+
+def _moments(parts: Iterable[np.ndarray]) -> tuple[float, float]:
+    """Return mean and standard deviation; of a single stretch, those of numpy to the last bit."""
+    count, mean, squares = 0, 0.0, 0.0
     for values in parts:
-        found.add(values)
-    return math.sqrt(found.squares / found.count) if found.count else math.nan
+        if values.size:
+            own = float(values.mean())
+            total, away = count + values.size, own - mean
+            squares += float(((values - own) ** 2).sum()) + away**2 * count * values.size / total
+            mean += away * (values.size / total)
+            count = total
+    return (mean, math.sqrt(squares / count)) if count else (math.nan, math.nan)

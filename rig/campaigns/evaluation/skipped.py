@@ -34,7 +34,6 @@ def repeats_summary(points: Iterable[Point[object]]) -> str:
 
 
 def _place(point: Point[object]) -> str:
-    """Return the level of a point, with the frequency or lag if the plan asks for one."""
     where = [f"{point.level:.4g} {point.level_unit}"]
     if point.asked_frequency_hz is not None:
         where.append(f"{point.asked_frequency_hz:.6g} Hz")

@@ -47,7 +47,6 @@ def stored(point: Point[object]) -> dict[str, JsonValue]:
 
 
 def _table(value: "DataclassInstance") -> dict[str, JsonValue]:
-    """Return the keys and values of a dataclass, including those of its parts."""
     out: dict[str, JsonValue] = {}
     for one in fields(value):
         content = getattr(value, one.name)
@@ -97,7 +96,6 @@ def _quality(table: Mapping[str, object]) -> Quality:
 
 
 def _read(kind: Kind, table: Mapping[str, object], result: Kind | None = None) -> Any:
-    """Build a dataclass from the keys of a table."""
     found: dict[str, object] = {}
     for one, inner, optional in _layout(kind):
         inner = result if inner is None and one.metadata == PART else inner
@@ -138,7 +136,6 @@ def _value(one: Field[object], inner: Kind | None, stored_value: object) -> obje
 
 
 def _fits(value: object, hint: object) -> bool:
-    """Return whether a value is of a type; of types that JSON does not have, everything is."""
     options = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     return any(_is(value, option) for option in options)
 
@@ -186,25 +183,13 @@ def value_of(point: Point[object], name: str) -> Any:
     return next((getattr(part, name) for part in _parts(point) if name in _own_names(type(part))), None)
 
 
-def names_of(result: Kind) -> frozenset[str]:
-    """Return the names of all fields that points of a kind of campaign have, given the class of its results."""
-    return frozenset(_names(Point)) | frozenset(_names(result))
-
-
 def _parts(value: "DataclassInstance") -> "Iterator[DataclassInstance]":
-    """Yield a dataclass and all parts in it."""
     yield value
     for one in fields(value):
         if one.metadata == PART and (part := getattr(value, one.name)) is not None:
             yield from _parts(part)
 
 
+@cache
 def _own_names(kind: Kind) -> frozenset[str]:
     return frozenset(one.name for one in fields(kind) if one.metadata != PART)
-
-
-def _names(kind: Kind) -> Iterator[str]:
-    yield from _own_names(kind)
-    for one, inner, _ in _layout(kind):
-        if one.metadata == PART and inner is not None:
-            yield from _names(inner)

@@ -8,9 +8,8 @@ from rig.campaigns.evaluation.lost_samples import bridged
 from rig.campaigns.evaluation.point import Point, Quality
 from rig.campaigns.evaluation.rows import Rows, stretches
 
-STANDS_OUT = (
-    4.0  # times the usual change from period to period; noise in a whole period, or a lasting beat, stays below 2
-)
+STANDS_OUT = 4.0
+"""Times the usual change from period to period; noise in a whole period, or a lasting beat, stays below 2."""
 FEWEST_PERIODS = 4  # for a median of changes from period to period; chosen
 
 
@@ -43,9 +42,6 @@ def _changes(bench: Bench, rows: Rows) -> np.ndarray | None:
         return None
     per_period = rows.size // (periods + 1)
     at = turns[0] + np.arange(periods * per_period) / per_period
-    inputs = bridged(rows)
-    out = []
-    for role in ("force", "drive"):
-        signal = np.interp(at, turns, inputs[:, bench.index_of(role)]).reshape(periods, per_period)
-        out.append(np.sqrt(np.mean(np.diff(signal, axis=0) ** 2, axis=1)))
-    return np.array(out)
+    inputs = bridged(rows)[:, [bench.index_of("force"), bench.index_of("drive")]]
+    signals = np.array([np.interp(at, turns, one) for one in inputs.T]).reshape(2, periods, per_period)
+    return np.asarray(np.sqrt(np.mean(np.diff(signals, axis=1) ** 2, axis=2)))

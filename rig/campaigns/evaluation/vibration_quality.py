@@ -11,6 +11,17 @@ from rig.campaigns.evaluation.rows import Rows, mean_of, std_of, stretches
 from rig.campaigns.evaluation.vibrations import quantisation_warnings
 from rig.text.column import Column
 
+_SHARED = (
+    Column("force_n", "force", "N", ".4f", plain=True),
+    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
+    Column("amplitude_m", "amplitude", "mm", ".4f", 1e3, plain=True),
+    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
+    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
+    Column("phase_error_deg", "phase error", "deg", ".2f"),
+    Column("level_error", "level error", "%", ".2f", 100.0),
+)
+FINE_AMPLITUDE = Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True)
+"""Column of an amplitude that is held, or whose changes count."""
 PURITY_COLUMNS = (
     Column("force_purity", "force purity", "%", ".2f", 100.0),
     Column("response_purity", "response purity", "%", ".2f", 100.0, in_line=False),
@@ -18,11 +29,15 @@ PURITY_COLUMNS = (
 )
 """Last columns in the tables of all campaigns under a phase lock."""
 
-BIASED_DAMPING = (
-    0.01  # power of all higher harmonics over that of the fundamental, above which the two dampings differ too much
-)
+BIASED_DAMPING = 0.01
+"""Power of all higher harmonics over that of the fundamental, above which the two dampings differ too much."""
 OTHER_MODE = 0.1  # a nonlinear resonance this far from the linear one more likely belongs to another mode
 SCATTERING_DEG = 5.0  # a larger scatter of the lag indicates a signal that hardly exceeds noise and converter steps
+
+
+def shared_columns(*keys: str) -> tuple[Column, ...]:
+    """Return columns that tables of several kinds of campaigns have, by their keys."""
+    return tuple(next(column for column in _SHARED if column.key == key) for key in keys)
 
 
 def purity(vibration: PeriodicVibration) -> Purity:

@@ -48,7 +48,7 @@ POLARITY_DEG = 60.0  # a larger phase error does not come from a settling time t
 FEW_BITS = 20.0  # below this, quantisation may change the damping by a percent unless noise dithers it
 
 
-def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool) -> Point[object]:
+def not_evaluated(plan: Plan, target: Target, error: Exception, settled: bool = True) -> Point[object]:
     """Return a point whose rows contain no vibration that can be evaluated."""
     return replace(planned_point(plan, target), settled=settled).refused(f"cannot be evaluated: {error}")
 

@@ -1,5 +1,6 @@
 """The multisine campaign in open loop: periodic random-phase signals, recorded realisation by realisation in whole periods."""
 
+from itertools import product
 from typing import Literal, Self
 
 import numpy as np
@@ -94,12 +95,8 @@ class MultisinePlan(OpenLoopPlan):
 
     def targets(self) -> tuple[Target, ...]:
         """Return every realisation at the first level, then at the next level, and so on."""
-        return tuple(
-            Target(number=number, level=level, realisation=realisation)
-            for number, (level, realisation) in enumerate(
-                (level, realisation) for level in self.levels_rms_v for realisation in range(self.realisations)
-            )
-        )
+        pairs = product(self.levels_rms_v, range(self.realisations))
+        return tuple(Target(number=n, level=level, realisation=index) for n, (level, index) in enumerate(pairs))
 
     def waveforms(self, sample_rate_hz: float) -> np.ndarray:
         """Return one period of every realisation, scaled to unit peak: float64[realisations, period]."""

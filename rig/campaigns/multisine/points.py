@@ -20,10 +20,9 @@ from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.lost_samples import lost_rows, rms_of
 from rig.campaigns.evaluation.point import Point, Quality, planned_point, result_of
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
-from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.planning.plan import Target
-from rig.daq import Channel
 from rig.recording.reader import Recording
 from rig.text.column import Column
 
@@ -61,14 +60,14 @@ def measure_multisine_point(
     bench: Bench, plan: MultisinePlan, target: Target, rows: np.ndarray, settling: np.void
 ) -> Point[object]:
     """Evaluate a recorded realisation and its quality."""
-    try:
-        spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=False)
-    roles = {channel.role: channel.name for channel in bench.channels}
+    spectra = spectra_of(bench, plan, {target.realisation or 0: rows})
+    roles, names = {c.role: c.name for c in bench.channels}, [c.name for c in bench.channels]
     periods = spectra.spectra.shape[1]
-    still = next((c.name for c, column in _watched(bench, rows) if not np.ptp(column)), "")
+    readings = rows["inputs"][~lost_rows(rows)]
+    still = next((name for name in (roles["force"], roles["drive"]) if not np.ptp(readings[:, names.index(name)])), "")
     change = max(_change(spectra, roles[role]) for role in ("force", "drive")) if periods > 1 else math.nan
+    warnings = [f"{plan.periods - periods} of {plan.periods} periods are left out"] if periods < plan.periods else []
+    warnings += ["one period only: neither noise nor a transient can be told"] if periods == 1 else []
     reason = f"channel {still} does not change at all: sensor, cable or supply is dead" if still else ""
     if not reason and change > plan.accepted_change:
         reason = (
@@ -80,7 +79,7 @@ def measure_multisine_point(
         settled=not reason if periods > 1 else None,
         reason=reason,
         quality=Quality.of(reason),
-        warnings=_warnings(plan.periods, periods),
+        warnings=tuple(warnings),
         channel_rms=tuple(rms_of(rows)),
         result=MultisineResult(
             force_rms_n=spectra.rms(roles["force"]),
@@ -91,18 +90,6 @@ def measure_multisine_point(
             periods=plan.periods,
         ),
     )
-
-
-def _watched(bench: Bench, rows: np.ndarray) -> list[tuple[Channel, np.ndarray]]:
-    """Return force and drive channels with their readings, without lost samples."""
-    readings = rows["inputs"][~lost_rows(rows)]
-    return [(c, readings[:, i]) for i, c in enumerate(bench.channels) if c.role in ("force", "drive")]
-
-
-def _warnings(planned: int, periods: int) -> tuple[str, ...]:
-    """Return warnings about the number of used periods compared with the ``planned`` number."""
-    left_out = (f"{planned - periods} of {planned} periods are left out",) if periods < planned else ()
-    return (*left_out, *(("one period only: neither noise nor a transient can be told",) if periods == 1 else ()))
 
 
 def spectra_of(bench: Bench, plan: MultisinePlan, records: Mapping[int, np.ndarray]) -> PeriodicSpectra:
@@ -134,18 +121,14 @@ def turned_periods(bench: Bench, plan: MultisinePlan, index: int, rows: np.ndarr
     if rows.size < plan.periods * size:
         raise IdentificationError(f"has {rows.size} samples", field="record", allowed=f"{plan.periods * size}")
     rows = rows[: plan.periods * size]
-    begun = _samples_since_begin(rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index))
+    output, played = rows["output_v"][:size].astype(float), design.realisation(plan.phase_seed, index)
+    # The sample of the played period at which the recorded one starts.
+    begun = int(np.argmax(np.fft.irfft(np.conj(np.fft.rfft(output)) * np.fft.rfft(played), size)))
     signals = np.vstack([rows["inputs"].T.astype(float), rows["output_v"].astype(float)])
     periods = signals.reshape(signals.shape[0], plan.periods, size)
     whole = ~lost_rows(rows).reshape(plan.periods, size).any(axis=1)
     IdentificationError.raise_if(not whole.any(), "samples were lost on their way in every period", field="record")
     return np.asarray(np.roll(periods[:, whole], begun, axis=2))
-
-
-def _samples_since_begin(output: np.ndarray, period: np.ndarray) -> int:
-    """Return the sample of the played ``period`` at which the recorded period of ``output`` starts."""
-    match = np.fft.irfft(np.conj(np.fft.rfft(output)) * np.fft.rfft(period), period.size)
-    return int(np.argmax(match))
 
 
 def _change(spectra: PeriodicSpectra, name: str) -> float:

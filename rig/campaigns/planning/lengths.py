@@ -6,7 +6,7 @@ from rig.bench import Bench
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError
-from rig.tick.sequencer.layout import SegmentKind
+from rig.tick.sequencer.layout import EVALUATED, SegmentKind
 from rig.tick.sequencer.segments import Segment
 
 LONGEST_DAYS = 100.0
@@ -34,12 +34,7 @@ def check_length(plan: Plan, bench: Bench) -> None:
         duration_s = _duration_s(plan, bench, segment)
         took[segment.kind] += duration_s
         rows = duration_s * bench.sample_rate_hz
-        if rows > MOST_ROWS and segment.kind in (
-            SegmentKind.RECORD,
-            SegmentKind.SWEEP,
-            SegmentKind.LEVEL_SWEEP,
-            SegmentKind.RELEASE,
-        ):
+        if rows > MOST_ROWS and segment.kind in EVALUATED:
             raise ConfigurationError(
                 f"up to {rows:.3g} samples of one record at {bench.sample_rate_hz:g} samples/s",
                 field=_keys(plan, segment.kind),

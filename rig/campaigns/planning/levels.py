@@ -73,7 +73,6 @@ class Levels(Configured):
 
     @property
     def _given(self) -> dict[str, tuple[float, ...]]:
-        """The levels, by each level key that is given."""
         levels = {
             "levels_v": self.levels_v,
             "levels_n": self.levels_n,

@@ -2,6 +2,7 @@
 
 import math
 from abc import abstractmethod
+from collections.abc import Iterable
 from typing import Literal, Self
 
 from pydantic import AliasChoices, Field, model_validator
@@ -44,6 +45,17 @@ class Target(Configured):
     fundamental, and phase in deg."""
     repeats_first: bool = False
     """Whether this is the repetition of the first point at the end, which reveals a drift. It enters no result."""
+
+
+def passes(values: Iterable[float], direction: str) -> list[tuple[float, Literal["up", "down"]]]:
+    """Return each value with its direction: rising (``up``), falling (``down``), or rising and falling (``up-down``).
+
+    ``up-down`` has the highest value once.
+    """
+    rising = sorted(values)
+    out: list[tuple[float, Literal["up", "down"]]] = [] if direction == "down" else [(value, "up") for value in rising]
+    falling = rising[::-1] if direction == "down" else rising[-2::-1]
+    return out if direction == "up" else [*out, *((value, "down") for value in falling)]
 
 
 def with_first_repeated(targets: tuple[Target, ...]) -> tuple[Target, ...]:
@@ -180,13 +192,11 @@ class Plan(Configured):
 
     def longest_delay_s(self, bench: Bench, at_most_s: float) -> float:
         """Return the longest delay, up to ``at_most_s``, from an output to the input that shows it that the gains bear, s."""
-        return at_most_s if self.law.harmonics is None else min(at_most_s, self._harmonics_bear_s(bench))
-
-    def _harmonics_bear_s(self, bench: Bench) -> float:
-        """Return the delay with which the harmonics loop has the smallest phase margin allowed, s."""
-        assert self.law.harmonics is not None
-        segments = self.segments(bench.sample_rate_hz)
-        return self.law.harmonics.longest_delay_s(highest_frequency_hz(self.law, segments))
+        loop = self.law.harmonics
+        if loop is None:
+            return at_most_s
+        highest_hz = highest_frequency_hz(self.law, self.segments(bench.sample_rate_hz))
+        return min(at_most_s, loop.longest_delay_s(highest_hz))
 
     def check_delay(self, bench: Bench, loop_delay_samples: float) -> None:
         """Raise `ConfigurationError` for gains that are not stable with ``loop_delay_samples`` from output to input.

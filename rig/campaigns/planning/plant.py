@@ -1,4 +1,4 @@
-"""Knowledge of the plant in a plan, and the checks that it allows before anything moves."""
+"""Knowledge of the plant in a plan, and the checks of the gains that it allows before anything moves."""
 
 import math
 from collections.abc import Sequence
@@ -17,16 +17,11 @@ from controller.tuning import (
     gains_at_half,
     unstable_poles,
 )
-from rig.bench import Bench
 from rig.bench.configuration import Configured
-from rig.campaigns.planning.levels import Levels
-from rig.campaigns.planning.levels_on_plant import MORE_DAMPING, check_motion, check_voltage, lags_text
+from rig.campaigns.planning.levels_on_plant import MORE_DAMPING, lags_text
 from rig.errors import ConfigurationError
 from vibrolock.errors import InputError
 
-DELAY_RESERVE = 1.5  # of the delay at which the gains must still be stable
-DELAY_STEP = 1.25  # between delays that are tried
-BISECTIONS = 5  # of the last step: to a percent
 CLOSEST_DEG = 0.5  # spacing of the lags that are checked on the plant: at most a few hundred, each takes milliseconds
 
 
@@ -101,106 +96,21 @@ class PlantFacts(Configured):
         return PlantModel(**self.model_dump(exclude={"response_ratios", "response_ratio_stds", "response_turns_deg"}))
 
 
-class KnownPlant(Levels):
-    """Levels of a plan that may contain a model of its plant."""
+def control_loops(
+    plant: PlantModel, law: PhaseLockedLoop, amplitude_law: AmplitudeLaw, lags_deg: Sequence[float]
+) -> list[ControlLoop]:
+    """Return the control loop at each lag.
 
-    plant: PlantFacts | None = None
-    """The plant as measured by ``rig tune``. If it is given, gains that are unstable on it and levels beyond the bench's limits
-    are refused."""
-
-    @property
-    def known_plant(self) -> PlantModel | None:
-        """Model of exciter and structure, if the plan contains one."""
-        return None if self.plant is None else self.plant.model
-
-    def ratios_to_drive(self, bench: Bench) -> dict[str, float]:
-        """Return the motion of each channel per metre at the drive point: as measured, else from the bench's mode shapes."""
-        measured = {} if self.plant is None else self.plant.response_ratios
-        names = [channel.name for channel in bench.channels if channel.role == "response"]
-        for name in measured:
-            if name not in names:
-                raise ConfigurationError(
-                    field=f"plant.response_ratios.{name}",
-                    allowed=f"a response channel of the bench {bench.name}: {', '.join(names) or 'it has none'}",
-                )
-        return bench.response_ratios | measured
-
-    def check_plant(self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float]) -> None:
-        """Refuse gains that are unstable or too quick on the known plant at one of the lags, and levels beyond its reach."""
-        if self.plant is None:
-            return
-        plant, lags_deg = self.plant.model, _apart(lags_deg)
-        try:
-            # A sign detector cannot be linearised.
-            if law.detector != "sign":
-                loops = self._loops(plant, law, lags_deg, bench)
-                _check_quickness(loops)
-                _check_stability(loops)
-            check_voltage(self, plant, lags_deg, bench)
-            check_motion(self, plant, lags_deg, bench, self.ratios_to_drive(bench))
-        except ValueError as error:
-            raise ConfigurationError.of(error, within="plant") from None
-
-    def check_delay_on_plant(
-        self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float], delay_s: float
-    ) -> None:
-        """Refuse gains that do not bear a delay on the known plant (`longest_delay_on_plant_s`)."""
-        longest_s = self.longest_delay_on_plant_s(bench, law, lags_deg, delay_s)
-        if delay_s <= longest_s:
-            return
-        given = ", ".join(f"{name} = {getattr(law, name):g}" for name in law.gain_names(self.amplitude_law))
-        raise ConfigurationError(
-            f"{given}: unstable on the known plant ([plant]) with {DELAY_RESERVE:g} times "
-            f"{1000.0 * delay_s:.3g} ms from output to input",
-            field="controller",
-            allowed=f"up to {1000.0 * longest_s:.3g} ms: shorter blocks or queue, smaller gains, or those that `rig "
-            "tune` finds with this delay",
-        )
-
-    def longest_delay_on_plant_s(
-        self, bench: Bench, law: PhaseLockedLoop, lags_deg: Sequence[float], at_most_s: float
-    ) -> float:
-        """Return the longest delay, up to ``at_most_s``, that the gains bear: with `DELAY_RESERVE` times it they are stable.
-
-        That of the plan itself is always allowed. ``at_most_s`` if the plant is not known.
-        """
-        known = self.known_plant
-        if known is None or law.detector == "sign" or at_most_s <= known.delay_s:
-            return at_most_s
-        lags_deg = _apart(lags_deg)
-
-        def unstable(seconds: float) -> bool:
-            plant = replace(known, latency_samples=DELAY_RESERVE * seconds * known.sample_rate_hz)
-            return any(unstable_poles(loop) > 0 for loop in self._loops(plant, law, lags_deg, bench))
-
-        low = high = max(known.delay_s, 1e-6)  # stability is not monotone in the delay: the first limit is looked for
-        while high < at_most_s:
-            low, high = high, min(DELAY_STEP * high, at_most_s)
-            if unstable(high):
-                break
-        else:
-            return at_most_s
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if unstable(middle) else (middle, high)
-        return low
-
-    def _loops(
-        self, plant: PlantModel, law: PhaseLockedLoop, lags_deg: Sequence[float], bench: Bench
-    ) -> list[ControlLoop]:
-        """Return the control loop at each lag.
-
-        The steady force cannot be linearised. If it is used, only the inner loops are returned.
-        """
-        amplitude_law = self.amplitude_law
-        if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
-            through = law.force_loop == "through-response"
-            amplitude_law = AmplitudeLaw.RESPONSE if through else AmplitudeLaw.VOLTAGE
-        laws = [law.model_copy(update={"phase_lag_deg": lag}) for lag in lags_deg]
-        return [control_loop(plant, at_lag, amplitude_law, plant.drive_shape) for at_lag in laws]
+    The steady force cannot be linearised. If it is used, only the inner loops are returned.
+    """
+    if law.rest_low_pass_rad_s > 0.0 and amplitude_law in (AmplitudeLaw.FORCE, AmplitudeLaw.FORCE_RMS):
+        through = law.force_loop == "through-response"
+        amplitude_law = AmplitudeLaw.RESPONSE if through else AmplitudeLaw.VOLTAGE
+    laws = [law.model_copy(update={"phase_lag_deg": lag}) for lag in lags_deg]
+    return [control_loop(plant, at_lag, amplitude_law, plant.drive_shape) for at_lag in laws]
 
 
-def _apart(lags_deg: Sequence[float]) -> list[float]:
+def lags_apart(lags_deg: Sequence[float]) -> list[float]:
     """Return the lags without those so close to the previous one that the loop is the same. The last lag is always included."""
     *rising, last = sorted(lags_deg)
     out: list[float] = []
@@ -210,7 +120,7 @@ def _apart(lags_deg: Sequence[float]) -> list[float]:
     return [*out, last]
 
 
-def _check_quickness(loops: Sequence[ControlLoop]) -> None:
+def check_quickness(loops: Sequence[ControlLoop]) -> None:
     """Refuse a loop that would have to act within a period or two, which is faster than any demodulator can follow."""
     found = [(gain, name, loop) for loop in loops for name, gain in gains_at_half(loop).items()]
     gain, name, loop = max(found, key=lambda entry: entry[0])
@@ -225,7 +135,8 @@ def _check_quickness(loops: Sequence[ControlLoop]) -> None:
         )
 
 
-def _check_stability(loops: Sequence[ControlLoop]) -> None:
+def check_stability(loops: Sequence[ControlLoop]) -> None:
+    """Refuse loops that are unstable, and say with how much damping they would be stable."""
     unstable = [loop for loop in loops if unstable_poles(loop) > 0]
     if not unstable:
         return

@@ -1,6 +1,7 @@
 """The response-controlled campaign: hold the drive point's displacement while the phase lag steps through resonance."""
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
@@ -9,7 +10,7 @@ from controller import AmplitudeLaw
 from rig.bench import Bench
 from rig.campaigns.planning.levels import ONE_LEVEL_KEY
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target
+from rig.campaigns.planning.plan import Target, passes
 from rig.errors import ConfigurationError
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment, SettleRule
@@ -70,19 +71,10 @@ class ResponseControlledPlan(SettledPlan):
 
     def targets(self) -> tuple[Target, ...]:
         """Return all points: all lags at each level, the lowest level first. ``up-down`` passes the lags up, then down."""
-        rising = sorted(self.phase_lags_deg)
-        ways: dict[str, list[tuple[float, Literal["up", "down"]]]] = {
-            "up": [(lag, "up") for lag in rising],
-            "down": [(lag, "down") for lag in rising[::-1]],
-        }
-        ways["up-down"] = ways["up"] + ways["down"][1:]
         return tuple(
             Target(number=number, level=level, direction=direction, repeat=repeat, phase_lag_deg=lag)
-            for number, (repeat, level, lag, direction) in enumerate(
-                (repeat, level, lag, direction)
-                for repeat in range(1, self.repeats + 1)
-                for level in sorted(self.levels)
-                for lag, direction in ways[self.direction]
+            for number, (repeat, level, (lag, direction)) in enumerate(
+                product(range(1, self.repeats + 1), sorted(self.levels), passes(self.phase_lags_deg, self.direction))
             )
         )
 
@@ -119,9 +111,8 @@ class ResponseControlledPlan(SettledPlan):
     def _ramp(self, at: Target | None, target: Target, number: int) -> Segment:
         """Return the ramp to a point, from the previous lag or from another level."""
         on_the_way = at is not None and (at.level, at.repeat) == (target.level, target.repeat)
-        return self._segment(
-            SegmentKind.RAMP, target, number, self.ramp_periods if on_the_way else self.level_ramp_periods
-        )
+        periods = self.ramp_periods if on_the_way else self.level_ramp_periods
+        return self._segment(SegmentKind.RAMP, target, number, periods)
 
     def _segment(self, kind: SegmentKind, target: Target, number: int, periods: float) -> Segment:
         failure, lost = (OnFailure[rule.upper()] for rule in (self.on_failure, self.on_lost_lock))

@@ -1,29 +1,28 @@
 """Points of a response-controlled test: their contents and their evaluation from recorded rows."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import FrequencyResponse, IdentificationError
+from identification import FrequencyResponse
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
-from rig.campaigns.evaluation.acceptance import level_objection, settled_point, with_settling
+from rig.campaigns.evaluation.acceptance import level_error, settled_point, with_settling
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
-from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluation.vibration_quality import FINE_AMPLITUDE, PURITY_COLUMNS, shared_columns
+from rig.campaigns.evaluation.vibrations import recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Target
 from rig.campaigns.response_controlled.plan import ResponseControlledPlan
 from rig.text.column import Column
 
 RESPONSE_CONTROLLED_COLUMNS = (
     Column("asked_phase_lag_deg", "lag asked for", "deg", ".0f"),
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
-    Column("force_n", "force", "N", ".4f", plain=True),
-    Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
-    Column("level_error", "level error", "%", ".2f", 100.0),
-    Column("phase_error_deg", "phase error", "deg", ".2f"),
+    *shared_columns("frequency_hz", "force_n"),
+    FINE_AMPLITUDE,
+    *shared_columns("level_error", "phase_error_deg"),
     *PURITY_COLUMNS,
 )
 
@@ -41,17 +40,12 @@ class ResponseControlledResult:
 def measure_response_controlled_point(
     bench: Bench, plan: ResponseControlledPlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[object]:
-    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
+    """Evaluate a recorded point and its quality."""
     rows = rows[within_periods(rows, plan.record_periods)]
-    try:
-        wanted = (target.phase_lag_deg or 0.0) + 180.0
-        vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=wanted)
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=True)
-    missed = vibration.amplitude_m / target.level - 1.0
-    off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
+    vibration = recorded_vibration(bench, rows, plan.harmonics, (target.phase_lag_deg or 0.0) + 180.0)
+    missed, off_level = level_error(plan.amplitude_law, target.level, vibration, math.nan, plan.accepted_level_error)
     point = settled_point(plan, target, bench, vibration, rows, off_level)
-    result = ResponseControlledResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed)
+    result = ResponseControlledResult(phase_lag_deg=vibration.phase_lag_deg, level_error=missed or 0.0)
     return with_settling(replace(point, result=result), settling)
 
 

@@ -72,7 +72,9 @@ def remaining(recording: Recording, change: Plan | None = None, source: str | Pa
 
 def identities(plan: Plan) -> tuple[Identity, ...]:
     """Return the physical identity of each target, with numbers rounded to nine digits. The last entry counts equal targets."""
-    common = _rounded((*(attrgetter(path)(plan) for path in KINDS[plan.kind].identity), *_controlled(plan)))
+    loop = plan.law.harmonics
+    controlled = () if loop is None else (loop.channel, loop.highest, loop.left_alone, loop.wanted)
+    common = _rounded((*(attrgetter(path)(plan) for path in KINDS[plan.kind].identity), *controlled))
     seen: Counter[Identity] = Counter()
     out = []
     for target in plan.targets():
@@ -80,12 +82,6 @@ def identities(plan: Plan) -> tuple[Identity, ...]:
         out.append((*what, seen[what]))
         seen[what] += 1
     return tuple(out)
-
-
-def _controlled(plan: Plan) -> Identity:
-    """Return what the harmonics loop makes of the force, nothing without the loop."""
-    loop = plan.law.harmonics
-    return () if loop is None else (loop.channel, loop.highest, loop.left_alone, loop.wanted)
 
 
 def _rounded(values: Iterable[object]) -> Identity:

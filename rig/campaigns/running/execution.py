@@ -8,6 +8,7 @@ from typing import ParamSpec, Protocol, TypeVar
 import numpy as np
 
 from controller import LockState
+from identification import IdentificationError
 from rig.arming.checked_scale import CheckedScale
 from rig.arming.run_options import Progress
 from rig.bench import Bench
@@ -20,16 +21,14 @@ from rig.campaigns.evaluation.rows import Rows
 from rig.campaigns.evaluation.skipped import skipped_summary
 from rig.campaigns.evaluation.stored_point import point_from, stored
 from rig.campaigns.evaluation.transient_disturbance import refused_for_a_transient
-from rig.campaigns.evaluation.vibrations import failed_point
+from rig.campaigns.evaluation.vibrations import failed_point, not_evaluated
 from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.plan import Plan, Target
-from rig.campaigns.running.attempts import RefusedRecords, after_attempts
+from rig.campaigns.running.attempts import MeasuredBefore, RefusedRecords, after_attempts, measured_before_repeat
 from rig.campaigns.running.device_remarks import with_device_remarks, with_disorder
 from rig.campaigns.running.evaluation_thread import EvaluationThread
-from rig.campaigns.running.measured_before import MeasuredBefore, measured_before_repeat
 from rig.campaigns.running.row_buffer import RowBuffer
-from rig.campaigns.running.start import Start
-from rig.campaigns.running.start_judgement import StartJudgement
+from rig.campaigns.running.start_judgement import Start, StartJudgement
 from rig.campaigns.running.stored_rows import StoredRows
 from rig.campaigns.running.trip_advice import Before, Trip, advice_on
 from rig.campaigns.running.tripped_level import tripped_at
@@ -43,15 +42,12 @@ from rig.system.stop_signals import deferred, stopping_on_signals
 from rig.text.disorder import disorder_text
 from rig.tick.safety.layout import EndReason, GuardMode
 from rig.tick.safety.limits import describe_end, end_reason_of
-from rig.tick.sequencer.layout import Outcome, SegmentKind
+from rig.tick.sequencer.layout import EVALUATED, Outcome, SegmentKind
 from vibrolock.one_thread import one_thread
 
-EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
 NO_LOCK = {EndReason.NO_LOCK_IN_WINDOW, EndReason.NO_LOCK}
 UNLOCKED = {Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED, Outcome.NOT_SETTLED}
 OVER = {*Outcome} - {Outcome.PENDING, Outcome.RUNNING, Outcome.SKIPPED, Outcome.INTERRUPTED}
-
-
 P = ParamSpec("P")
 T = TypeVar("T")
 Table = TypeVar("Table", bound=Mapping[str, object])
@@ -115,7 +111,11 @@ class Execution:
         self.locked = any(point.accepted for point in before.points)
         self.last = {"lock": int(LockState.SEARCHING), "guard": int(GuardMode.ARMED)}
         self.kept = RowBuffer(loop.tick.row_dtype, folder)
-        self.stored = StoredRows(plan, loop.tick.arrays.segments, self._evaluated(), bench.sample_rate_hz)
+        segments = loop.tick.arrays.segments
+        self.settles = bool((segments["kind"] == SegmentKind.SETTLE).any())
+        whole = self.batched or plan.evaluates_approach
+        evaluated = segments["point"] >= 0 if whole else np.isin(segments["kind"], list(EVALUATED))
+        self.stored = StoredRows(plan, segments, evaluated, bench.sample_rate_hz)
         self.evaluations = EvaluationThread()
         self.scale = StartJudgement(bench, plan, checked)
         self.start = Start(self.scale, loop)
@@ -153,13 +153,11 @@ class Execution:
             raise RecordingError(f"{self.write_error}; `rig resume` measures the rest once it can be written")
 
     def _remark(self, text: str) -> None:
-        """Record and print a remark of the driver, if there is one."""
         if text:
             self._event({"sample": self.tick.sample, "what": "remark", "text": text})
             self._attempt(self.progress.remark, text)
 
     def _take(self, rows: np.ndarray) -> None:
-        """Record and evaluate a chunk of rows."""
         stored, events = self.stored.take(self.tick.sample - rows.size, rows)
         if stored.size:
             self._record(self.journal.rows, stored)
@@ -220,7 +218,9 @@ class Execution:
     def _collect(self, rows: np.ndarray) -> None:
         """Keep the rows of the current point, and request the evaluation of points that are over."""
         self.kept.add(self.tick.sample - rows.size, rows)
-        self._judge_start()
+        if (due := self.start.due_rows(self.kept)) is not None:
+            self.evaluations.ask(self.start.judge, *due)
+        self._remark(self.start.take_remark())
         self._note_refused()
         outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
         while self.next_segment < segments.size:
@@ -242,20 +242,14 @@ class Execution:
                     record = self.kept.take(first := self._begin(self.next_segment), int(entry["end_sample"]))
                     steady = kind == SegmentKind.RECORD
                     faults = self._faults(self.next_segment, self.next_segment + 1, settled=steady)
-                    self.evaluations.ask(self._measured, first, record, faults, steady, target, settling)
+                    self.evaluations.ask(
+                        self._measured, first, record, faults, [target], steady=steady, settling=settling
+                    )
             self.next_segment += 1
         self.kept.drop_before(self._first_needed())
         while self.evaluations if self.loop.waits else self.evaluations.ready():
             for point in self.evaluations.take():
                 self._report(point)
-
-    def _judge_start(self) -> None:
-        """Request the judgement of the vibration at the start voltage when it is due, and say if it ended undecided."""
-        if (due := self.start.due_rows(self.kept)) is not None:
-            self.evaluations.ask(self.start.judge, *due)
-        if remark := self.start.take_remark():
-            self._event({"sample": self.tick.sample, "what": "remark", "text": remark})
-            self.progress.remark(remark)
 
     def _note_refused(self) -> None:
         """Keep what the sequencer has refused and measures again."""
@@ -278,38 +272,42 @@ class Execution:
         return int(sum(outcomes[name].sum() for name in ("held", "continued", "lost")))
 
     def _measured(
-        self, first: int, rows: Rows, faults: int, steady: bool, target: Target, settling: np.void
+        self,
+        first: int,
+        rows: Rows,
+        faults: int,
+        targets: list[Target],
+        *,
+        steady: bool = False,
+        settling: np.void | None = None,
+        passages: Sequence[Passage] = (),
+        ended: str = "",
     ) -> list[Point[object]]:
-        """Evaluate the point in rows that begin with sample ``first``.
+        """Evaluate the points in rows that begin with sample ``first``, and note those that are worth another attempt.
 
         ``faults``: samples with passing faults of the device; ``steady``: the rows hold one vibration at one level.
         """
-        assert self.kind.measure is not None
-        point = self.kind.measure(self.bench, self.plan, target, rows, settling)
-        point = with_device_remarks(point, rows, self.loop.counters)
-        point = with_force_harmonics(self.bench, self.plan, target, point, int(settling["left_alone"]))
-        return self._located([point], first, rows, faults, steady)
-
-    def _measured_batch(
-        self, first: int, rows: Rows, faults: int, targets: list[Target], passages: Sequence[Passage], ended: str
-    ) -> list[Point[object]]:
-        """Evaluate the points that are measured together in rows that begin with sample ``first``."""
-        assert self.kind.measure_batch is not None
-        points = self.kind.measure_batch(self.bench, self.plan, targets, rows, passages, ended)
-        points = [with_device_remarks(point, rows, self.loop.counters) for point in points]
-        return self._located(points, first, rows, faults, steady=False)
-
-    def _located(
-        self, points: list[Point[object]], first: int, rows: Rows, faults: int, steady: bool
-    ) -> list[Point[object]]:
-        """Add to evaluated points where their rows are stored, and note those that are worth another attempt."""
-        points = [with_heavy_damping(point) for point in points]
+        bench, plan, out = self.bench, self.plan, []
+        try:
+            if self.kind.measure_batch is not None:
+                points = self.kind.measure_batch(bench, plan, targets, rows, passages, ended)
+            else:
+                assert self.kind.measure is not None
+                points = [self.kind.measure(bench, plan, target, rows, settling) for target in targets]
+        except (IdentificationError, ArithmeticError) as error:
+            points = [not_evaluated(plan, target, error, self.settles) for target in targets]
+            points = [replace(point, direction="both") for point in points] if self.batched else points
         kept = self.stored.row_range(first, first + rows.size)
         where = None if kept is None else RowRange(first_sample=kept[0], end_sample=kept[1])
-        for point in points:
-            if refused_for_a_transient(point, self.bench, rows, faults, steady):
+        for target, measured in zip(targets, points, strict=True):
+            point = with_device_remarks(measured, rows, self.loop.counters)
+            if settling is not None:
+                point = with_force_harmonics(bench, plan, target, point, int(settling["left_alone"]))
+            point = with_heavy_damping(point)
+            if refused_for_a_transient(point, bench, rows, faults, steady):
                 self.passing.add(point.number)
-        return [replace(point, rows=where) for point in points]
+            out.append(replace(point, rows=where))
+        return out
 
     def _report_rest(self) -> None:
         """Wait for points still being evaluated, even after a failure elsewhere or in one of them, and report them."""
@@ -317,15 +315,7 @@ class Execution:
             for point in self._anyway(self.evaluations.take) or ():
                 self._anyway(self._report, point)
 
-    def _evaluated(self) -> np.ndarray:
-        """Return which segments belong to the rows with which a point is evaluated, bool[n]."""
-        segments = self.tick.arrays.segments
-        if self.batched or self.plan.evaluates_approach:
-            return np.asarray(segments["point"] >= 0)
-        return np.isin(segments["kind"], list(EVALUATED))
-
     def _begin(self, segment: int) -> int:
-        """Return the first sample of the rows with which a segment is evaluated."""
         if self.plan.evaluates_approach:
             segment = self._point_begins(segment)
         return int(self.tick.outcomes[segment]["first_sample"])
@@ -338,21 +328,20 @@ class Execution:
         return segment
 
     def _first_needed(self) -> int:
-        outcomes, segments = self.tick.outcomes, self.tick.arrays.segments
-        index = self.next_segment
+        outcomes, segments, index = self.tick.outcomes, self.tick.arrays.segments, self.next_segment
         if index >= outcomes.size:
             return self.tick.sample
         if (first := self.start.first_needed()) is not None:
             return first
-        running = int(outcomes[index]["outcome"]) == Outcome.RUNNING
-        of_a_point = int(segments[index]["point"]) >= 0
+        code, of_a_point = int(outcomes[index]["outcome"]), int(segments[index]["point"]) >= 0
+        needed = code == Outcome.RUNNING
         if self.batched and of_a_point:
-            return self._begin(index) if int(outcomes[index]["outcome"]) != Outcome.PENDING else self.tick.sample
-        if self.plan.evaluates_approach and of_a_point:
-            approached = index > 0 and segments[index - 1]["point"] == segments[index]["point"]
-            return self._begin(index) if running or approached else self.tick.sample
-        records = int(segments[index]["kind"]) in EVALUATED
-        return self._begin(index) if records and running else self.tick.sample
+            needed = code != Outcome.PENDING
+        elif self.plan.evaluates_approach and of_a_point:
+            needed = needed or (index > 0 and segments[index - 1]["point"] == segments[index]["point"])
+        else:
+            needed = needed and int(segments[index]["kind"]) in EVALUATED
+        return self._begin(index) if needed else self.tick.sample
 
     def _finish_round(self, *, cut_short: bool = False) -> bool:
         """Evaluate points that are measured together, once all their segments are over or no further segment will run."""
@@ -365,7 +354,7 @@ class Execution:
         targets = [self.targets[number] for number in sorted(numbers - self.measured_before)]
         ended = self._why() if found.ended_early else ""
         faults = self._faults(self.next_segment, found.end_segment, settled=False)
-        self.evaluations.ask(self._measured_batch, first, rows, faults, targets, passages, ended)
+        self.evaluations.ask(self._measured, first, rows, faults, targets, passages=passages, ended=ended)
         self.next_segment = found.end_segment
         return True
 
@@ -405,7 +394,6 @@ class Execution:
         return measured_before_repeat(self.numbers, known, self.to_repeat, self.attempts)
 
     def _mark_unlocked(self) -> None:
-        """If no lock was found at the start voltage, mark all remaining points of the plan as failed for that reason."""
         if EndReason(int(self.tick.guard["reason"][0])) not in NO_LOCK:
             return
         entry = next(one for one in self.tick.outcomes[::-1] if int(one["outcome"]) in UNLOCKED)
@@ -465,11 +453,9 @@ class Execution:
             return f"{down}{self.loop.failure}"
         if self.failure is not None and not self.loop.cause:
             return f"stopped by an error beside the loop: {type(self.failure).__name__}: {self.failure}"
-        return (
-            self.loop.cause
-            if self.loop.cause and reason == EndReason.STOP_REQUESTED
-            else describe_end(self.tick.guard, self.bench)
-        )
+        if self.loop.cause and reason is EndReason.STOP_REQUESTED:
+            return self.loop.cause
+        return describe_end(self.tick.guard, self.bench)
 
 
 def end_without_measuring(bench: Bench) -> End:

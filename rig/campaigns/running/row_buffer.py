@@ -27,23 +27,18 @@ class RowBuffer:
 
     def add(self, first: int, rows: np.ndarray) -> None:
         """Add a chunk that begins with sample ``first``; raises `RecordingError` if it cannot be kept in files."""
+        self._chunks.append((first, rows))
+        self._bytes += rows.nbytes
+        if self._spool is None and self._bytes <= self._most:
+            return
         try:
-            self._add(first, rows)
+            if self._spool is None:
+                self._first, self._spool = self._chunks[0][0], Spool(self._dtype, self._folder)
+            while self._chunks:
+                self._spool.add(self._chunks.popleft()[1])
         except OSError as error:
             where = self._folder or "the folder for temporary files"
             raise RecordingError(f"{where}: the rows of a long record cannot be kept ({error.strerror})") from error
-
-    def _add(self, first: int, rows: np.ndarray) -> None:
-        if self._spool is not None:
-            self._spool.add(rows)
-            return
-        self._chunks.append((first, rows))
-        self._bytes += rows.nbytes
-        if self._bytes > self._most:
-            self._first = self._chunks[0][0]
-            self._spool = Spool(self._dtype, self._folder)
-            while self._chunks:
-                self._spool.add(self._chunks.popleft()[1])
 
     def take(self, first: int, end: int) -> Rows:
         """Return the rows of a point, and drop all rows up to the end of the point."""

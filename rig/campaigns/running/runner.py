@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 import vibrolock
 from rig.arming.bench_memory import RememberedTrip, memory_of, now, remember
@@ -24,14 +24,14 @@ from rig.campaigns.kinds import KINDS
 from rig.campaigns.planning.lengths import check_length
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
+from rig.campaigns.running.attempts import MeasuredBefore
 from rig.campaigns.running.continuation import remaining
 from rig.campaigns.running.device_queue import armed_with_queue, settled_queue, with_queue
 from rig.campaigns.running.execution import Execution, end_without_measuring
-from rig.campaigns.running.measured_before import MeasuredBefore
 from rig.campaigns.running.output_file import back_up, forget_before, prepare_output, restore_backup
 from rig.campaigns.running.tripped_level import refuse_tripped
 from rig.campaigns.running.watched import watched_facts
-from rig.errors import ConfigurationError, RigError
+from rig.errors import ConfigurationError, RecordingError, RigError
 from rig.live.publisher import Live, published
 from rig.loop.session import RunningLoop, Session, open_session
 from rig.recording.conversion import continue_recording, finalise
@@ -124,7 +124,8 @@ def resume_run(
         before = MeasuredBefore(left.done, left.numbers, points)
         if not retry_tripped:
             refuse_tripped(recording, left.plan, left.to_measure)
-        options = _still_checked(recording, left.bench, _still_rehearsed(recording, options))
+        if left.to_measure:
+            options = _with_earlier_facts(recording, left.bench, options)
     plan, bench = left.plan, left.bench
     if left.to_measure:
         if not trust_code:
@@ -148,19 +149,22 @@ def resume_run(
     return _whole(output, progress) if journal_path(output).exists() else Recording(output)
 
 
-def _still_rehearsed(recording: Recording, options: RunOptions) -> RunOptions:
-    """Return the options with the rehearsal of the last part, if they name none and the part has one."""
-    before = recording.parts[-1].information.get("about", {}).get("rehearsal") if recording.parts else None
-    if options.rehearsal is not None or not before or "digest" not in before:
-        return options
-    return replace(options, rehearsal=TypeAdapter(Rehearsed).validate_python(before))
-
-
-def _still_checked(recording: Recording, bench: Bench, options: RunOptions) -> RunOptions:
-    """Return the options with the check of the last part, if neither they nor the memory of the bench have one."""
-    if options.check is not None or not recording.parts or memory_of(bench).check is not None:
-        return options
-    return replace(options, check=_checked(recording.parts[-1].information.get("about", {})))
+def _with_earlier_facts(recording: Recording, bench: Bench, options: RunOptions) -> RunOptions:
+    """Return the options with rehearsal and check of the last part, where neither they nor the memory of the bench have one."""
+    about = recording.parts[-1].information.get("about", {}) if recording.parts else {}
+    rehearsal = about.get("rehearsal")
+    if options.rehearsal is None and isinstance(rehearsal, dict) and "digest" in rehearsal:
+        try:
+            options = replace(options, rehearsal=TypeAdapter(Rehearsed).validate_python(rehearsal))
+        except ValidationError as error:
+            fault = error.errors()[0]
+            key = ".".join(str(part) for part in ("rehearsal", *fault["loc"]))
+            raise RecordingError(
+                f"{recording.path.name}: {key} of its last part: {fault['msg']}; name the rehearsal anew"
+            ) from None
+    if options.check is None and memory_of(bench).check is None:
+        options = replace(options, check=_checked(about))
+    return options
 
 
 @dataclass(frozen=True)
@@ -190,7 +194,9 @@ class _Run:
             execution = Execution(
                 self.plan, self.bench, loop, writer, self.options.progress, before, folder, self.live, checked
             )
-            execution.run({**information, "about": {**information["about"], "lead_samples": _lead(loop)}})
+            delay = loop.tick.arrays.loop[0]  # samples from an output to the input that responds to it
+            lead_samples = float(delay["delay_whole"]) + float(delay["delay_fraction"])
+            execution.run({**information, "about": {**information["about"], "lead_samples": lead_samples}})
         return execution
 
     def further_journal(self) -> JournalWriter:
@@ -295,12 +301,6 @@ def _checked(facts: About) -> CheckedScale | None:
         return TypeAdapter(CheckedScale).validate_python(facts["checked"]) if "checked" in facts else None
     except ValueError:
         return None
-
-
-def _lead(loop: RunningLoop) -> float:
-    """Return the number of samples between an output and the input that responds to it."""
-    record = loop.tick.arrays.loop
-    return float(record["delay_whole"][0] + record["delay_fraction"][0])
 
 
 @contextmanager

@@ -1,13 +1,15 @@
 """Likely cause of a trip, judged by what was measured before it, and advice on what to do."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from rig.bench import Bench
-from rig.campaigns.evaluation.point import Point
+from rig.campaigns.evaluation.point import Point, spectrum_of, vibration_of
 from rig.campaigns.planning.locked import LockedPlan
 from rig.campaigns.planning.plan import Plan
-from rig.campaigns.running.margins import LIMITS, margin_before
 from rig.campaigns.running.tripped_level import TrippedAt
 from rig.tick.safety.layout import POLARITY_HINT, EndReason
 
@@ -15,6 +17,15 @@ SHARE_TOO_HIGH = 0.7  # of a limit: a level expected to reach this share, in pro
 PROPOSED_SHARE = 0.9  # of a limit: share that the proposed level should reach, in proportion
 NEAR_WINDOW_END = 0.01  # of a frequency window's width
 
+LIMITS = {
+    EndReason.FORCE_LIMIT: "force_n",
+    EndReason.RESPONSE_LIMIT: "acceleration_m_s2",
+    EndReason.DISPLACEMENT_LIMIT: "displacement_m",
+    EndReason.OVERTRAVEL: "displacement_m",
+}
+"""The limit of the bench that a trip reason refers to."""
+
+SAMPLES = 256  # of a period
 BESIDE_THE_LEVEL = {
     EndReason.NON_FINITE_INPUT: ("the device delivered no number", "look at device and driver, then `rig check`"),
     EndReason.NON_FINITE_OUTPUT: (
@@ -28,8 +39,25 @@ BESIDE_THE_LEVEL = {
         "look at the amplifier's gain and at both sensors, then `rig check`; after a change of the rig, `rig tune` anew",
     ),
     EndReason.EMERGENCY_STOP: ("somebody pressed the stop, or its cable is broken", "ask who, and release it"),
+    EndReason.SENSOR_STUCK: (
+        "sensor, cable or supply of channel {channel} is dead, or the level is below one bit of its converter",
+        "look at the channel, then `rig check`; raise the level if it is alive",
+    ),
+    EndReason.LEVEL_NOT_FOLLOWED: (
+        "sensor or cable of channel {channel} has failed, or the amplifier does not put out what it is told",
+        "look at both, then `rig check`",
+    ),
+    EndReason.OVER_LEVEL: (
+        "the amplifier's gain has risen, or the rig is not the one that was checked; or channel {channel} reads too much",
+        "look at the amplifier's gain and at the channel, then `rig check`",
+    ),
+    EndReason.GAIN_CHANGED: (
+        "sensor or cable of channel {channel} loses sensitivity, or the amplifier's gain drifts; else the damping has changed "
+        "this much",
+        "look at both, then `rig check`; if they are sound, measure from this level on in a run of its own",
+    ),
 }
-"""Likely cause and advice for trips that are independent of levels and locks."""
+"""Likely cause and advice for trips that are independent of levels and locks; ``{channel}`` is the channel that tripped."""
 
 
 class Trip(NamedTuple):
@@ -66,29 +94,8 @@ class Advice(NamedTuple):
 def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
     """Return the likely cause and remedy of a trip at a level, judged by what was measured before."""
     if trip.reason in BESIDE_THE_LEVEL:
-        return Advice(*BESIDE_THE_LEVEL[trip.reason])
-    if trip.reason is EndReason.SENSOR_STUCK:
-        return Advice(
-            f"sensor, cable or supply of channel {_name(bench, trip)} is dead, or the level is below one bit of its converter",
-            "look at the channel, then `rig check`; raise the level if it is alive",
-        )
-    if trip.reason is EndReason.LEVEL_NOT_FOLLOWED:
-        return Advice(
-            f"sensor or cable of channel {_name(bench, trip)} has failed, or the amplifier does not put out what it is told",
-            "look at both, then `rig check`",
-        )
-    if trip.reason is EndReason.OVER_LEVEL:
-        return Advice(
-            "the amplifier's gain has risen, or the rig is not the one that was checked; or channel "
-            f"{_name(bench, trip)} reads too much",
-            "look at the amplifier's gain and at the channel, then `rig check`",
-        )
-    if trip.reason is EndReason.GAIN_CHANGED:
-        return Advice(
-            f"sensor or cable of channel {_name(bench, trip)} loses sensitivity, or the amplifier's gain drifts; else the "
-            "damping has changed this much",
-            "look at both, then `rig check`; if they are sound, measure from this level on in a run of its own",
-        )
+        cause, what_to_do = BESIDE_THE_LEVEL[trip.reason]
+        return Advice(cause.format(channel=_name(bench, trip)), what_to_do)
     if isinstance(plan, LockedPlan) and not (before.locked or before.points):
         return Advice(
             f"no lock was ever gained in this run: {POLARITY_HINT}",
@@ -105,18 +112,23 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
     """Advise on a trip at a limit, from the share of the limit that earlier points reached in proportion to their level."""
     name, unit = _name(bench, trip), plan.level_unit if at is None else at.level_unit
     margin = margin_before(bench, trip.reason, trip.channel, unit, before.points)
-    raised = _what_may_be_raised(trip, bench)
+    raised = f"take a less sensitive sensor for channel {name}"
+    if trip.reason in LIMITS:
+        key = LIMITS[trip.reason]
+        now = f"limits.{key} = {getattr(bench.limits, key):g}"
+        raised = f"raise {now} of the bench if specimen and rig bear it, in a run of its own"
+    lowered = f"lower {'start_v' if at is not None and at.start else plan.levels_key}"
     what = "the level" if at is None else f"the level {at.text}"
     if margin is None:
         polarity = ", or polarity or sensitivity of a sensor is wrong" if before.first else ""
         then = "; `rig check` tells polarity and sensitivity" if before.first else ""
-        return Advice(f"{what} is too high{polarity}", f"lower {_key(plan, at)}, or {raised}{then}")
+        return Advice(f"{what} is too high{polarity}", f"{lowered}, or {raised}{then}")
     reached = f"{100.0 * margin.share:.2g} % of {margin.key} on channel {name}"
     had = f"the point before, {margin.level:.4g} {unit}, had reached {reached}"
     if at is None or margin.share * max(at.level / margin.level, 1.0) >= SHARE_TOO_HIGH:
         below = PROPOSED_SHARE * margin.level / margin.share
         bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
-        return Advice(f"{had}: {what} is too high", f"lower {_key(plan, at)}{bound}, or {raised}")
+        return Advice(f"{had}: {what} is too high", f"{lowered}{bound}, or {raised}")
     return Advice(
         f"{had}: {what} alone does not explain it. A jump to another response, a knock, or a sensor that reads wrong",
         f"look at the sensors of force, drive and channel {name}, and at what else moved it; then take smaller steps",
@@ -142,20 +154,53 @@ def _on_a_lock(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None) -> Ad
     )
 
 
-def _what_may_be_raised(trip: Trip, bench: Bench) -> str:
-    if trip.reason in LIMITS:
-        key = LIMITS[trip.reason]
-        now = f"limits.{key} = {getattr(bench.limits, key):g}"
-        return f"raise {now} of the bench if specimen and rig bear it, in a run of its own"
-    return f"take a less sensitive sensor for channel {_name(bench, trip)}"
-
-
-def _key(plan: Plan, at: TrippedAt | None) -> str:
-    """Return the key of the plan that gives the level."""
-    if at is not None and at.start:
-        return "start_v"
-    return plan.levels_key
-
-
 def _name(bench: Bench, trip: Trip) -> str:
     return bench.channels[trip.channel].name if trip.channel >= 0 else "-"
+
+
+class Margin(NamedTuple):
+    """How close an earlier point came to the limit that later stopped the run."""
+
+    level: float
+    """Level of the point."""
+    share: float
+    """Peak over the allowed value; 1 at the limit."""
+    key: str
+    """Key or range of the bench that defines the limit."""
+
+
+def margin_before(
+    bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Point[object]]
+) -> Margin | None:
+    """Return the largest share of the tripped limit that points with levels in ``unit`` had reached.
+
+    Returns None if the trip does not concern an amplitude of a channel, or if no point has harmonics.
+    """
+    key, allowed = _allowed(bench, reason, channel)
+    known = [point for point in points if point.spectrum is not None and point.level_unit == unit]
+    if not key or not known:
+        return None
+    shares = [(_peak(point, channel, reason) / allowed, point.level) for point in known]
+    share, level = max(shares)
+    return Margin(level, share, key)
+
+
+def _allowed(bench: Bench, reason: EndReason, channel: int) -> tuple[str, float]:
+    if channel < 0:
+        return "", math.inf
+    if reason in LIMITS:
+        return f"limits.{LIMITS[reason]}", float(getattr(bench.limits, LIMITS[reason]))
+    if reason is EndReason.SENSOR_OVERLOAD:
+        one = bench.channels[channel]
+        return f"the range of {one.range_in_unit:.4g} {one.unit}", one.range_in_unit
+    return "", math.inf
+
+
+def _peak(point: Point[object], channel: int, reason: EndReason) -> float:
+    """Largest instantaneous value of a channel over a period, without its mean: of the signal, or of its displacement."""
+    harmonics = spectrum_of(point).harmonics[channel, 1:]
+    orders = np.arange(1, harmonics.size + 1)
+    if LIMITS.get(reason) == "displacement_m":
+        harmonics = -harmonics / (2.0 * math.pi * vibration_of(point).frequency_hz * orders) ** 2
+    turns = 2j * math.pi * np.outer(np.arange(SAMPLES) / SAMPLES, orders)
+    return float(np.abs((np.exp(turns) @ harmonics).real).max())

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.planning.levels import Levels
 from rig.campaigns.planning.plan import Plan, Target
@@ -65,8 +64,13 @@ def refuse_tripped(recording: Recording, plan: Plan, left: Sequence[Target]) -> 
         if part.end is None or not part.end["tripped"]:
             continue
         at = _tripped_in(part)
-        if at is not None and (_reached_since(recording.parts[number + 1 :], at) or not _asks_for(plan, left, at)):
-            continue
+        if at is not None:
+            later = (point_from(table) for one in recording.parts[number + 1 :] for table in one.points)
+            accepted = [point for point in later if point.accepted]  # any of them is beyond a trip at the start
+            alike = [point.level for point in accepted if point.level_unit == at.level_unit]
+            reached = bool(accepted) if at.start else any(level >= ALMOST * at.level for level in alike)
+            if reached or not _asks_for(plan, left, at):
+                continue
         head = f"{recording.path.name}: the run tripped{'' if at is None else f' at {at.text}'} ({part.end['text']})"
         lower = "" if at is None else f"`plan` with levels below {at.text}, or "
         if at is not None and at.start:
@@ -81,15 +85,6 @@ def _tripped_in(part: Part) -> TrippedAt | None:
         return None if end["tripped_at"] is None else TrippedAt(**end["tripped_at"])
     failed = [point for point in map(point_from, part.points) if not point.accepted]
     return TrippedAt(failed[-1].level, failed[-1].level_unit, start=False) if failed else None
-
-
-def _reached_since(parts: Sequence[Part], at: TrippedAt) -> bool:
-    """Whether a later point at this level or a higher one was accepted. For a trip at the start, any point counts."""
-    return any(_is_beyond(point, at) for part in parts for point in map(point_from, part.points) if point.accepted)
-
-
-def _is_beyond(point: Point[object], at: TrippedAt) -> bool:
-    return at.start or (point.level_unit == at.level_unit and point.level >= ALMOST * at.level)
 
 
 def _asks_for(plan: Plan, left: Sequence[Target], at: TrippedAt) -> bool:

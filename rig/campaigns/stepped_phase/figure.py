@@ -127,6 +127,5 @@ def _branch(
 
 
 def _resonant(item: FrequencyResponse) -> int | None:
-    """Return the point nearest to phase resonance; None if none is near."""
     nearest = int(np.argmin(np.abs(item.phase_lag_deg - 90.0)))
     return nearest if abs(item.phase_lag_deg[nearest] - 90.0) <= NEAR_DEG else None

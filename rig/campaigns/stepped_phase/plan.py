@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from itertools import product
+from operator import attrgetter
 from typing import Literal, Self
 
 import numpy as np
@@ -9,7 +11,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from rig.campaigns.planning.levels import ONE_LEVEL_KEY, exactly_one
 from rig.campaigns.planning.locked import SettledPlan
-from rig.campaigns.planning.plan import Target, with_first_repeated
+from rig.campaigns.planning.plan import Target, passes, with_first_repeated
 from rig.tick.sequencer.layout import OnFailure, SegmentKind
 from rig.tick.sequencer.segments import Segment
 from vibrolock.errors import InputError
@@ -113,14 +115,11 @@ class SteppedPhasePlan(SettledPlan):
 
     def targets(self) -> tuple[Target, ...]:
         """Return all points: every lag at the first level, then at the next level, and so on."""
-        rising, falling = [(lag, "up") for lag in self.lags], [(lag, "down") for lag in self.lags[::-1]]
-        way = {"up": rising, "down": falling, "up-down": rising + falling[1:]}[self.direction]
-        passes = [(level, repeat) for level in self.levels for repeat in range(1, self.repeats + 1)]
         targets = tuple(
-            Target.model_validate(
-                {"number": number, "level": level, "direction": to, "repeat": repeat, "phase_lag_deg": lag}
+            Target(number=number, level=level, direction=direction, repeat=repeat, phase_lag_deg=lag)
+            for number, (level, repeat, (lag, direction)) in enumerate(
+                product(self.levels, range(1, self.repeats + 1), passes(self.lags, self.direction))
             )
-            for number, (level, repeat, lag, to) in enumerate((*one, *point) for one in passes for point in way)
         )
         return with_first_repeated(targets) if self.repeat_first else targets
 
@@ -135,7 +134,8 @@ class SteppedPhasePlan(SettledPlan):
         at: int | None = None
         before: Target | None = None
         for target in self.targets():
-            origin = before if before is not None and _same_pass(before, target) else None
+            one_pass = attrgetter("level", "repeat", "repeats_first")
+            origin = before if before is not None and one_pass(before) == one_pass(target) else None
             before = target
             if target.number in done:
                 continue
@@ -150,13 +150,10 @@ class SteppedPhasePlan(SettledPlan):
                 lag_deg=target.phase_lag_deg,
                 geometric=True,
             )
-            longest, periods = self.settle.longest_periods, self.record_periods + 1.0
-            failing = replace(point, on_failure=failure, on_lost_lock=lost)
-            out += [
-                point,
-                replace(failing, kind=SegmentKind.SETTLE, periods=longest),
-                replace(failing, kind=SegmentKind.RECORD, periods=periods),
-            ]
+            failing = replace(point, on_failure=failure)
+            settle = replace(failing, kind=SegmentKind.SETTLE, periods=self.settle.longest_periods)
+            record = replace(failing, kind=SegmentKind.RECORD, periods=self.record_periods + 1.0)
+            out += [point, settle, record]
             at = target.number
         return tuple(out)
 
@@ -172,11 +169,5 @@ class SteppedPhasePlan(SettledPlan):
         return [*out, replace(hold, lag_deg=_lag(origin))] if origin is not None else out
 
 
-def _same_pass(before: Target, target: Target) -> bool:
-    """Whether two consecutive points belong to the same pass."""
-    return (before.level, before.repeat, before.repeats_first) == (target.level, target.repeat, target.repeats_first)
-
-
 def _lag(target: Target) -> float:
-    """Return the requested lag, deg."""
     return 0.0 if target.phase_lag_deg is None else target.phase_lag_deg

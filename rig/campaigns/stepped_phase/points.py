@@ -4,30 +4,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import FrequencyResponse, IdentificationError
+from identification import FrequencyResponse
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
-from rig.campaigns.evaluation.acceptance import level_error, level_objection, settled_point, with_settling
+from rig.campaigns.evaluation.acceptance import level_error, modal_point, with_settling
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.lost_samples import rms_of_force
 from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS
-from rig.campaigns.evaluation.vibrations import modal_part, not_evaluated, recorded_vibration, within_periods
-from rig.campaigns.planning.drive_shape import drive_shape
+from rig.campaigns.evaluation.vibration_quality import FINE_AMPLITUDE, PURITY_COLUMNS, shared_columns
+from rig.campaigns.evaluation.vibrations import recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Target
 from rig.campaigns.stepped_phase.plan import SteppedPhasePlan
 from rig.text.column import Column
 
 STEPPED_PHASE_COLUMNS = (
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
-    Column("force_n", "force", "N", ".4f", plain=True),
+    *shared_columns("frequency_hz", "force_n"),
     Column("force_rms_n", "force RMS", "N", ".4f"),
-    Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
-    Column("damping_ratio", "damping", "%", ".4f", 100.0, plain=True),
-    Column("damping_ratio_std", "+-", "%", ".4f", 196.0, in_line=False, optional=True),
-    Column("level_error", "level error", "%", ".2f", 100.0),
+    FINE_AMPLITUDE,
+    *shared_columns("damping_ratio", "damping_ratio_std", "level_error"),
     *PURITY_COLUMNS,
 )
 
@@ -47,22 +43,17 @@ class SteppedPhaseResult:
 def measure_stepped_phase_point(
     bench: Bench, plan: SteppedPhasePlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[object]:
-    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
+    """Evaluate a recorded point and its quality."""
     lag_deg = target.phase_lag_deg or 0.0
     rows = rows[within_periods(rows, plan.record_periods)]
-    try:
-        vibration = recorded_vibration(bench, rows, plan.harmonics, phase_lag_target_deg=lag_deg + 180.0)
-        modal = modal_part(vibration, drive_shape(bench, plan.plant))
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=True)
+    vibration = recorded_vibration(bench, rows, plan.harmonics, lag_deg + 180.0)
     force_rms_n = rms_of_force(bench, rows)
-    missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
-    off_level = level_objection(plan.amplitude_law, missed, plan.accepted_level_error)
-    point = settled_point(plan, target, bench, vibration, rows, off_level)
+    missed, off_level = level_error(plan.amplitude_law, target.level, vibration, force_rms_n, plan.accepted_level_error)
+    point = modal_point(plan, target, bench, vibration, rows, off_level)
     result = SteppedPhaseResult(
         force_rms_n=force_rms_n, phase_lag_deg=lag_deg - vibration.phase_error_deg, level_error=missed
     )
-    return with_settling(replace(point, modal=modal, result=result), settling)
+    return with_settling(replace(point, result=result), settling)
 
 
 STEPPED_PHASE = Campaign(

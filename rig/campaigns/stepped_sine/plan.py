@@ -1,6 +1,7 @@
 """The stepped-sine campaign: step through given frequencies at a given voltage or at a held force or displacement."""
 
 from functools import partial
+from itertools import product
 from typing import Literal, Self
 
 import numpy as np
@@ -94,7 +95,7 @@ class SteppedSinePlan(TonePlan):
         up = len(frequencies) < 2 or frequencies[1] >= frequencies[0]
         return tuple(
             Target(number=number, level=level, direction="up" if up else "down", frequency_hz=frequency_hz)
-            for number, (level, frequency_hz) in enumerate((v, f) for v in self.levels for f in frequencies)
+            for number, (level, frequency_hz) in enumerate(product(self.levels, frequencies))
         )
 
     def segments(self, sample_rate_hz: float, done: frozenset[int] = frozenset()) -> tuple[Segment, ...]:
@@ -123,7 +124,6 @@ class SteppedSinePlan(TonePlan):
         return tuple(out)
 
     def _at(self, target: Target, number: int, tone: Excitation) -> list[Segment]:
-        """Return the segments of a point, or only the ramp if the point is done (number -1)."""
         at = partial(Segment, point=number, level=target.level, excitation=tone)
         ramp = at(
             kind=SegmentKind.RAMP, periods=self.ramp_periods, geometric=self.amplitude_law is AmplitudeLaw.RESPONSE

@@ -4,35 +4,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification import FrequencyResponse, IdentificationError
+from identification import FrequencyResponse
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
-from rig.campaigns.evaluation.acceptance import (
-    drift_objection,
-    first_of,
-    level_error,
-    level_objection,
-    nonharmonic_objection,
-    with_settling,
-)
+from rig.campaigns.evaluation.acceptance import drift_objection, level_error, nonharmonic_objection, with_settling
 from rig.campaigns.evaluation.frequency_responses import recorded_frequency_responses
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.point import Point, Quality, planned_point
 from rig.campaigns.evaluation.rows import Rows
-from rig.campaigns.evaluation.vibration_quality import PURITY_COLUMNS, quality_warnings, vibration_part
-from rig.campaigns.evaluation.vibrations import not_evaluated, recorded_vibration, within_periods
+from rig.campaigns.evaluation.vibration_quality import (
+    FINE_AMPLITUDE,
+    PURITY_COLUMNS,
+    quality_warnings,
+    shared_columns,
+    vibration_part,
+)
+from rig.campaigns.evaluation.vibrations import recorded_vibration, within_periods
 from rig.campaigns.planning.plan import Target
 from rig.campaigns.stepped_sine.plan import SteppedSinePlan
 from rig.text.column import Column
 
-TRUSTED_NONHARMONIC_FORCE = (
-    0.1  # in open loop a larger value causes a warning; plans under a phase lock reject the point
-)
+TRUSTED_NONHARMONIC_FORCE = 0.1  # in open loop a larger value warns; plans under a phase lock reject the point
 
 STEPPED_SINE_COLUMNS = (
-    Column("frequency_hz", "frequency", "Hz", ".4f", plain=True),
-    Column("force_n", "force", "N", ".4f", plain=True),
-    Column("amplitude_m", "amplitude", "mm", ".5f", 1e3, plain=True),
+    *shared_columns("frequency_hz", "force_n"),
+    FINE_AMPLITUDE,
     Column("phase_lag_deg", "phase lag", "deg", ".2f"),
     *PURITY_COLUMNS,
 )
@@ -51,21 +47,13 @@ class SteppedSineResult:
 def measure_stepped_sine_point(
     bench: Bench, plan: SteppedSinePlan, target: Target, rows: Rows, settling: np.void
 ) -> Point[object]:
-    """Evaluate a recorded point and its quality; ``settling`` is the outcome record of its settle segment."""
+    """Evaluate a recorded point and its quality."""
     rows = rows[within_periods(rows, plan.record_periods)]
-    try:
-        vibration = recorded_vibration(bench, rows, plan.harmonics)
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=True)
+    vibration = recorded_vibration(bench, rows, plan.harmonics)
     harmonics = np.abs(vibration.harmonics[bench.index_of("force"), 1:])
     force_rms_n = float(np.sqrt(0.5 * np.sum(harmonics**2)))
-    missed = level_error(plan.amplitude_law, target.level, vibration, force_rms_n)
-    reason = first_of(
-        (
-            level_objection(plan.amplitude_law, missed, plan.accepted_level_error),
-            drift_objection(bench, vibration, plan.accepted_drift),
-        )
-    )
+    missed, off_level = level_error(plan.amplitude_law, target.level, vibration, force_rms_n, plan.accepted_level_error)
+    reason = off_level or drift_objection(bench, vibration, plan.accepted_drift)
     nonharmonic = nonharmonic_force(bench, [rows])
     point = replace(
         planned_point(plan, target),

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from controller import AmplitudeLaw
-from identification import ForceDropOut, IdentificationError, Transient, demodulate, force_drop_out
+from identification import ForceDropOut, Transient, demodulate, force_drop_out
 from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
-from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of, too_many_lost
+from rig.campaigns.evaluation.lost_samples import bridged, lost_rows, rms_of, too_many_lost, windows
 from rig.campaigns.evaluation.point import PART, Point, Quality, planned_point
 from rig.campaigns.evaluation.recorded import accepted_points, bench_of_recording, point_rows
-from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of, not_evaluated
+from rig.campaigns.evaluation.vibrations import VOLTAGE, channel_factors, channels_of
 from rig.campaigns.planning.plan import Target
 from rig.campaigns.sweep.plan import SweepPlan
 from rig.recording.reader import Recording
@@ -71,11 +71,8 @@ class SweepResult:
 
 def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarray, settling: np.void) -> Point[object]:
     """Evaluate a recorded sweep: a transient vibration, which does not have to settle."""
-    try:
-        transient = transient_of(bench, rows)
-        drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
-    except (IdentificationError, ArithmeticError) as error:
-        return not_evaluated(plan, target, error, settled=False)
+    transient = transient_of(bench, rows)
+    drop_out = force_drop_out(transient, off_resonance_hz=plan.off_resonance_hz)
     held, warnings = _held(bench, plan, target, rows, transient)
     reason = "" if held is None else _level_objection(plan, held.held_usual_error)
     return replace(
@@ -96,17 +93,13 @@ def measure_sweep(bench: Bench, plan: SweepPlan, target: Target, rows: np.ndarra
 
 def _gaps(transient: Transient, rows: np.ndarray) -> list[str]:
     """Warn of gaps in a sweep: what happened there, perhaps the smallest force, is unknown."""
-    lost = lost_rows(rows)
-    if not lost.any():
+    steps_s = np.diff(transient.time_s)
+    if not lost_rows(rows).any() or not steps_s.size:
         return []
-    usual = float(np.median(np.diff(transient.time_s))) if transient.time_s.size > 1 else 0.0
-    holes = np.flatnonzero(np.diff(transient.time_s) > 1.5 * usual)
+    holes = np.flatnonzero(steps_s > 1.5 * float(np.median(steps_s)))
     where = ", ".join(f"{transient.frequency_hz[hole]:.3f}" for hole in holes[:5])
-    return (
-        [f"nothing is known about {where}{' Hz and more' if holes.size > 5 else ' Hz'}: samples were lost"]
-        if where
-        else []
-    )
+    more = " Hz and more" if holes.size > 5 else " Hz"
+    return [f"nothing is known about {where}{more}: samples were lost"] if where else []
 
 
 def _level_objection(plan: SweepPlan, error: float) -> str:
@@ -172,26 +165,18 @@ def transient_of(bench: Bench, rows: np.ndarray) -> Transient:
     lost = lost_rows(rows)
     inputs = bridged(rows) if lost.any() else rows["inputs"]
     signals = np.vstack([inputs.T, rows["output_v"]])
-    transient = demodulate(
-        rows["theta_rad"],
-        signals,
-        (*channels_of(bench), VOLTAGE),
-        sample_rate_hz=bench.sample_rate_hz,
-    )
+    channels = (*channels_of(bench), VOLTAGE)
+    transient = demodulate(rows["theta_rad"], signals, channels, sample_rate_hz=bench.sample_rate_hz)
     corrected = transient.fundamentals.copy()
     corrected[:-1] *= channel_factors(bench, transient.frequency_hz)
     return _without_gaps(replace(transient, fundamentals=corrected), lost, bench.sample_rate_hz)
 
 
 def _without_gaps(transient: Transient, lost: np.ndarray, sample_rate_hz: float) -> Transient:
-    """Remove the instants within whose window too many samples were lost."""
     if not lost.any():
         return transient
-    half = 0.5 * transient.window_periods / transient.frequency_hz
-    first, end = (
-        np.clip(np.rint((transient.time_s + side * half) * sample_rate_hz), 0, lost.size).astype(int)
-        for side in (-1, 1)
-    )
+    half_s = 0.5 * transient.window_periods / transient.frequency_hz
+    first, end = windows(transient.time_s, half_s, sample_rate_hz, lost.size)
     keep = ~too_many_lost(lost, first, end)
     return replace(
         transient,

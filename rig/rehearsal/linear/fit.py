@@ -70,7 +70,6 @@ class _Fit:
 
 
 def _fit(table: ParameterTable, responses: Responses | None, starts: Sequence[Mapping[str, float]]) -> _Fit:
-    """Return the best of the fits from several starts."""
     centre, std = np.array(table.centre), np.array(table.std)
     if responses is None:
         return _Fit(_posterior(table, centre, np.diag(std**2)), 0.0)

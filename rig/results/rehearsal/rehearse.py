@@ -11,13 +11,12 @@ from rig.campaigns.planning.plan import Plan
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
-from rig.rehearsal.comparison import Comparison, compare
-from rig.rehearsal.effect import Effect
 from rig.rehearsal.files import write_bench, write_plan
+from rig.rehearsal.forecast import Comparison, compare
 from rig.rehearsal.forecasting import forecast
 from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
 from rig.rehearsal.knowledge import collect_knowledge
-from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse
+from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse
 from rig.rehearsal.remedies import improve
 from rig.results.files import load, load_as, save
 from rig.results.kinds import KINDS

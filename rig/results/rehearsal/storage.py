@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from rig.rehearsal.effect import Effect
-from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalFacts
+from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalFacts
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
 from rig.results.arrays import Arrays, Attributes

@@ -30,6 +30,10 @@ class SegmentKind(IntEnum):
     """0 V at once for ``periods`` of the frozen frequency, while the vibration decays; these rows are evaluated."""
 
 
+EVALUATED = {SegmentKind.RECORD, SegmentKind.SWEEP, SegmentKind.LEVEL_SWEEP, SegmentKind.RELEASE}
+"""Segments whose rows are evaluated."""
+
+
 class Drive(IntEnum):
     """Source of the output's frequency."""
 

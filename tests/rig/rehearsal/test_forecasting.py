@@ -10,9 +10,9 @@ from rig.arming.run_options import RunOptions
 from rig.bench.bench import Arming
 from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.running.runner import resume_run, run_plan
-from rig.errors import NotArmed
+from rig.errors import NotArmed, RecordingError
 from rig.recording.reader import Recording
-from rig.rehearsal.comparison import compare
+from rig.rehearsal.forecast import compare
 from rig.rehearsal.forecasting import forecast, rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.show.summary import summarise
@@ -111,3 +111,12 @@ def test_a_recording_shows_its_rehearsal_and_resumes_with_it(tmp_path, foreseein
         assert recording.complete
     with Recording(path) as recording:
         assert "foreseen" in recording.parts[0].information["about"]["rehearsal"]
+
+
+def test_a_recording_that_holds_no_rehearsal_in_its_place_is_not_resumed_and_says_so_in_one_line(tmp_path, monkeypatch):
+    path = tmp_path / "run.h5"
+    monkeypatch.setattr("rig.campaigns.running.runner.rehearsal_facts", lambda *_: {"digest": "x", "draws": "many"})
+    run_plan(SHORT, magnet_beam(), path).close()
+    more = SHORT.model_copy(update={"levels_v": (*SHORT.levels_v, 0.5)})
+    with pytest.raises(RecordingError, match=r"^run\.h5: rehearsal\.file of its last part: Field required; .*$"):
+        resume_run(path, change=more)

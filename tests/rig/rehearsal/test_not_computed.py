@@ -11,9 +11,8 @@ from rig.errors import ConfigurationError
 from rig.rehearsal.forecasting import rehearsed_in
 from rig.rehearsal.rehearsal import RehearsalRequest, rehearse
 from rig.rehearsal.report import lines, summary, verdict_in_one_line
-from rig.rehearsal.statistics import Proportion
 from rig.rehearsal.truth import NOT_BALANCED
-from rig.rehearsal.verdict import verdict_of
+from rig.rehearsal.verdict import Proportion, verdict_of
 from rig.results.rehearsal.rehearse import Subject, request_for
 from simulators.ensemble import VariantError
 from tests.refused import refused

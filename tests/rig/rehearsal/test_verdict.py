@@ -5,10 +5,9 @@ import pytest
 
 from rig.rehearsal.rehearsal import Draw, Rehearsal, RehearsalFacts
 from rig.rehearsal.report import lines, summary
-from rig.rehearsal.statistics import Proportion, Quantiles
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
-from rig.rehearsal.verdict import LevelCount, verdict_of, without_numbers
+from rig.rehearsal.verdict import LevelCount, Proportion, Quantiles, verdict_of, without_numbers
 
 FACTS = RehearsalFacts(
     bench={"name": "b", "specimen": {"name": "s"}},
