@@ -16,7 +16,7 @@ from rig.campaigns.evaluation.recorded import points_of
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.multisine.points import spectra_of
 from rig.campaigns.plans import plan_from
-from rig.check.findings import Finding, Verdict, failed, is_check, not_tested
+from rig.check.findings import Finding, Verdict, is_check, not_tested
 from rig.check.judging import driven_findings, latency_findings
 from rig.check.reference import reference_findings
 from rig.check.responses import Mode, Responses, responses_of, scale_of
@@ -66,7 +66,7 @@ class Assessment(Result):
     @property
     def failed(self) -> tuple[str, ...]:
         """Labels of the findings that failed."""
-        return failed(self.findings)
+        return tuple(finding.label for finding in self.findings if finding.verdict == "fail")
 
 
 def assess(recording: Recording, reference: Recording | None = None) -> Assessment:

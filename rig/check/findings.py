@@ -1,6 +1,5 @@
 """The result of one test of a check, and which recordings are those of a check."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,11 +43,6 @@ def graded(value: float, ok: tuple[float, float], tolerated: tuple[float, float]
     if ok[0] <= value <= ok[1]:
         return "ok"
     return "warn" if tolerated[0] <= value <= tolerated[1] else "fail"
-
-
-def failed(findings: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the labels of the findings that failed."""
-    return tuple(finding.label for finding in findings if finding.verdict == "fail")
 
 
 PURPOSE = "check"  # purpose of the recording of a check, in the facts of its parts

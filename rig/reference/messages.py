@@ -15,7 +15,7 @@ PAGES = "reference/messages"
 def message_entries() -> Iterator[Entry]:
     """Yield an entry for every message, found by its name and its text; a reason that is also a quality has one entry."""
     lines: dict[str, list[tuple[str, str]]] = {}
-    for name, what, text in (*_end_reasons(), *_qualities(), *_errors()):
+    for name, what, text in _messages():
         lines.setdefault(name, []).append((what, text))
     for name, texts in lines.items():
         words = (name, *(text.rstrip(".") for _, text in texts))
@@ -23,27 +23,20 @@ def message_entries() -> Iterator[Entry]:
         yield Entry("message", name, tuple(dict.fromkeys(words)), line, f"{PAGES}/{name}")
 
 
-def _end_reasons() -> Iterator[tuple[str, str, str]]:
+def _messages() -> Iterator[tuple[str, str, str]]:
+    """Yield name, kind and text of each."""
+    from rig import errors
+    from rig.campaigns.evaluation.point import Quality
     from rig.tick.safety.layout import EndReason
+    from vibrolock.described import attribute_docstrings
 
     for reason in EndReason:
         if reason not in (EndReason.NONE, EndReason.COMPLETED):
             yield page_of(reason.name), "end of a run", reason.text
-
-
-def _qualities() -> Iterator[tuple[str, str, str]]:
-    from rig.campaigns.evaluation.point import Quality
-    from vibrolock.described import attribute_docstrings
-
     texts = attribute_docstrings(Quality.__module__)["Quality"]
     for quality in Quality:
         if quality is not Quality.GOOD:
             yield quality.value, "quality of a point", texts[quality.name]
-
-
-def _errors() -> Iterator[tuple[str, str, str]]:
-    from rig import errors
-
     for name in errors.__all__:
         error = getattr(errors, name)
         if isinstance(error, type) and error not in (errors.RigError, errors.DaqError):

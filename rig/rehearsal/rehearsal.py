@@ -20,7 +20,7 @@ from rig.rehearsal.hypotheses import Hypotheses
 from rig.rehearsal.knowledge import Knowledge
 from rig.rehearsal.trial import Trial, not_computed, run_trial
 from rig.rehearsal.truth import NOT_BALANCED, TrueBackbone, true_backbone
-from rig.rehearsal.twins import Twin, draw_twin, exact_twin
+from rig.rehearsal.twins import Twin, draw_twin
 from simulators.ensemble import ensemble
 from vibrolock.results import Result
 
@@ -148,8 +148,8 @@ class RehearsalRequest:
 
     def twin(self, number: int) -> Twin:
         """Return the twin of a number."""
-        if self.knowledge is None:
-            return exact_twin(self.bench, self.seed + number)
+        if self.knowledge is None:  # the virtual bench itself, with another seed
+            return Twin(self.seed + number, self.bench, {})
         return draw_twin(self.bench, self.drawn_for or self.plan, self.knowledge, self.hypotheses, self.seed, number)
 
     def __call__(self, number: int) -> Draw:

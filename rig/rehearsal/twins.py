@@ -35,11 +35,6 @@ class Twin:
     """What was drawn, by name; 0 for a property that it does not have."""
 
 
-def exact_twin(bench: Bench, number: int) -> Twin:
-    """Return a virtual bench itself, with another seed."""
-    return Twin(number, bench, {})
-
-
 def draw_twin(bench: Bench, plan: Plan, knowledge: Knowledge, hypotheses: Hypotheses, seed: int, number: int) -> Twin:
     """Draw the twin of a number. The same seed and number give the same twin, whatever the others are.
 

@@ -23,12 +23,6 @@ def rounding(bit: float, noise_rms: float = 0.0) -> float:
     return bit / math.sqrt(12.0) * math.exp(-2.0 * (math.pi * noise_rms / bit) ** 2)
 
 
-def input_bits_n(bench: Bench) -> float:
-    """Return the RMS of the lines that rounding in the input converter adds to the measured force, N."""
-    force = bench.channels[bench.index_of("force")]
-    return rounding(force.resolution_in_unit, force.noise_rms)
-
-
 def bits_force_n(bench: Bench, responses: FrequencyResponseMatrix, beyond_n: float) -> float:
     """Return the RMS of the force (N) that rounding in the output converter causes.
 

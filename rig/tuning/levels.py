@@ -10,7 +10,7 @@ from controller.tuning import LowPassChoice, PlantModel, low_pass_from_densities
 from rig.bench import Bench
 from rig.campaigns.planning.levels_on_plant import voltage_for
 from rig.errors import ConfigurationError
-from rig.tuning.converter_bits import input_bits_n
+from rig.tuning.converter_bits import rounding
 
 LAG_STD_DEG = 0.75  # standard deviation of the lag before the settle rule averages it over ten periods
 RAISED = 3.0  # factor by which the lowest force may be raised
@@ -123,7 +123,7 @@ def lowest_force(bench: Bench, plant: PlantModel, highest_m: float, bits_force_n
     that leaves less than a span of `NARROW_SPAN`, rounding may add `RELAXED_NONHARMONIC`.
     """
     force, highest_n = bench.channels[bench.index_of("force")], needed_n(plant, highest_m)
-    read_n, sent_n = input_bits_n(bench), bits_force_n
+    read_n, sent_n = rounding(force.resolution_in_unit, force.noise_rms), bits_force_n
     rounded_n = math.hypot(read_n, sent_n)
     few_n = max(highest_n / SPAN, MIN_FORCE_BITS * force.resolution_in_unit)
     quiet_n = math.sqrt(2.0) * rounded_n / MAX_NONHARMONIC

@@ -73,9 +73,8 @@ def measure(
     """
     bench, runs = series.bench, _Runs(series, bench_name, highest_hz)
     if level_rms_v is None:
-        levels = SEARCH.search(bench, runs.listen)
-        tried = levels.tried_v
-        if not levels.enough:
+        tried, enough = SEARCH.search(bench, runs.listen)
+        if not enough:
             _audible(bench, tried[-1], runs.coherence, "at half of the bench's limits")
     else:
         runs.listen(level_rms_v)

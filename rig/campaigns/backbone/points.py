@@ -11,7 +11,6 @@ from rig.bench.configuration import validated
 from rig.campaigns.backbone.plan import BackbonePlan
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.evaluation.acceptance import (
-    first_of,
     modal_point,
     nonharmonic_objection,
     phase_objection,
@@ -70,19 +69,14 @@ def _short_point(bench: Bench, plan: BackbonePlan, target: Target, rows: Rows) -
     nonharmonic, shape = nonharmonic_force(bench, [rows]), drive_shape(bench, plan.plant)
     lost = int(np.count_nonzero(lost_rows(rows)))
     at_limit = {why: at for why, at in flagged(bench, rows, flow).items() if why != SAMPLES_LOST}
-    reason = first_of(
-        (
-            phase_objection(error_deg, plan.accepted_phase_error_deg),
-            std_objection(
-                found.modal_frequency_std_hz / found.modal_frequency_hz,
-                plan.accepted_frequency_std,
-                found.damping_ratio_std / abs(found.damping_ratio),
-                plan.accepted_damping_std,
-            ),
-            nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force),
-            *(why for why, at in at_limit.items() if at.any()),
-            lost_objection(lost, rows.size),
-        )
+    frequency_std = found.modal_frequency_std_hz / found.modal_frequency_hz
+    damping_std = found.damping_ratio_std / abs(found.damping_ratio)
+    reason = (
+        phase_objection(error_deg, plan.accepted_phase_error_deg)
+        or std_objection(frequency_std, plan.accepted_frequency_std, damping_std, plan.accepted_damping_std)
+        or nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force)
+        or next((why for why, at in at_limit.items() if at.any()), "")
+        or lost_objection(lost, rows.size)
     )
     turned = np.unwrap(rows["theta_rad"].astype(float))
     grown = found.growth_1_s * plan.settle.average_periods / found.modal_frequency_hz

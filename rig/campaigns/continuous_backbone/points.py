@@ -11,7 +11,7 @@ from rig.bench import Bench
 from rig.campaigns.campaign import Campaign
 from rig.campaigns.continuous_backbone.plan import ContinuousBackbonePlan
 from rig.campaigns.continuous_backbone.ways import WAYS, both_ways, rows_near
-from rig.campaigns.evaluation.acceptance import first_of, nonharmonic_objection, std_objection
+from rig.campaigns.evaluation.acceptance import nonharmonic_objection, std_objection
 from rig.campaigns.evaluation.measured_together import Passage
 from rig.campaigns.evaluation.nonharmonic_force import nonharmonic_force
 from rig.campaigns.evaluation.plausibility import with_plausible_ways
@@ -157,12 +157,10 @@ def _point(
     damping_std, shape = single * float(mode.damping_ratio_std[index]), drive_shape(bench, plan.plant)
     stds = (frequency_std / frequency, damping_std / abs(damping))
     nonharmonic = nonharmonic_force(bench, pieces)
-    reason = first_of(
-        (
-            f"passed on the way {covered[0]} only ({together.missing})" if together.missing else "",
-            std_objection(stds[0], plan.accepted_frequency_std, stds[1], plan.accepted_damping_std),
-            nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force),
-        )
+    reason = (
+        (f"passed on the way {covered[0]} only ({together.missing})" if together.missing else "")
+        or std_objection(stds[0], plan.accepted_frequency_std, stds[1], plan.accepted_damping_std)
+        or nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force)
     )
     near = np.abs(np.log(np.concatenate([flow.amplitude_m for flow in together.flows]) / target.level)) < plan.bandwidth
     momentary = np.concatenate([flow.frequency_hz for flow in together.flows])[near]

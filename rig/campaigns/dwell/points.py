@@ -110,9 +110,10 @@ def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[ob
     first mean, over all parts of a recording. Failed means count too; the ramp and the settling at the beginning of a part do
     not.
     """
-    cycles = sum(map(_cycles, known)) + 0.5 * _length(point).cycles_in_mean
-    seconds = sum(_length(one).seconds_in_mean for one in known) + 0.5 * _length(point).seconds_in_mean
-    result = replace(_result(point) or DwellResult(), cycles=cycles, time_s=seconds)
+    cycles = sum(map(_cycles, known)) + 0.5 * (value_of(point, "cycles_in_mean") or 0.0)
+    seconds = [value_of(one, "seconds_in_mean") or 0.0 for one in (*known, point)]
+    result = point.result if isinstance(point.result, DwellResult) else DwellResult()
+    result = replace(result, cycles=cycles, time_s=sum(seconds[:-1]) + 0.5 * seconds[-1])
     if not point.accepted:
         return replace(point, result=result), ""
     accepted, shape = [one for one in known if one.accepted], value_of(point, "drive_mode_shape")
@@ -134,20 +135,10 @@ def watch_drift(plan: DwellPlan, known: Sequence[Point[object]], point: Point[ob
     return point.warned(*alarms) if alarms else point, f"{abort}, after {cycles:.0f} cycles" if abort else ""
 
 
-def _result(point: Point[object]) -> DwellResult | None:
-    return point.result if isinstance(point.result, DwellResult) else None
-
-
-def _length(point: Point[object]) -> Length:
-    result = _result(point)
-    return (None if result is None else result.length) or Length(cycles_in_mean=0.0, seconds_in_mean=0.0)
-
-
 def _cycles(point: Point[object]) -> float:
     """Return the cycles that a mean has added: those of its record or, if it failed, those until it failed."""
-    result = _result(point)
-    length = None if result is None else result.length
-    return (point.settle_periods or 0.0) if length is None else length.cycles_in_mean
+    recorded: float | None = value_of(point, "cycles_in_mean")
+    return (point.settle_periods or 0.0) if recorded is None else recorded
 
 
 def _beyond(plan: DwellPlan, name: str, changes: Mapping[str, float | None]) -> Iterator[str]:

@@ -4,7 +4,6 @@ An objection is a line that says why a point is not accepted. It is empty if the
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -24,11 +23,6 @@ from rig.campaigns.planning.plan import Target
 MOTIONS = ("drive", "response")
 FEW_OUTPUT_BITS = 250.0  # amplitude: above, rounding amplified by 40 off resonance stays below 7 % of the force's RMS
 FAILING = 0.25  # of the largest motion: sensor noise drifts far less, a sensor that dies within a record more
-
-
-def first_of(objections: Iterable[str]) -> str:
-    """Return the first objection that is not empty."""
-    return next((objection for objection in objections if objection), "")
 
 
 def phase_objection(error_deg: float, accepted_deg: float) -> str:
@@ -124,16 +118,13 @@ def settled_point(
     """Judge a point that was settled and then recorded at a held lag; ``level`` is the objection to the held level."""
     scatter, nonharmonic = frequency_scatter(rows), nonharmonic_force(bench, [rows])
     vibrating = vibration_part(vibration, rows)
-    reason = first_of(
-        (
-            phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg),
-            level,
-            nonharmonic_objection(
-                nonharmonic, plan.accepted_nonharmonic_force, vibrating.voltage_v / bench.output_bit_v
-            ),
-            hunting_objection(scatter, plan.accepted_frequency_scatter),
-            drift_objection(bench, vibration, plan.accepted_drift),
-        )
+    bits = vibrating.voltage_v / bench.output_bit_v
+    reason = (
+        phase_objection(vibration.phase_error_deg, plan.accepted_phase_error_deg)
+        or level
+        or nonharmonic_objection(nonharmonic, plan.accepted_nonharmonic_force, bits)
+        or hunting_objection(scatter, plan.accepted_frequency_scatter)
+        or drift_objection(bench, vibration, plan.accepted_drift)
     )
     return replace(
         planned_point(plan, target),

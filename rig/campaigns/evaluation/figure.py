@@ -36,9 +36,8 @@ def refused(points: Sequence[Point[object]]) -> str:
     left_out = Counter(str(point.quality) for point in points if not point.accepted)
     if not left_out:
         return ""
-    if len(left_out) == 1:
-        return f"{left_out.total()} not accepted ({next(iter(left_out))})"
-    return f"{left_out.total()} not accepted ({', '.join(f'{count} {name}' for name, count in left_out.items())})"
+    names = left_out if len(left_out) == 1 else (f"{count} {name}" for name, count in left_out.items())
+    return f"{left_out.total()} not accepted ({', '.join(names)})"
 
 
 def why_nothing_is_drawn(points: Sequence[Point[object]]) -> str:
@@ -154,18 +153,13 @@ def _binned(part: Part, field: str, width: int) -> _Bins:
     found = []
     whole, step = part.n_rows // width * width, width * max(1, AT_ONCE // width)
     for first in range(0, whole, step):
-        values = _plain(field, part.rows(field, first, min(first + step, whole))).reshape(-1, width)
+        values = part.rows(field, first, min(first + step, whole))
+        values = np.abs(values) if np.iscomplexobj(values) else values
+        values = np.degrees(values) if field.endswith("_rad") else values
+        values = values.astype(float).reshape(-1, width)
         values = np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan)  # gaps stay gaps
         found.append((values.min(axis=1), values.mean(axis=1), values.max(axis=1)))
     return _Bins(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
-
-
-def _plain(field: str, values: np.ndarray) -> np.ndarray:
-    if np.iscomplexobj(values):
-        values = np.abs(values)
-    elif field.endswith("_rad"):
-        values = np.degrees(values)
-    return np.asarray(values.astype(float))
 
 
 def _usual_error_deg(part: Part) -> float:

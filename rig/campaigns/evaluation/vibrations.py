@@ -79,21 +79,15 @@ def failed_point(
     if math.isfinite(error) and code is not Outcome.INTERRUPTED:
         phase = "" if isinstance(plan, OpenLoopPlan) else f"averaged phase error {error:.2f} deg, "
         why += f" ({phase}amplitude drift {100.0 * drift:.3g} %)"
-    if code is Outcome.NOT_SETTLED:
-        why += _of_harmonics(float(outcome["distortion"]))
+    distortion = float(outcome["distortion"]) if code is Outcome.NOT_SETTLED else 0.0  # over the tolerance of the loop
+    if distortion == math.inf:
+        why += "; the harmonics loop could not measure its plant, or the voltage limit left no room for it"
+    elif distortion > 1.0:
+        why += f"; controlled harmonics are {distortion:.3g} times their tolerance off (controller.harmonics.largest, voltage?)"
     if not locked and (code in (Outcome.OUTSIDE_WINDOW, Outcome.NOT_LOCKED) or abs(error) > POLARITY_DEG):
         why += f"; {POLARITY_HINT}"
     failed = replace(planned_point(plan, target), settled=False, settle_periods=float(outcome["periods"]))
     return failed.refused(why, Quality.REJECTED if code in ALLOWED else Quality(code.name.lower().replace("_", "-")))
-
-
-def _of_harmonics(distortion: float) -> str:
-    """Return what the harmonics loop did not reach; ``distortion`` is its largest error over its tolerance."""
-    if distortion == math.inf:
-        return "; the harmonics loop could not measure its plant, or the voltage limit left no room for it"
-    if distortion > 1.0:
-        return f"; controlled harmonics are {distortion:.3g} times their tolerance off (controller.harmonics.largest, voltage?)"
-    return ""
 
 
 def recorded_vibration(
@@ -112,7 +106,14 @@ def recorded_vibration(
         noise_rms=[channel.noise_rms for channel in bench.channels],
         phase_lag_target_deg=phase_lag_target_deg,
     )
-    return _corrected(vibration, bench)
+    factors = channel_factors(bench, vibration.frequency_hz * np.arange(vibration.harmonics.shape[1]))
+    std, rounding = vibration.harmonics_std, vibration.rounding_std
+    return replace(
+        vibration,
+        harmonics=vibration.harmonics * factors,
+        harmonics_std=None if std is None else std * np.abs(factors),
+        rounding_std=None if rounding is None else rounding * np.abs(factors),
+    )
 
 
 class _Record:
@@ -211,18 +212,6 @@ def quantisation_warnings(vibration: PeriodicVibration, bench: Bench) -> list[st
                 "rounding is most of the error bounds"
             )
     return out
-
-
-def _corrected(vibration: PeriodicVibration, bench: Bench) -> PeriodicVibration:
-    """Correct the harmonics of every channel, and their standard errors, for the skew and the high-pass of the channel."""
-    factors = channel_factors(bench, vibration.frequency_hz * np.arange(vibration.harmonics.shape[1]))
-    std, rounding = vibration.harmonics_std, vibration.rounding_std
-    return replace(
-        vibration,
-        harmonics=vibration.harmonics * factors,
-        harmonics_std=None if std is None else std * np.abs(factors),
-        rounding_std=None if rounding is None else rounding * np.abs(factors),
-    )
 
 
 def channel_factors(bench: Bench, frequency_hz: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 from identification import IdentificationError, InstrumentResponse, PeriodicSpectra, coherence
 from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.recorded import points_of, specimen_of
+from rig.campaigns.evaluation.vibrations import VOLTAGE
 from rig.campaigns.multisine.points import recorded_spectra
 from rig.drawing.axes import log_axis
 from rig.drawing.page import grid, legend_below
@@ -33,14 +34,7 @@ def draw(page: "Figure", recording: Recording) -> None:
     draw_multisine(page, at_level, title=text + (f", {left_out}" if left_out else ""))
 
 
-def draw_multisine(
-    page: "Figure",
-    spectra: PeriodicSpectra,
-    *,
-    voltage: str = "voltage",
-    response: str = "drive",
-    title: str = "",
-) -> None:
+def draw_multisine(page: "Figure", spectra: PeriodicSpectra, *, title: str = "") -> None:
     """Draw amplitude spectra of voltage, force and response, and the frequency response with its noise and coherence.
 
     ``page`` is an empty figure, about 9 by 6.4 inches. Lines that are not excited have separate marks for odd and even. What
@@ -48,13 +42,12 @@ def draw_multisine(
     """
     force = next(channel.name for channel in spectra.channels if channel.role == "force")
     axes = grid(page, 3, 2, down_columns=True)
-    names = {voltage: "voltage", force: "force", response: response}
+    names = {VOLTAGE.name: "voltage", force: "force", "drive": "drive"}
     for axis, (name, text) in zip(axes[:, 0], names.items(), strict=True):
         _spectrum(axis, spectra, name, text)
-    _response(
-        axes[0, 1], axes[1, 1], spectra.frequency_response(response, instrument=voltage), f"{response} over {force}"
-    )
-    _coherence(axes[2, 1], spectra, response, force)
+    measured = spectra.frequency_response("drive", instrument=VOLTAGE.name)
+    _response(axes[0, 1], axes[1, 1], measured, f"drive over {force}")
+    _coherence(axes[2, 1], spectra, "drive", force)
     legend_below(page, *axes[:, 0], axes[0, 1])
     heading(page, title)
 

@@ -73,13 +73,7 @@ class Levels(Configured):
 
     @property
     def _given(self) -> dict[str, tuple[float, ...]]:
-        levels = {
-            "levels_v": self.levels_v,
-            "levels_n": self.levels_n,
-            "levels_rms_n": self.levels_rms_n,
-            "levels_m": self.levels_m,
-        }
-        return {name: values for name, values in levels.items() if values is not None}
+        return {name: values for name in LEVELS if (values := getattr(self, name)) is not None}
 
     @property
     def level_count(self) -> dict[str, int]:

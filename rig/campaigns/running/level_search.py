@@ -54,16 +54,6 @@ class Seen:
     """Factor by which the level should be raised if the responses do not suffice."""
 
 
-@dataclass(frozen=True)
-class Levels:
-    """Outcome of a search."""
-
-    tried_v: tuple[float, ...]
-    """All levels that were played, V RMS. The last one is the level to use."""
-    enough: bool
-    """Whether the last level suffices."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class LevelSearch:
     """Raises the level until the responses suffice, peaks come near the limits, or the largest number of levels was tried."""
@@ -75,15 +65,18 @@ class LevelSearch:
     most_levels: int
     """Largest number of levels tried."""
 
-    def search(self, bench: Bench, listen: Callable[[float], Seen]) -> Levels:
-        """Search from a thousandth of the largest voltage upwards; ``listen`` plays a level (V RMS) and evaluates it."""
+    def search(self, bench: Bench, listen: Callable[[float], Seen]) -> tuple[tuple[float, ...], bool]:
+        """Search from a thousandth of the largest voltage upwards; ``listen`` plays a level (V RMS) and evaluates it.
+
+        Returns all levels that were played, of which the last one is the level to use, and whether it suffices.
+        """
         tried: list[float] = []
         level: float | None = FIRST * bench.limits.voltage_v
         while level is not None:
             seen = listen(level)
             tried.append(level)
             level = self.next_level(level, seen) if len(tried) < self.most_levels else None
-        return Levels(tuple(tried), seen.enough)
+        return tuple(tried), seen.enough
 
     def next_level(self, level_rms_v: float, seen: Seen) -> float | None:
         """Return the next level to play; None if this level suffices, or if the limits allow no worthwhile rise."""

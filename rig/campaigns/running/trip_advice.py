@@ -111,7 +111,7 @@ def advice_on(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before
 def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, before: Before) -> Advice:
     """Advise on a trip at a limit, from the share of the limit that earlier points reached in proportion to their level."""
     name, unit = _name(bench, trip), plan.level_unit if at is None else at.level_unit
-    margin = margin_before(bench, trip.reason, trip.channel, unit, before.points)
+    margin = _margin(bench, trip, unit, before.points)
     raised = f"take a less sensitive sensor for channel {name}"
     if trip.reason in LIMITS:
         key = LIMITS[trip.reason]
@@ -123,10 +123,10 @@ def _on_a_limit(trip: Trip, bench: Bench, plan: Plan, at: TrippedAt | None, befo
         polarity = ", or polarity or sensitivity of a sensor is wrong" if before.first else ""
         then = "; `rig check` tells polarity and sensitivity" if before.first else ""
         return Advice(f"{what} is too high{polarity}", f"{lowered}, or {raised}{then}")
-    reached = f"{100.0 * margin.share:.2g} % of {margin.key} on channel {name}"
-    had = f"the point before, {margin.level:.4g} {unit}, had reached {reached}"
-    if at is None or margin.share * max(at.level / margin.level, 1.0) >= SHARE_TOO_HIGH:
-        below = PROPOSED_SHARE * margin.level / margin.share
+    share, level, key = margin
+    had = f"the point before, {level:.4g} {unit}, had reached {100.0 * share:.2g} % of {key} on channel {name}"
+    if at is None or share * max(at.level / level, 1.0) >= SHARE_TOO_HIGH:
+        below = PROPOSED_SHARE * level / share
         bound = f" below {below:.2g} {unit}" if at is None or below < at.level else ""
         return Advice(f"{had}: {what} is too high", f"{lowered}{bound}, or {raised}")
     return Advice(
@@ -158,42 +158,21 @@ def _name(bench: Bench, trip: Trip) -> str:
     return bench.channels[trip.channel].name if trip.channel >= 0 else "-"
 
 
-class Margin(NamedTuple):
-    """How close an earlier point came to the limit that later stopped the run."""
+def _margin(bench: Bench, trip: Trip, unit: str, points: Iterable[Point[object]]) -> tuple[float, float, str] | None:
+    """Return the largest share of the tripped limit that points with levels in ``unit`` had reached (1 at the limit).
 
-    level: float
-    """Level of the point."""
-    share: float
-    """Peak over the allowed value; 1 at the limit."""
-    key: str
-    """Key or range of the bench that defines the limit."""
-
-
-def margin_before(
-    bench: Bench, reason: EndReason, channel: int, unit: str, points: Iterable[Point[object]]
-) -> Margin | None:
-    """Return the largest share of the tripped limit that points with levels in ``unit`` had reached.
-
-    Returns None if the trip does not concern an amplitude of a channel, or if no point has harmonics.
+    The level of that point and the key or range of the bench that defines the limit are returned too. None if no point has
+    harmonics.
     """
-    key, allowed = _allowed(bench, reason, channel)
     known = [point for point in points if point.spectrum is not None and point.level_unit == unit]
-    if not key or not known:
+    if trip.channel < 0 or not known:
         return None
-    shares = [(_peak(point, channel, reason) / allowed, point.level) for point in known]
-    share, level = max(shares)
-    return Margin(level, share, key)
-
-
-def _allowed(bench: Bench, reason: EndReason, channel: int) -> tuple[str, float]:
-    if channel < 0:
-        return "", math.inf
-    if reason in LIMITS:
-        return f"limits.{LIMITS[reason]}", float(getattr(bench.limits, LIMITS[reason]))
-    if reason is EndReason.SENSOR_OVERLOAD:
-        one = bench.channels[channel]
-        return f"the range of {one.range_in_unit:.4g} {one.unit}", one.range_in_unit
-    return "", math.inf
+    channel = bench.channels[trip.channel]
+    key, allowed = f"the range of {channel.range_in_unit:.4g} {channel.unit}", channel.range_in_unit
+    if trip.reason in LIMITS:
+        key, allowed = f"limits.{LIMITS[trip.reason]}", float(getattr(bench.limits, LIMITS[trip.reason]))
+    share, level = max((_peak(point, trip.channel, trip.reason) / allowed, point.level) for point in known)
+    return share, level, key
 
 
 def _peak(point: Point[object], channel: int, reason: EndReason) -> float:

@@ -53,7 +53,6 @@ def draw_sweep(
     sample_rate_hz: float,
     *,
     drop_out: ForceDropOut | None = None,
-    response: str = "drive",
     title: str = "",
 ) -> None:
     """Draw voltage, force, response and instantaneous frequency over time.
@@ -70,14 +69,12 @@ def draw_sweep(
         Samples per second.
     drop_out
         Drop-out of the force, whose characteristic points are marked; None: no marks.
-    response
-        Name of the channel that is drawn below force and voltage.
     title
         Heading.
     """
     force = next(channel.name for channel in sweep.channels if channel.role == "force")
     axes = grid(page, 4, sharex=True, height_ratios=(1.0, 1.5, 1.5, 1.2))[:, 0]
-    names = {VOLTAGE.name: "voltage", force: "force", response: f"response ({response})"}
+    names = {VOLTAGE.name: "voltage", force: "force", "drive": "response (drive)"}
     longest = int(np.ceil(sample_rate_hz / sweep.frequency_hz.min()))
     for axis, (name, text) in zip(axes, names.items(), strict=False):
         row = sweep.index(name)
@@ -130,17 +127,9 @@ def _momentary_frequency(axis: "Axes", sweep: Transient, force: np.ndarray, rate
 def _mark_drop_out(force: "Axes", response: "Axes", drop_out: ForceDropOut) -> None:
     """Mark the force off resonance, its minimum and overshoot, and the peak response, with their values."""
     force.axhline(drop_out.off_resonance_n, color=REJECTED, lw=0.8, ls="--")
-    marks = (
-        (drop_out.minimum_time_s, drop_out.minimum_n, drop_out.minimum_ratio, drop_out.minimum_frequency_hz, "v"),
-        (
-            drop_out.overshoot_time_s,
-            drop_out.overshoot_n,
-            drop_out.overshoot_ratio,
-            drop_out.overshoot_frequency_hz,
-            "^",
-        ),
-    )
-    for seconds, newtons, ratio, frequency_hz, marker in marks:
+    for name, marker in (("minimum", "v"), ("overshoot", "^")):
+        values = (getattr(drop_out, f"{name}_{quantity}") for quantity in ("time_s", "n", "ratio", "frequency_hz"))
+        seconds, newtons, ratio, frequency_hz = values
         label = f"{100 * ratio:.3g} % of {drop_out.off_resonance_n:.3g} N at {frequency_hz:.4g} Hz"
         force.plot(seconds, newtons, marker, color="black", label=label)
     label = f"largest displacement, {1e3 * drop_out.peak_m:.4g} mm at {drop_out.peak_frequency_hz:.4g} Hz"

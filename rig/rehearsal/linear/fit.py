@@ -5,7 +5,7 @@ stiffnesses and all else that is positive are fitted and drawn by their logarith
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -50,29 +50,25 @@ def posterior(
     The fit starts from several shakers, because it may have more than one minimum.
     """
     neighbours_hz: list[float] = []
-    fit = _fit(parameters_of(channels, start, priors, responses, neighbours_hz), responses, start_values(start))
-    while responses is not None and fit.posterior.inflation > _MIN_UNEXPLAINED and len(neighbours_hz) < _MAX_NEIGHBOURS:
-        neighbours_hz.append(fit.worst_hz)
+    parameters = parameters_of(channels, start, priors, responses, neighbours_hz)
+    found, worst_hz = _fit(parameters, responses, start_values(start))
+    while responses is not None and found.inflation > _MIN_UNEXPLAINED and len(neighbours_hz) < _MAX_NEIGHBOURS:
+        neighbours_hz.append(worst_hz)
         parameters = parameters_of(channels, start, priors, responses, neighbours_hz)
-        better = _fit(parameters, responses, [fit.posterior.rig().values])
-        if better.posterior.inflation > _MAX_LEFT * fit.posterior.inflation:
+        better, worst_hz = _fit(parameters, responses, [found.rig().values])
+        if better.inflation > _MAX_LEFT * found.inflation:
             break
-        fit = better
-    return fit.posterior
+        found = better
+    return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Posterior of one fit, and the line (Hz) that fits worst."""
-
-    posterior: Posterior
-    worst_hz: float
-
-
-def _fit(table: ParameterTable, responses: Responses | None, starts: Sequence[Mapping[str, float]]) -> _Fit:
+def _fit(
+    table: ParameterTable, responses: Responses | None, starts: Sequence[Mapping[str, float]]
+) -> tuple[Posterior, float]:
+    """Return the best of the fits from several starts, and the line (Hz) that fits worst."""
     centre, std = np.array(table.centre), np.array(table.std)
     if responses is None:
-        return _Fit(_posterior(table, centre, np.diag(std**2)), 0.0)
+        return _posterior(table, centre, np.diag(std**2)), 0.0
     scale = np.sqrt(np.mean(np.abs(responses.value) ** 2, axis=0))
     sigma = np.sqrt(
         responses.std**2 + (_MODEL_FLOOR * np.abs(responses.value)) ** 2 + (0.2 * _MODEL_FLOOR * scale) ** 2
@@ -90,17 +86,10 @@ def _fit(table: ParameterTable, responses: Responses | None, starts: Sequence[Ma
     with np.errstate(over="ignore", invalid="ignore"):
         for start in starts:
             x = np.clip(_with_measured_force(table, table.vector(start), responses), *bounds)
-            fits.append(
-                scipy.optimize.least_squares(
-                    residuals,
-                    x,
-                    bounds=bounds,
-                    x_scale=std,
-                    max_nfev=_MAX_EVALUATIONS,
-                    ftol=_TOLERANCE,
-                    xtol=_TOLERANCE,
-                )
+            fit = scipy.optimize.least_squares(
+                residuals, x, bounds=bounds, x_scale=std, max_nfev=_MAX_EVALUATIONS, ftol=_TOLERANCE, xtol=_TOLERANCE
             )
+            fits.append(fit)
     found = min(fits, key=lambda fit: float(fit.cost))
     if not np.all(np.isfinite(found.fun)):
         raise ConfigurationError("the responses are not those of a shaker, a stinger and a structure near one mode")
@@ -117,7 +106,7 @@ def _fit(table: ParameterTable, responses: Responses | None, starts: Sequence[Ma
         determined=float(np.mean(np.linalg.eigvalsh(covariance / np.outer(std, std)) < _HALVED)),
         linearisation=Linearisation(responses, sigma * np.sqrt(max(1.0, inflation)), jacobian, std, bounds),
     )
-    return _Fit(best, float(responses.frequency_hz[int(np.argmax(relative[:, 1]))]))
+    return best, float(responses.frequency_hz[int(np.argmax(relative[:, 1]))])
 
 
 def _model(table: ParameterTable, x: Float, responses: Responses) -> Complex:

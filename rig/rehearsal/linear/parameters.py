@@ -42,21 +42,13 @@ class ParameterTable:
         least = [self.lowest.get(name, -np.inf) for name in self.names]
         return np.maximum(self.centre - wide, least), self.centre + wide
 
-    def log(self, name: str, value: float, log_std: float = _UNKNOWN_LOG_STD) -> None:
-        """Add a positive parameter."""
-        known = self.priors.get(name, Prior(value, log_std))
-        self._add(name, True, float(np.log(known.value)), known.log_std)
-
-    def plain(self, name: str, value: float, std: float) -> None:
-        """Add a parameter of any sign."""
-        known = self.priors.get(name)
-        self._add(name, False, value if known is None else known.value, std if known is None else known.log_std)
-
-    def _add(self, name: str, positive: bool, centre: float, std: float) -> None:
+    def add(self, name: str, value: float, std: float = _UNKNOWN_LOG_STD, *, positive: bool = True) -> None:
+        """Add a parameter; ``std`` is that of the logarithm of a positive one."""
+        known = self.priors.get(name, Prior(value, std))
         self.names.append(name)
         self.positive.append(positive)
-        self.centre.append(centre)
-        self.std.append(std)
+        self.centre.append(float(np.log(known.value)) if positive else known.value)
+        self.std.append(known.log_std)
 
     def vector(self, values: Mapping[str, float]) -> Float:
         """Return the vector of named values; what they do not name is at its centre."""
@@ -70,11 +62,10 @@ class ParameterTable:
     def mode(self, mode: str, frequency_hz: float, shape: float, *, log_std: tuple[float, float, float]) -> None:
         """Add a mode; ``log_std`` holds the values of frequency, damping ratio and drive shape."""
         end = f" {mode}" if mode else ""
-        self.log(f"frequency_hz{end}", frequency_hz, log_std[0])
-        self.log(f"damping_ratio{end}", _FLOOR_DAMPING, log_std[1])
-        self.log(f"drive_shape{end}", shape, log_std[2])
+        for name, value, std in zip(MODE, (frequency_hz, _FLOOR_DAMPING, shape), log_std, strict=True):
+            self.add(f"{name}{end}", value, std)
         for name in self.channels:
-            self.plain(f"ratio {name}{end}", 0.0 if mode else 1.0, 2.0)
+            self.add(f"ratio {name}{end}", 0.0 if mode else 1.0, 2.0, positive=False)
 
 
 def shaker_prior(mode: Mapping[str, float]) -> dict[str, Prior]:
@@ -117,10 +108,10 @@ def parameters_of(
     shape, hertz = start["drive_shape"], start["frequency_hz"]
     out.mode("", hertz, shape, log_std=(0.1, 1.5, _UNKNOWN_LOG_STD))
     for name, shaker in shaker_prior(start).items():
-        out.log(name, shaker.value, shaker.log_std)
+        out.add(name, shaker.value, shaker.log_std)
     rate = _DEFAULT_RATE_HZ if responses is None else responses.sample_rate_hz
-    out.plain("delay_s", 0.0, 2.0 / rate)
-    out.log("coupling_hz", _COUPLING_HZ)
+    out.add("delay_s", 0.0, 2.0 / rate, positive=False)
+    out.add("coupling_hz", _COUPLING_HZ)
     lowest, highest = (0.4 * hertz, 2.5 * hertz) if responses is None else responses.frequency_hz[[0, -1]]
     out.mode("low", _LOW * float(lowest), 0.1 * shape, log_std=(1e-3, 1e-3, 2.0))
     out.mode("high", _HIGH * float(highest), shape, log_std=(0.5, 1e-3, 2.0))
