@@ -5,12 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification import (
-    Backbone,
-    ContinuousBackbone,
-    IdentificationError,
-    nonlinear_mode,
-)
+from identification import Backbone, ContinuousBackbone, IdentificationError, nonlinear_mode
 from rig.campaigns.evaluation.figure import refused
 from rig.campaigns.evaluation.frequency_responses import passes_of
 from rig.campaigns.evaluation.point import spectrum_of, vibration_of

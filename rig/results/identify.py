@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import ConfigurationError
+from rig.results.kind import Progress
 from rig.results.kinds import identifications
 
 if TYPE_CHECKING:
-    from rig.results.kind import Progress
     from rig.results.options import Options
 
 
-def identify_model(paths: Sequence[Path], options: "Options", *, progress: "Progress | None" = None) -> Any:
+def identify_model(paths: Sequence[Path], options: "Options", *, progress: Progress | None = None) -> Any:
     """Identify a model in recordings or imported measurements. Its kind is that of the options.
 
     ``progress`` is called after every iteration when a PNLSS model is fitted. Raises `RecordingError` for files with other

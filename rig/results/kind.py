@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from rig.results.options import Options
     from rig.text.contents import Contents
 
-    Progress = Callable[[FitProgress], None]
-
+Progress = Callable[["FitProgress"], None]
+"""Is called after every iteration of a fit."""
 T = TypeVar("T")
 S = TypeVar("S")
 
@@ -91,7 +91,7 @@ class Identification:
         told: Remark | None = resolve_name(self.remark_address)(result, path) if self.remark_address else None
         return told
 
-    def identify(self, paths: Sequence[Path], options: "Options", progress: "Progress | None" = None) -> Any:
+    def identify(self, paths: Sequence[Path], options: "Options", progress: Progress | None = None) -> Any:
         """Identify a model in files; ``progress`` is called after every iteration of a fit."""
         return resolve_name(self.identify_address)(paths, options, progress)
 

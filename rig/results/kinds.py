@@ -10,20 +10,20 @@ from vibrolock.on_use import Registry
 
 KINDS: Mapping[str, ResultKind] = Registry(
     {
-        "nonlinear-mode": "rig.results.nonlinear_mode.kind:KIND",
-        "decay-backbone": "rig.results.decay_backbone.kind:KIND",
-        "linear-modes": "rig.results.linear_modes.kind:KIND",
-        "exciter": "rig.results.exciter.kind:KIND",
-        "pnlss": "rig.results.pnlss.kind:KIND",
-        "structured": "rig.results.structured.kind:KIND",
-        "force-surface": "rig.results.force_surface.kind:KIND",
-        "frequency-responses": "rig.results.frequency_responses.kind:KIND",
-        "frequency-response-matrix": "rig.results.frequency_response_matrix.kind:KIND",
-        "hammer-test": "rig.results.hammer_test.kind:KIND",
-        "measured-backbone": "rig.results.measured_backbone.kind:KIND",
-        "time-data": "rig.results.time_data.kind:KIND",
-        "predictions": "rig.results.predictions.kind:KIND",
-        "rehearsal": "rig.results.rehearsal.kind:KIND",
+        "nonlinear-mode": "rig.results.nonlinear_mode:KIND",
+        "decay-backbone": "rig.results.decay_backbone:KIND",
+        "linear-modes": "rig.results.linear_modes:KIND",
+        "exciter": "rig.results.exciter:KIND",
+        "pnlss": "rig.results.pnlss:KIND",
+        "structured": "rig.results.structured:KIND",
+        "force-surface": "rig.results.force_surface:KIND",
+        "frequency-responses": "rig.results.frequency_responses:KIND",
+        "frequency-response-matrix": "rig.results.frequency_response_matrix:KIND",
+        "hammer-test": "rig.results.hammer_test:KIND",
+        "measured-backbone": "rig.results.measured_backbone:KIND",
+        "time-data": "rig.results.time_data:KIND",
+        "predictions": "rig.results.predictions:KIND",
+        "rehearsal": "rig.results.rehearsal:KIND",
     }
 )
 """Every kind of file other than recordings, by its name in the file. A declaration is imported when it is asked for."""

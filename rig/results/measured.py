@@ -2,25 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from identification import (
-    FrequencyResponse,
-    LinearModes,
-    ModalAnalysis,
-)
+from identification import FrequencyResponse, LinearModes, ModalAnalysis
 from rig.errors import RecordingError
-from rig.measurements import (
-    STEPPED,
-    frequency_responses,
-)
+from rig.measurements import STEPPED, frequency_responses
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load_as
-
-if TYPE_CHECKING:
-    pass
 
 
 def modes_in(path: Path) -> LinearModes:

@@ -10,9 +10,9 @@ class Column(NamedTuple):
     """Name of the field of the point or of one of its parts."""
     heading: str
     """Heading of the column."""
-    unit: str
+    unit: str = ""
     """Unit as it is shown."""
-    pattern: str
+    pattern: str = ""
     """Format of the number."""
     scale: float = 1.0
     """Factor from the stored unit to the shown one."""
@@ -24,3 +24,8 @@ class Column(NamedTuple):
     """Whether the column is shown only if there is a value."""
     counts_from: int = 0
     """Number that a stored 0 is shown as: 1 for numbers that people count from 1."""
+
+    @property
+    def title(self) -> str:
+        """Heading with the unit."""
+        return f"{self.heading} {self.unit}".rstrip()

@@ -4,9 +4,11 @@ import contextlib
 import io
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from rig.text.column import Column
 from vibrolock.printable import printable
 
 
@@ -64,6 +66,23 @@ def _finite(value: object) -> object:
 def number(value: float | None, pattern: str, scale: float = 1.0) -> str:
     """Return a number in a format, or a dash for None or NaN."""
     return "-" if value is None or value != value else format(scale * value, pattern)
+
+
+def print_columns(*columns: tuple[str, str, Iterable[float | None]]) -> None:
+    """Print a table from heading, format and values of each column; values that are not numbers are dashes."""
+    cells = [[number(value, pattern) for value in values] for _, pattern, values in columns]
+    print_table([heading for heading, _, _ in columns], list(zip(*cells, strict=True)))
+
+
+def print_rows(rows: Sequence[Mapping[str, Any]], *columns: Column) -> None:
+    """Print a table of fields of the rows; those of columns without a format are text."""
+    print_table(
+        [column.title for column in columns],
+        [
+            [number(row[one.key], one.pattern, one.scale) if one.pattern else str(row[one.key]) for one in columns]
+            for row in rows
+        ],
+    )
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

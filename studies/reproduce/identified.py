@@ -28,7 +28,7 @@ from rig.measurements import response_matrices
 from rig.recording.reader import Recording
 from rig.results.files import load_as, save
 from rig.results.pnlss.model import IdentifiedPnlss
-from rig.results.simulated.data_fingerprints import uses_of
+from rig.results.simulated.data_files import uses_of
 from rig.results.structured.model import IdentifiedStructured
 from studies.reproduce.options import Options
 from studies.reproduce.recordings import exciter_of, recorded

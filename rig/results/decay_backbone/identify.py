@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,7 @@ from rig.measurements import bench_of_recording, decays, point_rows
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.decay_backbone.options import DecayOptions
-
-if TYPE_CHECKING:
-    from rig.results.kind import Progress
+from rig.results.kind import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +30,7 @@ class _Record:
     specimen: str
 
 
-def identify(paths: Sequence[Path], options: DecayOptions, progress: "Progress | None" = None) -> DecayBackbone:
+def identify(paths: Sequence[Path], options: DecayOptions, progress: Progress | None = None) -> DecayBackbone:
     """Evaluate the decay in one recorded point of a recording, or in one record of time data.
 
     The mode shape at the drive point is taken as given in the options; without it a force that acts during the decay, as that

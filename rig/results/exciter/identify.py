@@ -3,31 +3,19 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from identification import (
-    Exciter,
-    PeriodicSpectra,
-    identify_exciter,
-)
+from identification import Exciter, PeriodicSpectra, identify_exciter
 from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import (
-    bench_of_recording,
-    spectra,
-)
+from rig.measurements import bench_of_recording, spectra
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.exciter.options import ExciterOptions
-
-if TYPE_CHECKING:
-    from rig.results.kind import Progress
-
-    pass
+from rig.results.kind import Progress
 
 
-def identify(paths: Sequence[Path], options: ExciterOptions, progress: "Progress | None" = None) -> Exciter:
+def identify(paths: Sequence[Path], options: ExciterOptions, progress: Progress | None = None) -> Exciter:
     """Identify an exciter from the highest level of one multisine recording."""
     if len(paths) != 1:
         raise ConfigurationError(f"`kind` exciter: {len(paths)} files given, allowed is one multisine recording")

@@ -2,22 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification.common import one_specimen
 from rig.results.force_surface.model import MeasuredSurface
 from rig.results.force_surface.options import ForceSurfaceOptions
+from rig.results.kind import Progress
 from rig.results.measured import stepped_sines
 
-if TYPE_CHECKING:
-    from rig.results.kind import Progress
 
-    pass
-
-
-def identify(
-    paths: Sequence[Path], options: ForceSurfaceOptions, progress: "Progress | None" = None
-) -> MeasuredSurface:
+def identify(paths: Sequence[Path], options: ForceSurfaceOptions, progress: Progress | None = None) -> MeasuredSurface:
     """Build a force surface from levels of held displacement, taking all files together."""
     measured, missing = stepped_sines(paths)
     one_specimen(**{response.label: response.specimen for response in measured})

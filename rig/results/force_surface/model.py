@@ -1,4 +1,4 @@
-"""Levels of a response-controlled test. The surface is fitted again on each use."""
+"""Levels of a response-controlled test, and their files. The surface is fitted again on each use."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,7 +7,11 @@ from identification import (
     ForceSurface,
     FrequencyResponse,
     force_surface,
+    pack_frequency_responses,
+    unpack_frequency_responses,
 )
+from rig.results.arrays import Arrays, Attributes
+from rig.results.kind import Storage
 from vibrolock.results import Result
 
 
@@ -27,3 +31,15 @@ class MeasuredSurface(Result):
 def exported(measured: MeasuredSurface) -> list[tuple[FrequencyResponse, ...]]:
     """Return what is exported of a file: the measured levels."""
     return [measured.responses]
+
+
+def _pack(measured: MeasuredSurface) -> tuple[Arrays, Attributes]:
+    arrays, attributes = pack_frequency_responses(measured.responses)
+    return arrays, {**attributes, "notes": list(measured.notes)}
+
+
+def _unpack(arrays: Arrays, attributes: Attributes) -> MeasuredSurface:
+    return MeasuredSurface(unpack_frequency_responses(arrays, attributes), tuple(attributes.get("notes", ())))
+
+
+STORAGE = Storage(_pack, _unpack)

@@ -4,18 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from identification import (
-    ConstantForceCurve,
-    FrequencyResponse,
-    Predictions,
-    ResponseBand,
-    SteadyPrediction,
-    compare,
-)
+from identification import ConstantForceCurve, FrequencyResponse, Predictions, ResponseBand, SteadyPrediction, compare
 from rig.errors import RecordingError
 from rig.results.files import load_as
 from rig.results.force_surface.model import MeasuredSurface
-from rig.results.force_surface.prediction_options import ForceSurfacePrediction
+from rig.results.force_surface.options import ForceSurfacePrediction
 from rig.results.predictions.references import stepped_sines
 
 _INTERVAL = 1.96

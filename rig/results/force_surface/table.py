@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from identification import (
-    FrequencyResponse,
-)
+from identification import FrequencyResponse
 from rig.results.force_surface.model import MeasuredSurface
 from rig.results.kind import Table
-from rig.text.console import number, print_table
+from rig.text.column import Column
+from rig.text.console import print_rows
 
 
 def _summarise(measured: MeasuredSurface) -> dict[str, Any]:
@@ -51,18 +50,13 @@ def _points_at(responses: Sequence[FrequencyResponse], amplitudes_m: np.ndarray)
 
 def _say(summary: dict[str, Any]) -> None:
     print(f"{len(summary['levels'])} levels of displacement; at phase resonance:")
-    print_table(
-        ("level mm", "points", "frequency Hz", "force N", "fit leaves %"),
-        [
-            (
-                number(level["amplitude_m"], ".5f", 1e3),
-                str(level["points"]),
-                number(level["frequency_hz"], ".4f"),
-                number(level["force_n"], ".4f"),
-                number(level["fit_residual"], ".3f", 100.0),
-            )
-            for level in summary["levels"]
-        ],
+    print_rows(
+        summary["levels"],
+        Column("amplitude_m", "level", "mm", ".5f", 1e3),
+        Column("points", "points"),
+        Column("frequency_hz", "frequency", "Hz", ".4f"),
+        Column("force_n", "force", "N", ".4f"),
+        Column("fit_residual", "fit leaves", "%", ".3f", 100.0),
     )
     print(f"one more level would tell most at {1e3 * summary['next_level_m']:.4g} mm")
 

@@ -20,10 +20,11 @@ from identification import (
     Transient,
 )
 from rig.check import report as checks
-from rig.results.in_memory.responses import as_predictions
+from rig.results.in_memory.figures import as_predictions
 from rig.results.kind import Table
-from rig.results.predictions.table import TABLE as PREDICTIONS
-from rig.text.console import number, print_table
+from rig.results.predictions.table import ERRORS, TABLE as PREDICTIONS
+from rig.text.column import Column
+from rig.text.console import number, print_columns, print_rows, print_table
 from rig.tuning import Tuning
 from rig.tuning.report import lines
 from simulators.analysis import PeriodicResponses
@@ -34,10 +35,11 @@ T = TypeVar("T")
 
 def _say_response(found: FrequencyResponse) -> None:
     print(f"frequency response of {found.specimen or 'an unnamed specimen'}, {found.label or found.level_unit}")
-    rows = zip(found.frequency_hz, found.force_n, found.amplitude_m, found.phase_lag_deg, strict=True)
-    print_table(
-        ("frequency Hz", "force N", "amplitude mm", "phase lag deg"),
-        [(f"{f:.4f}", f"{n:.4f}", f"{1e3 * x:.5f}", f"{lag:.2f}") for f, n, x, lag in rows],
+    print_columns(
+        ("frequency Hz", ".4f", found.frequency_hz),
+        ("force N", ".4f", found.force_n),
+        ("amplitude mm", ".5f", 1e3 * found.amplitude_m),
+        ("phase lag deg", ".2f", found.phase_lag_deg),
     )
 
 
@@ -46,36 +48,25 @@ def _say_surface(found: ForceSurface) -> None:
     print(
         f"force surface of {found.specimen or 'an unnamed specimen'}, {len(found.levels)} levels; at phase resonance:"
     )
-    rows = zip(resonance.amplitude_m, resonance.frequency_hz, resonance.force_n, strict=True)
-    print_table(
-        ("amplitude mm", "frequency Hz", "force N"), [(f"{1e3 * x:.5f}", f"{f:.4f}", f"{n:.4f}") for x, f, n in rows]
+    print_columns(
+        ("amplitude mm", ".5f", 1e3 * resonance.amplitude_m),
+        ("frequency Hz", ".4f", resonance.frequency_hz),
+        ("force N", ".4f", resonance.force_n),
     )
 
 
 def _say_curve(found: ConstantForceCurve) -> None:
     response = found.response
     print(f"{response.label}, cut from a force surface; +- are 95 %")
-    rows = zip(
-        response.phase_lag_deg,
-        response.frequency_hz,
-        found.frequency_std_hz,
-        response.amplitude_m,
-        found.amplitude_std_m,
-        found.stable,
-        strict=True,
+    columns = (
+        *(response.phase_lag_deg, response.frequency_hz, 1.96 * found.frequency_std_hz),
+        *(1e3 * response.amplitude_m, 1.96e3 * found.amplitude_std_m, found.stable),
     )
     print_table(
         ("lag deg", "frequency Hz", "+-", "amplitude mm", "+-", "stable"),
         [
-            (
-                f"{lag:.0f}",
-                f"{f:.4f}",
-                f"{1.96 * df:.2g}",
-                f"{1e3 * x:.5f}",
-                f"{1.96e3 * dx:.2g}",
-                "yes" if ok else "no",
-            )
-            for lag, f, df, x, dx, ok in rows
+            (f"{lag:.0f}", f"{f:.4f}", f"{df:.2g}", f"{x:.5f}", f"{dx:.2g}", "yes" if stable else "no")
+            for lag, f, df, x, dx, stable in zip(*columns, strict=True)
         ],
     )
 
@@ -84,11 +75,12 @@ def _say_continuous(found: ContinuousBackbone) -> None:
     print(f"continuous backbone of {found.backbone.specimen or 'an unnamed specimen'}, {found.periods:.0f} periods")
     omega = np.sqrt(found.stiffness)
     frequency, damping = omega / (2.0 * np.pi), 50.0 * found.damping_1_s / omega
-    columns = (1e3 * found.amplitude_m, frequency[0], frequency[1], damping[0], damping[1])
-    rows = zip(*columns, strict=True)
-    print_table(
-        ("amplitude mm", "frequency up Hz", "down Hz", "damping up %", "down %"),
-        [(f"{x:.5f}", *(f"{value:.4f}" for value in row)) for x, *row in rows],
+    print_columns(
+        ("amplitude mm", ".5f", 1e3 * found.amplitude_m),
+        ("frequency up Hz", ".4f", frequency[0]),
+        ("down Hz", ".4f", frequency[1]),
+        ("damping up %", ".4f", damping[0]),
+        ("down %", ".4f", damping[1]),
     )
 
 
@@ -105,28 +97,15 @@ def _say_distortion(found: DistortionLevels) -> None:
 
 
 def _say_comparison(found: Comparison) -> None:
-    row = found.error.row()
-    values: dict[str, Any] = dict(row)
-    print_table(
-        ("prediction", "peak %", "frequency %", "envelope %", "range use", ""),
-        [
-            (
-                values["name"],
-                number(values["peak_error"], "+.2f", 100.0),
-                number(values["peak_frequency_error"], "+.3f", 100.0),
-                number(values["envelope_error"], ".2f", 100.0),
-                number(values["range_use"], ".2f"),
-                values["verdict"],
-            )
-        ],
-    )
+    use = Column("range_use", "range use", "", ".2f")
+    print_rows([dict(found.error.row())], Column("name", "prediction"), *ERRORS, use, Column("verdict", ""))
 
 
 def _say_band(found: ResponseBand) -> None:
     print(f"of {found.draws} draws; +- are 95 %")
-    print_table(
-        ("peak +- mm", "at +- Hz"),
-        [(f"{1.96e3 * found.peak_amplitude_std_m:.2g}", f"{1.96 * found.peak_frequency_std_hz:.2g}")],
+    print_columns(
+        ("peak +- mm", ".2g", [1.96e3 * found.peak_amplitude_std_m]),
+        ("at +- Hz", ".2g", [1.96 * found.peak_frequency_std_hz]),
     )
 
 
@@ -135,17 +114,18 @@ def _say_stabilisation(found: StabilisationDiagram) -> None:
         f"{found.order.size} poles, orders {found.orders.min()} to {found.orders.max()}; stable ones of the last order"
     )
     last = found.stable & (found.order == found.orders.max())
-    rows = zip(found.frequency_hz[last], found.damping_ratio[last], strict=True)
-    print_table(("frequency Hz", "damping %"), [(f"{f:.4f}", f"{100.0 * z:.4f}") for f, z in rows])
+    print_columns(
+        ("frequency Hz", ".4f", found.frequency_hz[last]), ("damping %", ".4f", 100.0 * found.damping_ratio[last])
+    )
 
 
 def _say_periodic(found: PeriodicResponses) -> None:
     print(f"harmonic balance, {found.frequency_hz.size} points")
-    columns = (found.force_n, found.frequency_hz, 1e3 * found.amplitude_m, found.damping_ratio)
-    rows = zip(*columns, strict=True)
-    print_table(
-        ("force N", "frequency Hz", "amplitude mm", "damping %"),
-        [(f"{n:.4f}", f"{f:.4f}", f"{x:.5f}", number(z, ".4f", 100.0)) for n, f, x, z in rows],
+    print_columns(
+        ("force N", ".4f", found.force_n),
+        ("frequency Hz", ".4f", found.frequency_hz),
+        ("amplitude mm", ".5f", 1e3 * found.amplitude_m),
+        ("damping %", ".4f", 100.0 * found.damping_ratio),
     )
 
 
@@ -190,11 +170,11 @@ def _table(say: Callable[[T], None]) -> Table[T, T]:
 RESPONSE = _table(_say_response)
 SURFACE = _table(_say_surface)
 CURVE = _table(_say_curve)
-CONTINUOUS = _table(_say_continuous)
+BACKBONE = _table(_say_continuous)
 DISTORTION = _table(_say_distortion)
 COMPARISON = _table(_say_comparison)
 BAND = _table(_say_band)
-STABILISATION = _table(_say_stabilisation)
+POLES = _table(_say_stabilisation)
 PERIODIC = _table(_say_periodic)
 SPECTRA = _table(_say_spectra)
 SWEEP = _table(_say_transient)

@@ -19,24 +19,20 @@ from identification import (
 from identification.common import one_specimen
 from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import RecordingError
-from rig.measurements import (
-    Estimator,
-    bench_of_recording,
-    spectra,
-)
+from rig.measurements import Estimator, bench_of_recording, spectra
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load
+from rig.results.kind import Progress
 from rig.results.kinds import KINDS
 from rig.results.linear_modes.options import LinearOptions
 
 if TYPE_CHECKING:
     from identification import TimeRecords
-    from rig.results.kind import Progress
 
 
-def identify(paths: Sequence[Path], options: LinearOptions, progress: "Progress | None" = None) -> ModalAnalysis:
+def identify(paths: Sequence[Path], options: LinearOptions, progress: Progress | None = None) -> ModalAnalysis:
     """Identify linear modes from multisines or frequency responses. Several levels are extrapolated to zero force."""
     read = [_matrices(path, options.estimator) for path in paths]
     pairs = [pair for found, _ in read for pair in found]

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification import (
     Backbone,
@@ -17,26 +16,18 @@ from identification import (
 )
 from rig.campaigns.kinds import kinds_that_yield
 from rig.errors import ConfigurationError, RecordingError
-from rig.measurements import (
-    STEPPED,
-    backbone,
-    continuous_backbones,
-)
+from rig.measurements import STEPPED, backbone, continuous_backbones
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load, load_as
+from rig.results.kind import Progress
 from rig.results.kinds import KINDS
 from rig.results.measured import modes_in, stepped_sines
 from rig.results.nonlinear_mode.options import NonlinearModeOptions
 
-if TYPE_CHECKING:
-    from rig.results.kind import Progress
 
-    pass
-
-
-def identify(paths: Sequence[Path], options: NonlinearModeOptions, progress: "Progress | None" = None) -> NonlinearMode:
+def identify(paths: Sequence[Path], options: NonlinearModeOptions, progress: Progress | None = None) -> NonlinearMode:
     """Identify a nonlinear mode from one or several backbones, or from stepped sines (imported or response-controlled)."""
     kinds = {kind_of(path): path for path in paths}
     modes = None if options.modes is None else modes_in(options.modes)

@@ -21,7 +21,7 @@ from identification import (
 from identification.prediction import FLAGGED_BEYOND
 from rig.results.files import load_as
 from rig.results.measured import modes_in
-from rig.results.nonlinear_mode.prediction_options import NonlinearModePrediction
+from rig.results.nonlinear_mode.options import NonlinearModePrediction
 from rig.results.predictions.references import over_of, stepped_sines
 from rig.results.predictions.sweeps import SweepModels, Swept, planned_sweeps, recorded_sweeps
 

@@ -5,27 +5,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from identification import (
-    FitSettings,
-    fit_pnlss,
-    identify_pnlss,
-)
+from identification import FitSettings, fit_pnlss, identify_pnlss
 from rig.errors import ConfigurationError, RecordingError
 from rig.results.files import load_as
-from rig.results.kind import Remark
+from rig.results.kind import Progress, Remark
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.pnlss.options import PnlssOptions
-from rig.results.simulated.data_files import exciter_in
-from rig.results.simulated.data_fingerprints import uses_of
+from rig.results.simulated.data_files import exciter_in, uses_of
 from rig.results.simulated.fit_data import FitData, fit_data, fitted
 
-if TYPE_CHECKING:
-    from rig.results.kind import Progress
 
-
-def identify(paths: Sequence[Path], options: PnlssOptions, progress: "Progress | None" = None) -> IdentifiedPnlss:
+def identify(paths: Sequence[Path], options: PnlssOptions, progress: Progress | None = None) -> IdentifiedPnlss:
     """Identify one model from all recordings together.
 
     After Ctrl-C, return the state reached; `PnlssOptions.resume` continues from it. Raises `RecordingError` for files with

@@ -2,14 +2,9 @@
 
 from dataclasses import dataclass
 
-from identification import (
-    PnlssFit,
-    PnlssModel,
-)
+from identification import PnlssFit, PnlssModel
 from identification.models import is_users
-from rig.results.simulated.model import (
-    SimulatedModel,
-)
+from rig.results.simulated.model import SimulatedModel
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

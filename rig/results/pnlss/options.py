@@ -1,4 +1,4 @@
-"""Options for the identification of a nonlinear state-space model."""
+"""Options for the identification of a nonlinear state-space model, and for predictions by it."""
 
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from rig.errors import ConfigurationError
 from rig.results.options import Listed, Option
-from rig.results.simulated.options import FitDataOptions
+from rig.results.simulated.options import FitDataOptions, SimulatedPrediction
 
 _OF_THE_FIT = ("states", "degrees", "output_polynomials", "saturating", "rate_hz", "input", "outputs")
 """Options that a fit which goes on has already."""
@@ -89,3 +89,10 @@ class PnlssOptions(FitDataOptions):
     def saturating_features(self) -> int | tuple[int, int]:
         """Number of saturating features as `identification.identify_pnlss` takes it. Linear outputs have none of them."""
         return self.saturating if self.output_polynomials else (self.saturating, 0)
+
+
+class PnlssPrediction(SimulatedPrediction):
+    """Options of ``rig predict pnlss``."""
+
+    kind: ClassVar[str] = "pnlss"
+    takes: ClassVar[str] = "a PNLSS model, which answers"

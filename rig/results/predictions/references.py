@@ -6,9 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification import (
-    FrequencyResponse,
-)
+from identification import FrequencyResponse
 from identification.prediction import Over
 from rig.campaigns.evaluation.point import spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of

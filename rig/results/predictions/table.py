@@ -15,13 +15,19 @@ from identification import (
     Transient,
 )
 from rig.results.kind import Table
-from rig.text.console import number, print_table
+from rig.text.column import Column
+from rig.text.console import number, print_rows, print_table
 
 PLANNED = "planned"
 """Use of a multisine that has not been measured."""
 CUT = "the response from "
 """Beginning of the note on a response that was cut off. The note on the first path precedes that on the second."""
-_ERRORS = ("peak %", "frequency %", "envelope %")
+ERRORS = (
+    Column("peak_error", "peak", "%", "+.2f", 100.0),
+    Column("peak_frequency_error", "frequency", "%", "+.3f", 100.0),
+    Column("envelope_error", "envelope", "%", ".2f", 100.0),
+)
+"""Columns of the errors of one prediction."""
 
 
 def _steady(
@@ -82,82 +88,17 @@ def _summarise(predictions: Predictions) -> dict[str, Any]:
 
 
 def _say(summary: dict[str, Any]) -> None:
-    if summary["frequency_responses"]:
-        compared = any(r["error"] for r in summary["frequency_responses"])
-        print("frequency responses; +- are 95 % by the model's own errors")
-        if compared:
-            print("errors: predicted over reference, minus one")
-        print_table(
-            (
-                *("response", "force N", "peak mm", "+-", "at Hz", "+-", "lag deg", "folds at Hz", "range use"),
-                *(_ERRORS if compared else ()),
-            ),
-            [
-                (
-                    r["name"],
-                    number(r["force_n"], ".4g"),
-                    number(r["peak_m"], ".5f", 1e3) if r["peak_m"] else f">= {1e3 * r['largest_m']:.5f}",
-                    number(r["peak_std_m"], ".2g", 1.96e3),
-                    number(r["peak_frequency_hz"], ".4f"),
-                    number(r["peak_frequency_std_hz"], ".2g", 1.96),
-                    number(r["peak_phase_lag_deg"], ".1f"),
-                    ", ".join(f"{fold:.4f}" for fold in r["folds_hz"]) or "none",
-                    number(r["range_use"], ".2f"),
-                    *(_errors(r["error"]) if compared else ()),
-                )
-                for r in summary["frequency_responses"]
-            ],
-        )
-    if summary["sweeps"]:
-        print("sweeps")
-        print_table(
-            ("sweep", "from", "peak mm", "at Hz", "least force N", "range use"),
-            [
-                (
-                    s["name"],
-                    s["origin"] if s["origin"] != s["name"] else "the plan",
-                    number(s["peak_m"], ".5f", 1e3),
-                    number(s["peak_frequency_hz"], ".3f"),
-                    number(s["smallest_force_n"], ".4f"),
-                    "unbounded" if s["unbounded"] else number(s["range_use"], ".2f"),
-                )
-                for s in summary["sweeps"]
-            ],
-        )
-    recorded = [run for run in summary["multisines"] if run["use"] != PLANNED]
-    if recorded:
-        print("multisines: relative errors, %")
-        names = list(recorded[0]["errors"])
-        print_table(
-            ("realisation", "use", *names, "range use"),
-            [
-                (
-                    r["name"],
-                    r["use"],
-                    *("-" if r["unbounded"] else number(r["errors"].get(name), ".3f", 100.0) for name in names),
-                    "unbounded" if r["unbounded"] else number(r["range_use"], ".2f"),
-                )
-                for r in recorded
-            ],
-        )
-        lost = sum(r["unbounded"] for r in recorded)
-        if lost:
-            print(f"{lost} of {len(recorded)} runs unbounded")
-    _say_planned([run for run in summary["multisines"] if run["use"] == PLANNED])
+    multisines = summary["multisines"]
+    _say_responses(summary["frequency_responses"])
+    _say_sweeps(summary["sweeps"])
+    _say_multisines([run for run in multisines if run["use"] != PLANNED])
+    _say_planned([run for run in multisines if run["use"] == PLANNED])
     of_sweeps = summary["errors"][sum(bool(r["error"]) for r in summary["frequency_responses"]) :]
     if of_sweeps:
         print("errors: predicted over reference, minus one")
-        print_table(
-            ("prediction", *_ERRORS, "range use", ""),
-            [
-                (
-                    e["name"],
-                    *_errors(e),
-                    "-" if e["verdict"] == "unbounded" else number(e["range_use"], ".2f"),
-                    e["verdict"],
-                )
-                for e in of_sweeps
-            ],
+        print_rows(
+            [{**e, "use": "-" if e["verdict"] == "unbounded" else number(e["range_use"], ".2f")} for e in of_sweeps],
+            *(Column("name", "prediction"), *ERRORS, Column("use", "range use"), Column("verdict", "")),
         )
     shown = set()
     for part in (*summary["frequency_responses"], *summary["sweeps"], *summary["errors"]):
@@ -165,6 +106,75 @@ def _say(summary: dict[str, Any]) -> None:
             if note not in shown:
                 print(f"note: {part['name']}: {note}")
             shown.add(note)
+
+
+def _say_responses(responses: Sequence[dict[str, Any]]) -> None:
+    if not responses:
+        return
+    compared = any(one["error"] for one in responses)
+    print("frequency responses; +- are 95 % by the model's own errors")
+    if compared:
+        print("errors: predicted over reference, minus one")
+    none = dict.fromkeys(column.key for column in ERRORS)
+    print_rows(
+        [
+            {
+                **(one["error"] or none),
+                **one,
+                "peak": number(one["peak_m"], ".5f", 1e3) if one["peak_m"] else f">= {1e3 * one['largest_m']:.5f}",
+                "folds": ", ".join(f"{fold:.4f}" for fold in one["folds_hz"]) or "none",
+            }
+            for one in responses
+        ],
+        Column("name", "response"),
+        Column("force_n", "force", "N", ".4g"),
+        Column("peak", "peak", "mm"),
+        Column("peak_std_m", "+-", "", ".2g", 1.96e3),
+        Column("peak_frequency_hz", "at", "Hz", ".4f"),
+        Column("peak_frequency_std_hz", "+-", "", ".2g", 1.96),
+        Column("peak_phase_lag_deg", "lag", "deg", ".1f"),
+        Column("folds", "folds at", "Hz"),
+        Column("range_use", "range use", "", ".2f"),
+        *(ERRORS if compared else ()),
+    )
+
+
+def _say_sweeps(sweeps: Sequence[dict[str, Any]]) -> None:
+    if not sweeps:
+        return
+    print("sweeps")
+    print_rows(
+        [
+            {**one, "from": one["origin"] if one["origin"] != one["name"] else "the plan", "use": _range_use(one)}
+            for one in sweeps
+        ],
+        Column("name", "sweep"),
+        Column("from", "from"),
+        Column("peak_m", "peak", "mm", ".5f", 1e3),
+        Column("peak_frequency_hz", "at", "Hz", ".3f"),
+        Column("smallest_force_n", "least force", "N", ".4f"),
+        Column("use", "range use"),
+    )
+
+
+def _say_multisines(runs: Sequence[dict[str, Any]]) -> None:
+    if not runs:
+        return
+    print("multisines: relative errors, %")
+    names = list(runs[0]["errors"])
+    print_table(
+        ("realisation", "use", *names, "range use"),
+        [
+            (
+                *(r["name"], r["use"]),
+                *("-" if r["unbounded"] else number(r["errors"].get(name), ".3f", 100.0) for name in names),
+                _range_use(r),
+            )
+            for r in runs
+        ],
+    )
+    if lost := sum(r["unbounded"] for r in runs):
+        print(f"{lost} of {len(runs)} runs unbounded")
 
 
 def _say_planned(runs: Sequence[dict[str, Any]]) -> None:
@@ -176,25 +186,14 @@ def _say_planned(runs: Sequence[dict[str, Any]]) -> None:
     print_table(
         ("realisation", *(f"{name} {what}" for name in names for what in ("RMS", "largest")), "range use"),
         [
-            (
-                r["name"],
-                *(number(r[which][name], ".4g") for name in names for which in ("rms", "peak")),
-                "unbounded" if r["unbounded"] else number(r["range_use"], ".2f"),
-            )
+            (r["name"], *(number(r[which][name], ".4g") for name in names for which in ("rms", "peak")), _range_use(r))
             for r in runs
         ],
     )
 
 
-def _errors(error: dict[str, Any] | None) -> tuple[str, str, str]:
-    """Return the errors of one prediction as they are printed."""
-    if error is None:
-        return "-", "-", "-"
-    return (
-        number(error["peak_error"], "+.2f", 100.0),
-        number(error["peak_frequency_error"], "+.3f", 100.0),
-        number(error["envelope_error"], ".2f", 100.0),
-    )
+def _range_use(run: dict[str, Any]) -> str:
+    return "unbounded" if run["unbounded"] else number(run["range_use"], ".2f")
 
 
 TABLE = Table(_summarise, _say)

@@ -1,8 +1,11 @@
-"""Files from which experiments are made: recordings, and time data of others."""
+"""Files from which experiments are made, recordings and time data of others, and fingerprints that identify their data."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from identification import Experiment, IdentificationError, TimeRecords, time_experiments
 from identification.experiments import suitable_rate_hz
@@ -64,3 +67,21 @@ def exciter_in(path: Path) -> str:
         return path.name
     with Recording(path) as recording:
         return bench_of_recording(recording).name
+
+
+def features_of(experiment: Experiment) -> str:
+    """Describe the data of an experiment to six digits, without its weight, names and files."""
+    signals = np.vstack([experiment.inputs, experiment.outputs])
+    sizes = [np.sqrt(np.mean(values**2)) for rows in (signals, np.diff(signals)) for values in rows]
+    shape = f"{signals.shape} {experiment.counted_from} {experiment.period_samples} {experiment.initial_state}"
+    return f"{shape} {[f'{size:.5e}' for size in sizes]}"
+
+
+def fingerprint(experiment: Experiment) -> str:
+    """Return a short text that identifies the data of an experiment."""
+    return hashlib.sha256(features_of(experiment).encode()).hexdigest()[:16]
+
+
+def uses_of(training: Sequence[Experiment], validation: Sequence[Experiment]) -> dict[str, str]:
+    """Return the use of experiments in a model, ``training`` or ``validation``, by their fingerprints."""
+    return {fingerprint(one): "validation" for one in validation} | {fingerprint(one): "training" for one in training}

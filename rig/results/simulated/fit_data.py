@@ -14,8 +14,7 @@ from identification.common import one_specimen
 from identification.experiments import Simulator
 from rig.errors import ConfigurationError, RecordingError
 from rig.recording.arrays import kind_of
-from rig.results.simulated.data_files import KINDS, experiments_in, rates_hz_in, specimen_in
-from rig.results.simulated.data_fingerprints import features_of
+from rig.results.simulated.data_files import KINDS, experiments_in, features_of, rates_hz_in, specimen_in
 from rig.results.simulated.options import FitDataOptions, RunEffect
 
 Fit = TypeVar("Fit", StructuredFit, PnlssFit)

@@ -11,8 +11,8 @@ from rig.measurements.experiments import experiments
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.reader import Recording
 from rig.results.predictions.sweeps import strangers
-from rig.results.simulated.constants import driving, with_constants
-from rig.results.simulated.data_fingerprints import fingerprint
+from rig.results.simulated.data_files import fingerprint
+from rig.results.simulated.driven_models import driving, with_constants
 from rig.results.simulated.model import SimulatedModel
 
 

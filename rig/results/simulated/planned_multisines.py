@@ -11,8 +11,7 @@ from rig.campaigns.plans import bench_of, load_plan
 from rig.errors import ConfigurationError
 from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD
 from rig.results.predictions.sweeps import strangers
-from rig.results.simulated.constants import all_inputs
-from rig.results.simulated.driven_models import DrivenModel
+from rig.results.simulated.driven_models import DrivenModel, all_inputs
 from vibrolock.arrays import Float
 
 _LOWEST = 0.8

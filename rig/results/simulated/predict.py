@@ -20,12 +20,11 @@ from identification.prediction import band_of_responses
 from rig.errors import ConfigurationError
 from rig.results.files import load, load_as
 from rig.results.predictions.references import references_in
-from rig.results.simulated.constants import constants_of
-from rig.results.simulated.driven_models import DrivenModel, Fixed, frequency_response_at
+from rig.results.simulated.driven_models import DrivenModel, Fixed, constants_of, frequency_response_at
 from rig.results.simulated.model import SimulatedModel
 from rig.results.simulated.multisines import simulated_multisines
+from rig.results.simulated.options import SimulatedPrediction
 from rig.results.simulated.planned_multisines import planned_multisines
-from rig.results.simulated.prediction_options import SimulatedPrediction
 from rig.results.simulated.steady import compared, default_held
 from rig.results.simulated.sweep_models import SimulatedSweepModels
 from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simulated_sweeps

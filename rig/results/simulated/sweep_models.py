@@ -18,8 +18,7 @@ from identification import (
 )
 from identification.common import MOTION_ORDER, find_role
 from rig.campaigns.evaluation.vibrations import VOLTAGE
-from rig.results.simulated.constants import all_inputs, driving
-from rig.results.simulated.driven_models import DrivenModel
+from rig.results.simulated.driven_models import DrivenModel, all_inputs, driving
 from vibrolock.arrays import Float
 
 _SHOWN = 10.0

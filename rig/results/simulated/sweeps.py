@@ -6,13 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification import (
-    IdentificationError,
-    PnlssModel,
-    Transient,
-    compare_sweep,
-    estimated_initial_state,
-)
+from identification import IdentificationError, PnlssModel, Transient, compare_sweep, estimated_initial_state
 from identification.common import find_role
 from rig.campaigns.evaluation.lost_samples import bridged, lost_rows
 from rig.campaigns.evaluation.stored_point import point_from
@@ -27,8 +21,7 @@ from rig.measurements.experiments.signals import Signals
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.reader import Recording
 from rig.results.predictions.sweeps import Swept, force_and_drive, planned, strangers
-from rig.results.simulated.constants import with_constants
-from rig.results.simulated.driven_models import DrivenModel
+from rig.results.simulated.driven_models import DrivenModel, with_constants
 from rig.results.simulated.sweep_models import SimulatedSweepModels, SweepGiven
 from rig.tick.layout import SAMPLE_LOST
 from vibrolock.arrays import Float

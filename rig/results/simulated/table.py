@@ -2,9 +2,7 @@
 
 from typing import Any
 
-from identification import (
-    RunScatter,
-)
+from identification import RunScatter
 from rig.results.simulated.model import SimulatedModel
 from rig.text.console import number, print_table
 

@@ -1,12 +1,16 @@
-"""Figure of a structured model: spectra and time of measured and simulated outputs, laws of the elements, errors."""
+"""Figure and curves of a structured model: spectra and time of measured and simulated outputs, laws of the elements, errors."""
 
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identification import structured_mode
+from rig.drawing.curves import Curves, View, backbone_curves
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD
+from rig.errors import RecordingError
 from rig.results.simulated.figure import channels_of, draw_simulated
+from rig.results.structured.model import IdentifiedStructured
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,6 +18,7 @@ if TYPE_CHECKING:
 
     from identification import NonlinearElement
     from rig.results.structured.model import IdentifiedStructured
+
 
 _BEYOND = 1.5
 """Drawn displacements relative to the largest of the training data."""
@@ -77,3 +82,10 @@ def _loop(sliders: np.ndarray, largest: float, to_mm: float) -> tuple[np.ndarray
     turned = np.minimum(stiffness * largest, strength) - np.minimum(stiffness * (largest - down), 2.0 * strength)
     force = turned.sum(axis=0)
     return to_mm * np.concatenate([down, -down]), np.concatenate([force, -force])
+
+
+def curves(found: IdentifiedStructured, view: View) -> Curves:
+    """Return modal frequency and damping over the amplitude; refuse code that the model names."""
+    if functions := found.functions:
+        raise RecordingError(f"names a function, {functions[0]}, which is not imported to draw; use structured_mode")
+    return backbone_curves([(None, structured_mode(found.model if found.fit is None else found.fit))], view)

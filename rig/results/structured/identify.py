@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification import LinearModes, ModalAnalysis, fit_structured
 from identification.common import one_specimen
@@ -11,20 +10,18 @@ from identification.models import linear_start
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
 from rig.results.files import load_as
-from rig.results.simulated.data_fingerprints import uses_of
+from rig.results.kind import Progress
+from rig.results.simulated.data_files import uses_of
 from rig.results.simulated.fit_data import fit_data, fitted
 from rig.results.structured.model import IdentifiedStructured
 from rig.results.structured.options import MODES_OF_A_STRUCTURE, StructuredOptions
-
-if TYPE_CHECKING:
-    from rig.results.kind import Progress
 
 _KINDS = ("multisine", "sweep", "time-data")
 """Data that may begin at rest."""
 
 
 def identify(
-    paths: Sequence[Path], options: StructuredOptions, progress: "Progress | None" = None
+    paths: Sequence[Path], options: StructuredOptions, progress: Progress | None = None
 ) -> IdentifiedStructured:
     """Identify one model from all recordings together, beginning with the modes in a file.
 

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from identification import StructuredFit, StructuredModel
 from identification.experiments import Simulator
 from identification.models import UserSpring, drawn
-from rig.results.simulated.model import (
-    SimulatedModel,
-)
+from rig.results.simulated.model import SimulatedModel
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

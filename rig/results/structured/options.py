@@ -1,4 +1,4 @@
-"""Options for the identification of a structured model."""
+"""Options for the identification of a structured model, and for predictions by it."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Self
@@ -7,11 +7,12 @@ from pydantic import Field, model_validator
 
 from rig.errors import ConfigurationError
 from rig.results.options import Option
-from rig.results.simulated.options import FitDataOptions
+from rig.results.simulated.options import FitDataOptions, SimulatedPrediction
 
 if TYPE_CHECKING:
     from identification import ElementPlan
     from identification.models import Law
+
 
 MODES_OF_A_STRUCTURE = (
     "the modes with which a structured model begins; make them from a test at a low level with "
@@ -59,3 +60,13 @@ class StructuredOptions(FitDataOptions):
                 )
             found.append(ElementPlan(tuple(ready[name]() for name in names), tuple(between) if at else ()))
         return tuple(found)
+
+
+class StructuredPrediction(SimulatedPrediction):
+    """Options of ``rig predict structured``."""
+
+    kind: ClassVar[str] = "structured"
+    takes: ClassVar[str] = "a structured model, which answers"
+
+    bands: bool = False
+    """Give the responses 95 % bands, from 40 models that the fit allows; takes as long as 40 responses."""

@@ -11,7 +11,8 @@ from identification.models import Joint, std_of
 from rig.results.kind import Table
 from rig.results.simulated.table import errors_in, say_errors, say_scatter, scatter_in
 from rig.results.structured.model import IdentifiedStructured
-from rig.text.console import number, print_table
+from rig.text.column import Column
+from rig.text.console import number, print_rows, print_table
 
 _LEAST_SUPPORT_N_M = 1e-3
 """Stiffness of the support below which it counts as none."""
@@ -161,18 +162,13 @@ def _say_trials(trials: list[dict[str, Any]]) -> None:
 
 
 def _say_modes(modes: _Modes) -> None:
-    print_table(
-        ("mode", "frequency Hz", "+-", "damping %", "+-"),
-        [
-            (
-                str(index),
-                number(mode["frequency_hz"], ".4f"),
-                number(mode["frequency_std_hz"], ".2g", 1.96),
-                number(mode["damping_ratio"], ".4f", 100.0),
-                number(mode["damping_ratio_std"], ".2g", 196.0),
-            )
-            for index, mode in enumerate(modes, 1)
-        ],
+    print_rows(
+        [{"mode": index, **mode} for index, mode in enumerate(modes, 1)],
+        Column("mode", "mode"),
+        Column("frequency_hz", "frequency", "Hz", ".4f"),
+        Column("frequency_std_hz", "+-", "", ".2g", 1.96),
+        Column("damping_ratio", "damping", "%", ".4f", 100.0),
+        Column("damping_ratio_std", "+-", "", ".2g", 196.0),
     )
 
 

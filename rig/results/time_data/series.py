@@ -1,12 +1,17 @@
-"""Samples over time of one recorded point."""
+"""Samples over time of one recorded point, and their exchange."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification import Channel, IdentificationError, TimeRecord, TimeRecords
+from identification.common import decode, encode
 from rig.campaigns.evaluation.point import point_name
+from rig.results.arrays import Arrays, Attributes
+from rig.results.kind import Exchange
+from rig.text.contents import Array, Contents
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,3 +74,24 @@ def records_of_series(data: TimeData) -> TimeRecords:
     return TimeRecords(
         channels=data.channels, sample_rate_hz=data.sample_rate_hz, records=(record,), specimen=data.specimen
     )
+
+
+def units_and_labels(channels: Sequence[Channel]) -> tuple[Array, tuple[tuple[str, ...]]]:
+    """Return units and names of channels as `Contents` has them."""
+    return np.array([channel.unit for channel in channels]), (tuple(channel.name for channel in channels),)
+
+
+def _contents(data: TimeData) -> Contents:
+    arrays, attributes = encode(data)
+    arrays["time_s"] = data.start_s + np.arange(data.samples.shape[1]) / data.sample_rate_hz
+    units, labels = units_and_labels(data.channels)
+    title = f"{data.specimen}, {point_name(data.point)}"
+    rows = {"time_s": 0, "samples": 1}
+    return Contents("time-data", title, arrays, attributes, rows, {"samples": units}, {"samples": labels})
+
+
+def _from_contents(arrays: Arrays, attributes: Attributes) -> TimeData:
+    return decode(TimeData, {"samples": arrays["samples"]}, attributes)
+
+
+EXCHANGE = Exchange("time-data", TimeData, _contents, _from_contents)

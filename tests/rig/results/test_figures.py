@@ -11,9 +11,9 @@ from identification import FrequencyResponse, best_linear_approximation
 from rig.drawing.nonlinear_mode import SHAPE_FLOOR, draw_mode
 from rig.measurements import spectra
 from rig.recording.reader import Recording
-from rig.results.exciter.figure import draw_exciter
+from rig.results.exciter.views import draw_exciter
 from rig.results.files import load, save
-from rig.results.frequency_response_matrix.figure import draw_response_matrix
+from rig.results.frequency_response_matrix.views import draw_response_matrix
 from rig.results.predict import predict_vibrations
 from rig.results.predictions.figure import draw_predictions
 

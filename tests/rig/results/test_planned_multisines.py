@@ -13,7 +13,7 @@ from rig.errors import ConfigurationError
 from rig.results.files import load, save
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.predictions.runs_figure import draw_runs
-from rig.results.simulated.constants import all_inputs, constants_of, with_constants
+from rig.results.simulated.driven_models import all_inputs, constants_of, with_constants
 from rig.results.simulated.planned_multisines import planned_multisines
 
 PLAN = {"kind": "multisine", "bench": "magnet-beam", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from identification import Features, FitProgress
 from rig.campaigns.plans import plan_from
 from rig.results.files import load, save
-from rig.results.pnlss.figure import draw_pnlss
 from rig.results.pnlss.options import PnlssOptions
+from rig.results.pnlss.views import draw_pnlss
 from rig.show.progress import FitLines
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from rig.bench import load_bench
 from rig.results.files import load
-from rig.results.pnlss.figure import draw_pnlss
 from rig.results.pnlss.model import IdentifiedPnlss
+from rig.results.pnlss.views import draw_pnlss
 from simulators import VirtualRig
 from simulators.analysis import constant_force_response
 from studies.reproduce.options import Options

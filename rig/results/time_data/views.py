@@ -1,4 +1,4 @@
-"""Figure of time records: every channel over time, and its spectrum, one record of each level."""
+"""Table and figure of time records that were measured with other systems."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,12 +6,80 @@ import numpy as np
 import scipy
 
 from identification import TimeRecord, TimeRecords
+from identification.experiments import period_remark
 from rig.drawing.page import grid, legend_below
 from rig.drawing.style import MAIN, TRACE_BINS, shade, title, unit_text
+from rig.results.kind import Table
+from rig.text.column import Column
+from rig.text.console import print_rows
 from vibrolock.arrays import Float
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def _summarise(data: TimeRecords) -> dict[str, Any]:
+    rate, size = data.sample_rate_hz, data.period_samples
+    return {
+        "specimen": data.specimen,
+        "source": data.source,
+        "sample_rate_hz": rate,
+        "period_samples": size,
+        "resolution_hz": rate / size if size else None,
+        "ahead_periods": data.ahead_periods if size else None,
+        "excited_hz": None if data.excited_hz is None else list(data.excited_hz),
+        "at_rest": data.at_rest,
+        "instrument": data.instrument,
+        "channels": [
+            {
+                **vars(channel),
+                "rms": float(np.sqrt(np.mean([np.mean(one.samples[row] ** 2) for one in data.records]))),
+                "largest": max(float(np.abs(one.samples[row]).max()) for one in data.records),
+                "mean": float(np.mean([one.samples[row].mean() for one in data.records])),
+            }
+            for row, channel in enumerate(data.channels)
+        ],
+        "level_unit": data.level_unit,
+        "records": [
+            {
+                "name": one.name,
+                "level": None if np.isnan(one.level) else one.level,
+                "samples": one.samples.shape[1],
+                "periods": one.samples.shape[1] // size if size else None,
+                "duration_s": one.samples.shape[1] / rate,
+            }
+            for one in data.records
+        ],
+        "notes": list(dict.fromkeys([*data.notes, *filter(None, [period_remark(data)])])),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    records, band = summary["records"], summary["excited_hz"]
+    periodic = f"periods of {summary['period_samples']} samples" if summary["period_samples"] else "not periodic"
+    excited = "" if band is None else f", excited {band[0]:g} to {band[1]:g} Hz"
+    rest = ", from rest" if summary["at_rest"] and not summary["period_samples"] else ""
+    many = "1 record" if len(records) == 1 else f"{len(records)} records"
+    print(f"{many} at {summary['sample_rate_hz']:g} Hz, {periodic}{rest}{excited}")
+    print_rows(
+        summary["channels"],
+        *(Column(key, heading) for key, heading in (("name", "channel"), ("role", "role"), ("unit", "unit"))),
+        *(
+            Column(key, heading, "", ".4g")
+            for key, heading in (("rms", "RMS"), ("largest", "largest"), ("mean", "mean"))
+        ),
+    )
+    print_rows(
+        records,
+        Column("name", "record"),
+        Column("samples", "samples"),
+        Column("periods", "periods", "", ".0f"),
+        Column("duration_s", "s", "", ".4g"),
+    )
+
+
+TABLE = Table(_summarise, _say)
+
 
 _MOST_CHANNELS, _MOST_LEVELS = 6, 8
 """Largest numbers of channels and levels that are drawn; chosen for legibility."""

@@ -1,4 +1,4 @@
-"""Files of rehearsals: every draw with its unknowns, its end, its points and its harmonic balance."""
+"""Storage and table of rehearsals: every draw with its unknowns, its end, its points and its harmonic balance."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalFacts
+from rig.rehearsal.report import Summary, lines, summary
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
 from rig.results.arrays import Arrays, Attributes
-from rig.results.kind import Storage
+from rig.results.kind import Storage, Table
 
 _FACTS, _TRIED = TypeAdapter(RehearsalFacts), TypeAdapter(tuple[Effect, ...])
 """Readers of facts and remedies, as a file stores them."""
@@ -88,3 +89,16 @@ def _row(values: NDArray[np.float64], names: Sequence[str]) -> dict[str, float]:
 
 
 STORAGE = Storage(_pack, _unpack)
+
+
+def _say(found: dict[str, Any]) -> None:
+    """Print the page; the specimen stands above it."""
+    for line in lines(Summary.model_validate(found)):
+        print(line)
+
+
+def _summarise(rehearsal: Rehearsal) -> dict[str, Any]:
+    return summary(rehearsal).model_dump(by_alias=True)
+
+
+TABLE = Table(_summarise, _say)

@@ -1,18 +1,25 @@
-"""Files of nonlinear state-space models: the fit, its errors by experiment, and the spectra of one experiment."""
+"""Table and figure of a nonlinear state-space model: the fit, its errors by experiment, spectra and time of one experiment."""
 
 from collections import Counter
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification import (
-    Features,
-    PnlssModel,
-)
+from identification import Features, PnlssModel
+from rig.drawing.style import MAIN, REJECTED, SECOND, plain_log
 from rig.results.kind import Table
 from rig.results.pnlss.model import IdentifiedPnlss
+from rig.results.simulated.figure import channels_of, draw_simulated
 from rig.results.simulated.table import errors_in, say_errors, say_scatter, scatter_in
 from rig.text.console import number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from identification import PnlssFit
+    from rig.results.pnlss.model import IdentifiedPnlss
 
 
 def poles_of(model: PnlssModel) -> list[dict[str, float]]:
@@ -100,3 +107,36 @@ def _say(summary: dict[str, Any]) -> None:
 
 
 TABLE = Table(_summarise, _say)
+
+
+def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
+    """Draw the drive point's spectrum and a stretch of time, measured and simulated, the course of the fit, and all errors."""
+    model, fit = found.model, found.fit
+    heading = (
+        f"PNLSS model of {model.specimen or 'an unnamed specimen'}: {channels_of(model)}, {model.states} states, "
+        f"{model.nonlinear_coefficients} nonlinear coefficients, {model.sample_rate_hz:g} Hz"
+    )
+    draw_simulated(page, found, heading, {"fit": None if fit is None else partial(_history, fit=fit)})
+
+
+def _history(axis: "Axes", fit: "PnlssFit") -> None:
+    """Draw training and validation error over the iterations, and mark the chosen iteration."""
+    from matplotlib.ticker import MaxNLocator
+
+    past = fit.history
+    at = np.arange(past.training_error.size)
+    line = "o-" if at.size == 1 else "-"
+    axis.semilogy(at, 100.0 * past.training_error, line, color=MAIN, label="training")
+    shown = np.where(np.isfinite(past.validation_error), past.validation_error, np.nan)
+    if np.isfinite(shown).any():
+        axis.semilogy(at, 100.0 * shown, line, color=SECOND, label="validation")
+    axis.axvline(fit.chosen, color=REJECTED, lw=0.9, ls="--", label=f"chosen: iteration {fit.chosen}")
+    for index, bad in enumerate(at[np.isinf(past.validation_error)]):
+        label = None if index else "validation run unbounded"
+        axis.axvline(bad, color=SECOND, lw=0.5, alpha=0.3, label=label)
+    axis.set(xlabel="iteration", ylabel="relative error, %")
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if fit.limited:
+        axis.set_title("stopped while it still paid", loc="right")
+    plain_log(axis)
+    axis.legend()

@@ -1,17 +1,63 @@
-"""Figure of a hammer test: responses with their errors, coherence, spectrum of the force, and the hits."""
+"""Table and figure of a hammer test: the hits, and the frequency responses with coherence."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification import HammerTest
+from identification import FrequencyResponseMatrix, HammerTest
 from rig.drawing.areas import is_narrow
 from rig.drawing.lines import without_wraps
 from rig.drawing.page import grid
 from rig.drawing.style import COLOURS, MAIN, REJECTED, title, unit_text
+from rig.results.kind import Table
+from rig.text.console import number, print_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def _summarise(found: HammerTest) -> dict[str, Any]:
+    responses = found.responses
+    return {
+        "specimen": responses.specimen,
+        "estimator": responses.estimator,
+        "channels": [dict(vars(channel)) for channel in found.channels],
+        "lines": int(responses.frequency_hz.size),
+        "band_hz": [float(responses.frequency_hz[0]), float(responses.frequency_hz[-1])],
+        "record_s": found.record_s,
+        "decay_rate_1_s": responses.decay_rate_1_s,
+        "hits": found.table(),
+        "coherence_median": {
+            output.name: float(np.median(found.coherence[:, row])) for row, output in enumerate(responses.outputs)
+        },
+        "notes": list(responses.notes),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    low, high = summary["band_hz"]
+    used = sum(not hit["fault"] for hit in summary["hits"])
+    window = f", exponential window {summary['decay_rate_1_s']:.3g} 1/s" if summary["decay_rate_1_s"] else ""
+    print(f"{used} of {len(summary['hits'])} hits of {summary['record_s']:.4g} s count{window}")
+    print(f"{summary['estimator']}, {summary['lines']} lines, {low:.4g} to {high:.4g} Hz")
+    print_table(
+        ("hit", "peak N", "pulse ms", "fault"),
+        [
+            (hit["label"], number(hit["peak_n"], ".4g"), number(hit["duration_s"], ".3g", 1e3), hit["fault"] or "-")
+            for hit in summary["hits"]
+        ],
+    )
+    coherence = ", ".join(f"{name} {value:.4f}" for name, value in summary["coherence_median"].items())
+    print(f"median coherence: {coherence}")
+
+
+def exported(found: HammerTest) -> list[FrequencyResponseMatrix]:
+    """Return what is exported of a file: the responses."""
+    return [found.responses]
+
+
+TABLE = Table(_summarise, _say)
+
 
 _MOST_OUTPUTS = 6
 """Largest number of outputs that are drawn; chosen for legibility."""

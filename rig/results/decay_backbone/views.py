@@ -1,12 +1,51 @@
-"""Figure of a free decay: modal frequency and damping over the amplitude, one row of panels per mode."""
+"""Table and figure of a free decay: modal frequency and damping over the amplitude."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from identification import DecayBackbone
 from rig.drawing.style import MAIN, SECOND, engineering, title
+from rig.results.kind import Table
+from rig.text.column import Column
+from rig.text.console import print_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def _summarise(found: DecayBackbone) -> dict[str, Any]:
+    modes = [
+        {
+            "reference": mode.reference,
+            "start_s": mode.start_s,
+            "stop_s": mode.stop_s,
+            "floor_m": mode.floor_m,
+            "drive_mode_shape": mode.drive_mode_shape,
+            "points": mode.table(),
+        }
+        for mode in found.modes
+    ]
+    return {"specimen": found.specimen, "modes": modes, "notes": list(found.notes)}
+
+
+def _say(summary: dict[str, Any]) -> None:
+    for mode in summary["modes"]:
+        print(
+            f"decay of {mode['reference']} from {mode['start_s']:.4g} to {mode['stop_s']:.4g} s, "
+            f"noise {1e3 * mode['floor_m']:.3g} mm"
+        )
+        print_rows(
+            mode["points"],
+            Column("amplitude_m", "amplitude", "mm", ".5f", 1e3),
+            Column("modal_frequency_hz", "modal frequency", "Hz", ".4f"),
+            Column("modal_frequency_bound_95_hz", "+-", "", ".4f"),
+            Column("damping_ratio", "damping", "%", ".4f", 100.0),
+            Column("damping_ratio_bound_95", "+-", "", ".4f", 100.0),
+            Column("time_s", "at", "s", ".3f"),
+        )
+
+
+TABLE = Table(_summarise, _say)
+
 
 _SMALL_CHANGE = 2e-4
 """Least height of the frequency axis over the last frequency, so that rounding does not look like a change; chosen."""

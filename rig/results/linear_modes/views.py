@@ -1,17 +1,66 @@
-"""Figure of a linear modal analysis: responses with their fit, stabilisation diagram, mode shapes, MAC."""
+"""Table, figure and exchange of a linear modal analysis."""
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
+from identification.common import decode, encode
 from rig.drawing.areas import areas
 from rig.drawing.lines import pooled, without_wraps
 from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, say_why_empty, shade, title, unit_text
+from rig.results.kind import Exchange, Table
+from rig.text.console import number, print_table
+from rig.text.contents import Contents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
+    modes = analysis.modes
+    return {
+        "specimen": modes.specimen,
+        "channels": [channel.name for channel in modes.channels],
+        "estimator": None if analysis.responses is None else analysis.responses.estimator,
+        "band_hz": [modes.lowest_hz, modes.highest_hz],
+        "force_rms_n": modes.force_rms_n,
+        "force_unit": modes.force_unit,
+        "fit_residual": modes.fit_residual,
+        "modes": modes.table(),
+        "shapes": modes.shapes.T.tolist(),
+        "shapes_std": modes.shapes_std.T.tolist(),
+        "notes": list(modes.notes),
+    }
+
+
+def _say(summary: dict[str, Any]) -> None:
+    low, high = summary["band_hz"]
+    source = f"{summary['estimator']}, " if summary["estimator"] else ""
+    level = f", {summary['force_rms_n']:.3g} {summary['force_unit']} RMS" if summary["force_rms_n"] > 0.0 else ""
+    residual = summary["fit_residual"]
+    left = "" if residual != residual else f"; residual {number(residual, '.2f')} times that expected from noise"
+    print(f"{source}{low:g} to {high:g} Hz{level}{left}")
+    print_table(
+        ("mode", "frequency Hz", "+-", "damping %", "+-", *(f"shape {name}" for name in summary["channels"])),
+        [
+            (
+                str(index + 1),
+                number(m["frequency_hz"], ".4f"),
+                number(m["frequency_std_hz"], ".4f", 1.96),
+                number(m["damping_ratio"], ".4f", 100.0),
+                number(m["damping_ratio_std"], ".4f", 196.0),
+                *(number(value, ".5f") for value in summary["shapes"][index]),
+            )
+            for index, m in enumerate(summary["modes"])
+        ],
+    )
+
+
+TABLE = Table(_summarise, _say)
+
 
 _MOST_OUTPUTS = 4
 """Largest number of outputs that are drawn; chosen for legibility."""
@@ -150,3 +199,25 @@ def _mac(axis: "Axes", modes: LinearModes) -> None:
 def _legend_above(axis: "Axes", columns: int) -> None:
     """Put the legend above the panel, where it hides nothing."""
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, handlelength=1.2, borderaxespad=0.2)
+
+
+def _linear_modes(modes: LinearModes) -> Contents:
+    arrays, attributes = encode(modes)
+    names = tuple(channel.name for channel in modes.channels)
+    shapes = {name: 1 for name in arrays if name.startswith("shapes")}
+    rows = {name: 0 for name, array in arrays.items() if array.shape == modes.frequency_hz.shape and name not in _SIDES}
+    units: dict[str, Any] = {"lower": "1/kg", "upper": "s2/kg", "force_rms_n": "N", "residues": "1/kg"}
+    units["small_terms"] = np.array(["1/(kg s)", "1/(kg s2)", "s3/kg"])
+    labels = dict.fromkeys(shapes, (names,))
+    return Contents("linear-modes", modes.specimen, arrays, attributes, rows | shapes, units, labels)
+
+
+_SIDES = ("lower", "upper")  # one value per channel, not per mode
+
+
+def objects_of(found: ModalAnalysis) -> list[LinearModes | FrequencyResponseMatrix]:
+    """Return the modes, and the responses in which they were identified if the file holds them."""
+    return [found.modes] if found.responses is None else [found.modes, found.responses]
+
+
+EXCHANGE = Exchange("linear-modes", LinearModes, _linear_modes, partial(decode, LinearModes))
