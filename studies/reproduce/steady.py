@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from identification import IdentificationError, SteadyPrediction
-from rig.results.simulated.driven_models import DrivenModel, frequency_response_at
+from identification import IdentificationError, SteadyPrediction, frequency_response
+from rig.results.simulated.driven_models import LARGEST_RANGE_USE, DrivenModel, level_of
 from studies.reproduce.options import Options
 from studies.reproduce.recordings import exciter_of
 from studies.reproduce.true_responses import Truth, truths
@@ -74,8 +74,12 @@ def steady(
             used = exciter if truth.held == "fundamental" else None
             prediction, reason = None, ""
             try:
-                prediction = frequency_response_at(
-                    model, truth.level, force=truth.held, exciter=used, band_hz=options.specimen.band_hz
+                prediction = frequency_response(
+                    model,
+                    exciter=used,
+                    band_hz=options.specimen.band_hz,
+                    largest_range_use=LARGEST_RANGE_USE,
+                    **level_of(truth.level, truth.held),
                 )
             except IdentificationError as error:
                 reason = str(error)

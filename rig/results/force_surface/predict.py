@@ -9,7 +9,7 @@ from rig.errors import RecordingError
 from rig.results.files import load_as
 from rig.results.force_surface.model import MeasuredSurface
 from rig.results.force_surface.options import ForceSurfacePrediction
-from rig.results.predictions.references import stepped_sines
+from rig.results.predictions.references import Compared, predictions_of, stepped_sines
 
 _INTERVAL = 1.96
 """Half of a 95 % interval of a normal distribution, in standard deviations."""
@@ -34,22 +34,15 @@ def predict(model: Path, request: ForceSurfacePrediction) -> Predictions:
         (force, None) for force in request.forces_without_reference(references, "fundamental")
     ]
     forces += [(one.level, one) for one in references]
-    steady, bands, errors = [], [], []
+    steady = []
     for force_n, reference in forces:
         curve = measured.surface.constant_force(force_n)
-        steady.append(_as_prediction(curve, measured))
-        bands.append(_band(curve))
-        errors.append(None if reference is None else compare(steady[-1], reference, over="phase").error)
+        predicted = _as_prediction(curve, measured)
+        error = None if reference is None else compare(predicted, reference, over="phase").error
+        steady.append(Compared(predicted, reference, error, _band(curve)))
     others = {one.specimen for one in references} - {"", measured.surface.specimen}
     strangers = [f"the model is of {measured.surface.specimen}, a reference of {other}" for other in sorted(others)]
-    return Predictions(
-        steady=tuple(steady),
-        steady_references=tuple(reference for _, reference in forces),
-        steady_errors=tuple(errors),
-        steady_bands=tuple(bands),
-        specimen=measured.surface.specimen,
-        notes=(*measured.notes, *strangers),
-    )
+    return predictions_of(measured.surface.specimen, steady, notes=(*measured.notes, *strangers))
 
 
 def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> SteadyPrediction:

@@ -1,12 +1,22 @@
 """Measured responses with which predictions are compared."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from identification import FrequencyResponse
+from identification import (
+    FrequencyResponse,
+    PredictionError,
+    Predictions,
+    ResponseBand,
+    SimulatedRun,
+    SteadyPrediction,
+    SweepPrediction,
+    Transient,
+)
 from identification.prediction import Over
 from rig.campaigns.evaluation.point import spectrum_of, vibration_of
 from rig.campaigns.evaluation.recorded import points_of
@@ -15,6 +25,52 @@ from rig.measurements import STEPPED, frequency_responses
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load_as
+
+
+class Compared(NamedTuple):
+    """A steady prediction, with its reference, error and band as far as there are some."""
+
+    prediction: SteadyPrediction
+    reference: FrequencyResponse | None = None
+    error: PredictionError | None = None
+    band: ResponseBand | None = None
+
+
+class Swept(NamedTuple):
+    """A predicted sweep, with force and drive-point motion as recorded and the error where it was, and remarks on both."""
+
+    prediction: SweepPrediction
+    recorded: Transient | None = None
+    error: PredictionError | None = None
+    notes: tuple[str, ...] = ()
+
+
+def predictions_of(
+    specimen: str,
+    steady: Sequence[Compared],
+    swept: Sequence[Swept] = (),
+    runs: tuple[SimulatedRun, ...] = (),
+    notes: Iterable[str] = (),
+) -> Predictions:
+    """Return all predictions of one model; notes are given once each."""
+    return Predictions(
+        steady=tuple(one.prediction for one in steady),
+        steady_references=tuple(one.reference for one in steady),
+        steady_errors=tuple(one.error for one in steady),
+        steady_bands=tuple(one.band for one in steady),
+        sweeps=tuple(one.prediction for one in swept),
+        sweep_references=tuple(one.recorded for one in swept),
+        sweep_errors=tuple(one.error for one in swept),
+        runs=runs,
+        specimen=specimen,
+        notes=tuple(dict.fromkeys([*notes, *(note for one in swept for note in one.notes)])),
+    )
+
+
+def other_specimens(specimen: str, references: Iterable[FrequencyResponse]) -> list[str]:
+    """Return a note on each specimen of the references other than the model's."""
+    others = {one.specimen for one in references} - {"", specimen}
+    return [f"the model is of {specimen}, a reference of {other}: not the same specimen" for other in sorted(others)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from identification import (
     HalfPeriods,
     LinearModes,
     NonlinearMode,
-    PredictionError,
     SweepPrediction,
     Transient,
     VoltageSweep,
@@ -25,6 +24,7 @@ from rig.campaigns.sweep.plan import SweepPlan
 from rig.errors import ConfigurationError, RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
 from rig.recording.reader import Recording
+from rig.results.predictions.references import Swept
 
 
 @dataclass(frozen=True)
@@ -51,20 +51,6 @@ class SweepModels:
             linear_modes=self.modes,
             largest_range_use=self.largest_range_use,
         )
-
-
-@dataclass(frozen=True)
-class Swept:
-    """A predicted sweep, the recorded sweep if there is one, and remarks on both."""
-
-    prediction: SweepPrediction
-    """The prediction."""
-    recorded: Transient | None
-    """Force and drive-point motion as recorded."""
-    error: PredictionError | None
-    """Difference between prediction and recording."""
-    notes: tuple[str, ...]
-    """Remarks, for example on models that may not belong to the rig."""
 
 
 def recorded_sweeps(path: Path, models: SweepModels) -> Iterator[Swept]:
@@ -94,7 +80,7 @@ def planned_sweeps(plan_source: str, models: SweepModels) -> Iterator[Swept]:
     notes = strangers(bench_of(plan, plan_source), models.mode.specimen, models.exciter, plan_source)
     for level_v in plan.levels:
         predicted = models.predict(VoltageSweep(plan.start_hz, plan.stop_hz, plan.rate_hz_per_s, level_v))
-        yield Swept(predicted, None, None, notes)
+        yield Swept(predicted, notes=notes)
 
 
 def planned(plan_source: str) -> SweepPlan:

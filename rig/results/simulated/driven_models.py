@@ -7,20 +7,11 @@ from typing import TypedDict
 
 import numpy as np
 
-from identification import (
-    Channel,
-    Exciter,
-    Experiment,
-    PnlssModel,
-    SteadyPrediction,
-    SteadyStates,
-    StructuredModel,
-    frequency_response,
-    steady_state,
-)
+from identification import Channel, Exciter, Experiment, PnlssModel, Simulation, StructuredModel, coupled_run
 from identification.experiments import Simulator
 from identification.harmonic_balance import Held
 from rig.errors import ConfigurationError
+from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD
 from vibrolock.arrays import Float
 
 DrivenModel = PnlssModel | StructuredModel
@@ -34,60 +25,40 @@ class Fixed(TypedDict, total=False):
 
     exciter: Exciter | None
     held_inputs: Mapping[str, float]
+    largest_range_use: float
 
 
-class _Level(TypedDict, total=False):
+class Level(TypedDict, total=False):
+    """A held level as `identification.frequency_response` takes it."""
+
     force_n: float
     voltage_v: float
     force: Held
 
 
-def _level(level: float, force: Held) -> _Level:
-    return {"voltage_v": level} if force == "voltage" else {"force_n": level, "force": force}
+def level_of(level: float, held: Held) -> Level:
+    """Return the level of what is held: of the force (N) or of the voltage (V)."""
+    return {"voltage_v": level} if held == "voltage" else {"force_n": level, "force": held}
 
 
-def frequency_response_at(
-    model: DrivenModel,
-    level: float,
-    *,
-    force: Held,
-    band_hz: tuple[float | None, float | None] | None = None,
-    exciter: Exciter | None = None,
-    held_inputs: Mapping[str, float] | None = None,
-) -> SteadyPrediction:
-    """Return the response at a constant level, of the force (N) or of the voltage (V)."""
-    return frequency_response(
-        model,
-        exciter=exciter,
-        held_inputs=held_inputs,
-        band_hz=band_hz,
-        largest_range_use=LARGEST_RANGE_USE,
-        **_level(level, force),
-    )
+def coupled(model: DrivenModel, exciter: Exciter, voltage_v: Float, lowest_hz: float) -> Simulation:
+    """Simulate a model behind its exciter, whose reaction is exact over the band of the voltage and of the model."""
+    if isinstance(model, PnlssModel) and model.excited_hz:
+        lowest_hz = min(lowest_hz, model.excited_hz[0])
+    return coupled_run(model, exciter, voltage_v, lowest_hz=_LOWEST * lowest_hz)
 
 
-def steady_state_at(
-    model: DrivenModel,
-    level: float,
-    frequency_hz: float,
-    *,
-    force: Held,
-    near: SteadyStates | None = None,
-    exciter: Exciter | None = None,
-    held_inputs: Mapping[str, float] | None = None,
-) -> SteadyStates:
-    """Return the vibration at one level and frequency."""
-    return steady_state(
-        model,
-        frequency_hz,
-        exciter=exciter,
-        held_inputs=held_inputs,
-        near=near,
-        largest_range_use=LARGEST_RANGE_USE,
-        **_level(level, force),
-    )
+def check_rate(source: str, highest_hz: float, rate_hz: float) -> None:
+    """Raise `ConfigurationError` for a plan that goes too high for the sample rate of a model."""
+    if FEWEST_SAMPLES_PER_PERIOD * highest_hz >= rate_hz:
+        raise ConfigurationError(
+            f"{source}: goes up to {highest_hz:g} Hz; a model at {rate_hz:g} Hz allows below "
+            f"{rate_hz / FEWEST_SAMPLES_PER_PERIOD:g} Hz"
+        )
 
 
+_LOWEST = 0.8
+"""Part of the lowest frequency above which the exciter's reaction is exact."""
 CONSTANT = "constant"
 """Name of the input of `identification.Experiment.with_constant_input`, whose value a model remembers."""
 

@@ -4,18 +4,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from identification import Exciter, PnlssModel, SimulatedRun, Simulation, coupled_run
+from identification import Exciter, SimulatedRun, Simulation
 from rig.bench import Bench
 from rig.campaigns.multisine.plan import MultisinePlan
 from rig.campaigns.plans import bench_of, load_plan
 from rig.errors import ConfigurationError
-from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD
 from rig.results.predictions.sweeps import strangers
-from rig.results.simulated.driven_models import DrivenModel, all_inputs
+from rig.results.simulated.driven_models import DrivenModel, all_inputs, check_rate, coupled
 from vibrolock.arrays import Float
-
-_LOWEST = 0.8
-"""Part of the lowest frequency above which the exciter's reaction is exact."""
 
 
 def planned_multisines(
@@ -36,7 +32,12 @@ def planned_multisines(
     for target in plan.targets():
         index = target.realisation or 0
         period = target.level * _period(plan, bench, index, samples)
-        run = _run(model, exciter, constants, np.tile(period, ahead + 1), plan.lowest_hz)
+        voltage_v = np.tile(period, ahead + 1)
+        run: Simulation
+        if exciter is None:
+            run = model.simulate(all_inputs(model, voltage_v[None], constants))
+        else:
+            run = coupled(model, exciter, voltage_v, plan.lowest_hz)
         last = run.outputs[:, ahead * samples :]
         at = run.unbounded_at
         runs.append(
@@ -57,11 +58,7 @@ def planned_multisines(
 
 def _period_samples(source: str, plan: MultisinePlan, rate_hz: float) -> int:
     """Number of samples of a period at the model's rate."""
-    if FEWEST_SAMPLES_PER_PERIOD * plan.highest_hz >= rate_hz:
-        raise ConfigurationError(
-            f"{source}: goes up to {plan.highest_hz:g} Hz; a model at {rate_hz:g} Hz allows below "
-            f"{rate_hz / FEWEST_SAMPLES_PER_PERIOD:g} Hz"
-        )
+    check_rate(source, plan.highest_hz, rate_hz)
     samples = rate_hz / plan.resolution_hz
     if abs(samples - round(samples)) > 1e-6:
         raise ConfigurationError(
@@ -76,14 +73,3 @@ def _period(plan: MultisinePlan, bench: Bench, index: int, samples: int) -> Floa
     played = plan.design(bench.sample_rate_hz).realisation(plan.phase_seed, index)
     lines = np.fft.rfft(played / np.sqrt(np.mean(played**2)))
     return np.fft.irfft(lines[: samples // 2 + 1], samples) * (samples / played.size)
-
-
-def _run(
-    model: DrivenModel, exciter: Exciter | None, constants: Mapping[str, float], voltage_v: Float, lowest_hz: float
-) -> Simulation:
-    if exciter is None:
-        return model.simulate(all_inputs(model, voltage_v[None], constants))
-    lowest = _LOWEST * lowest_hz
-    if isinstance(model, PnlssModel) and model.excited_hz:
-        lowest = min(lowest, _LOWEST * model.excited_hz[0])
-    return coupled_run(model, exciter, voltage_v, lowest_hz=lowest)

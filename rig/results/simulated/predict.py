@@ -10,17 +10,17 @@ from identification import (
     Exciter,
     FrequencyResponse,
     IdentificationError,
-    PredictionError,
     Predictions,
     ResponseBand,
     SteadyPrediction,
+    frequency_response,
 )
 from identification.harmonic_balance import Held
 from identification.prediction import band_of_responses
 from rig.errors import ConfigurationError
 from rig.results.files import load, load_as
-from rig.results.predictions.references import references_in
-from rig.results.simulated.driven_models import DrivenModel, Fixed, constants_of, frequency_response_at
+from rig.results.predictions.references import Compared, other_specimens, predictions_of, references_in
+from rig.results.simulated.driven_models import LARGEST_RANGE_USE, DrivenModel, Fixed, Level, constants_of, level_of
 from rig.results.simulated.model import SimulatedModel
 from rig.results.simulated.multisines import simulated_multisines
 from rig.results.simulated.options import SimulatedPrediction
@@ -47,19 +47,19 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
     bands_asked = getattr(request, "bands", False)
     exciter = None if request.exciter is None else load_as(Exciter, request.exciter)
     constants = constants_of(model, request.constants, path)
-    fixed: Fixed = {"exciter": exciter, "held_inputs": constants} if constants else {"exciter": exciter}
+    fixed: Fixed = {"exciter": exciter, "largest_range_use": LARGEST_RANGE_USE}
+    if constants:
+        fixed["held_inputs"] = constants
     held: Held = request.held or default_held(model, exciter)
     references_held = default_held(model, exciter)
     alone = request.forces_without_reference([one.measured for one in references], references_held)
-    steady: list[tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]] = [
-        (frequency_response_at(model, level, force=one, **fixed), None, None)
-        for one, levels in ((held, alone), ("voltage", request.voltages_v))
-        for level in levels
-    ]
-    if bands_asked and not steady:
+    levels = [*(level_of(force, held) for force in alone), *(level_of(one, "voltage") for one in request.voltages_v)]
+    if bands_asked and not levels:
         raise ConfigurationError("`bands`: are those of responses without a reference; add `forces_n` or `voltages_v`")
-    others = _others(found, bands_asked, path) if steady else []
-    bands = [_band(others, one, fixed) for one, _, _ in steady]
+    responses = [frequency_response(model, **level, **fixed) for level in levels]
+    others = _others(found, bands_asked, path) if levels else []
+    bands = [_band(others, level, fixed) for level in levels]
+    steady = [Compared(one, band=band) for one, band in zip(responses, bands, strict=True)]
     steady += [compared(model, fixed, one, whole=_asked(request, alone, one.measured)) for one in references]
     models = SimulatedSweepModels(model, exciter, constants)
     swept = [one for recording in request.sweeps for one in recorded_simulated_sweeps(recording, models)]
@@ -83,20 +83,8 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
             "the model is that of a run in the middle; its scatter from run to run is not in these predictions",
         )
     notes = [*(_default(request, held) if request.forces_n else ()), *said]
-    notes += _strangers(model, [reference.measured for reference in references])
-    notes += [note for one in swept for note in one.notes]
-    return Predictions(
-        steady=tuple(one for one, _, _ in steady),
-        steady_bands=(*bands, *[None] * (len(steady) - len(bands))),
-        steady_references=tuple(reference for _, reference, _ in steady),
-        steady_errors=tuple(error for _, _, error in steady),
-        sweeps=tuple(one.prediction for one in swept),
-        sweep_references=tuple(one.recorded for one in swept),
-        sweep_errors=tuple(one.error for one in swept),
-        runs=runs,
-        specimen=model.specimen,
-        notes=tuple(dict.fromkeys(notes)),
-    )
+    notes += other_specimens(model.specimen, [reference.measured for reference in references])
+    return predictions_of(model.specimen, steady, swept, runs, notes)
 
 
 def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenModel]:
@@ -112,14 +100,12 @@ def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenMo
     return cast(Sequence[DrivenModel], models)
 
 
-def _band(others: Sequence[DrivenModel], predicted: SteadyPrediction, fixed: Fixed) -> ResponseBand | None:
+def _band(others: Sequence[DrivenModel], level: Level, fixed: Fixed) -> ResponseBand | None:
     """Return the band of a response over other models; None if there are none, or if most have no such response."""
     responses: list[SteadyPrediction] = []
     for model in others:
         with suppress(IdentificationError):
-            responses.append(
-                frequency_response_at(model, predicted.force_n, force=cast(Held, predicted.force), **fixed)
-            )
+            responses.append(frequency_response(model, **level, **fixed))
     return band_of_responses(responses) if len(responses) > _DRAWS // 2 else None
 
 
@@ -169,9 +155,3 @@ def _default(request: SimulatedPrediction, held: Held) -> tuple[str, ...]:
         "constant is a force without harmonics, for nothing in the model makes any: an exciter model gives the "
         "fundamental or the RMS of a force that a shaker makes",
     )
-
-
-def _strangers(model: DrivenModel, references: Sequence[FrequencyResponse]) -> list[str]:
-    """Return a note on each specimen of the references other than the model's."""
-    others = {one.specimen for one in references} - {"", model.specimen}
-    return [f"the model is of {model.specimen}, a reference of {one}: not the same specimen" for one in sorted(others)]

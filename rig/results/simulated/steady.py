@@ -8,14 +8,15 @@ from identification import (
     Exciter,
     FrequencyResponse,
     IdentificationError,
-    PredictionError,
     SteadyPrediction,
     SteadyStates,
     compare,
+    frequency_response,
+    steady_state,
 )
 from identification.harmonic_balance import Held
-from rig.results.predictions.references import Reference
-from rig.results.simulated.driven_models import DrivenModel, Fixed, frequency_response_at, steady_state_at
+from rig.results.predictions.references import Compared, Reference
+from rig.results.simulated.driven_models import DrivenModel, Fixed, level_of
 
 _MARGIN = 0.02
 """Relative margin by which a response is followed beyond the frequencies of a reference."""
@@ -33,9 +34,7 @@ def default_held(model: DrivenModel, exciter: Exciter | None) -> Held:
     return "pure-sine" if force_driven and exciter is None else "fundamental"
 
 
-def compared(
-    model: DrivenModel, fixed: Fixed, reference: Reference, *, whole: bool = False
-) -> tuple[SteadyPrediction, FrequencyResponse | None, PredictionError | None]:
+def compared(model: DrivenModel, fixed: Fixed, reference: Reference, *, whole: bool = False) -> Compared:
     """Predict a reference at its held level if the model can hold it, otherwise at the force of each point, and compare.
 
     ``fixed`` has the ``exciter``, and ``held_inputs`` if the model has constant ones. At a held level, only the band of the
@@ -43,18 +42,11 @@ def compared(
     """
     measured, over = reference.measured, reference.over
     held, notes = default_held(model, fixed["exciter"]), []
-    band_hz = (
-        None
-        if whole
-        else (
-            (1.0 - _MARGIN) * float(measured.frequency_hz.min()),
-            (1.0 + _MARGIN) * float(measured.frequency_hz.max()),
-        )
-    )
-    if measured.controlled == "force":
-        predicted = frequency_response_at(model, measured.level, force=held, band_hz=band_hz, **fixed)
-    elif measured.controlled == "voltage" and held == "fundamental":
-        predicted = frequency_response_at(model, measured.level, force="voltage", band_hz=band_hz, **fixed)
+    low, high = float(measured.frequency_hz.min()), float(measured.frequency_hz.max())
+    band_hz = None if whole else ((1.0 - _MARGIN) * low, (1.0 + _MARGIN) * high)
+    if measured.controlled == "force" or (measured.controlled == "voltage" and held == "fundamental"):
+        level = level_of(measured.level, held if measured.controlled == "force" else "voltage")
+        predicted = frequency_response(model, band_hz=band_hz, **level, **fixed)
     else:
         predicted = _point_by_point(model, fixed, held, measured)
         over = "frequency"
@@ -66,7 +58,7 @@ def compared(
             "predicted one has no harmonics; with an exciter model it has"
         )
     predicted = replace(predicted, notes=(*predicted.notes, *notes))
-    return predicted, measured, compare(predicted, measured, over=over).error
+    return Compared(predicted, measured, compare(predicted, measured, over=over).error)
 
 
 def _point_by_point(model: DrivenModel, fixed: Fixed, held: Held, measured: FrequencyResponse) -> SteadyPrediction:
@@ -91,7 +83,7 @@ def _point_by_point(model: DrivenModel, fixed: Fixed, held: Held, measured: Freq
         for start, way in ways:
             try:
                 for frequency_hz, force_n in way:
-                    start = steady_state_at(model, force_n, frequency_hz, force=held, near=start, **fixed)
+                    start = steady_state(model, frequency_hz, near=start, **level_of(force_n, held), **fixed)
             except IdentificationError:
                 continue
             tried += [] if start is None else [start]

@@ -13,20 +13,17 @@ from identification import (
     Simulation,
     SweepPrediction,
     Transient,
-    coupled_run,
     demodulate,
 )
 from identification.common import MOTION_ORDER, find_role
 from rig.campaigns.evaluation.vibrations import VOLTAGE
-from rig.results.simulated.driven_models import DrivenModel, all_inputs, driving
+from rig.results.simulated.driven_models import DrivenModel, all_inputs, coupled, driving
 from vibrolock.arrays import Float
 
 _SHOWN = 10.0
 """An unbounded run is shown while it is below this many times the largest recorded amplitude, or the largest in training."""
 _SHORT_PERIODS = 20
 """A run that became unbounded within fewer periods of the first frequency is too short to show anything."""
-_LOWEST = 0.8
-"""Part of the lowest frequency of a sweep above which the exciter's reaction is exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +100,9 @@ class SimulatedSweepModels:
         channels = {channel.role: (row, channel) for row, channel in enumerate(model.outputs)}
         if self.exciter is not None:
             channel = next(channel for channel in model.inputs if channel.role == "force")
-            lowest = _LOWEST * min(given.frequencies_hz)
-            if isinstance(model, PnlssModel) and model.excited_hz:
-                lowest = min(lowest, _LOWEST * model.excited_hz[0])
-            coupled = coupled_run(model, self.exciter, given.inputs[0], lowest_hz=lowest)
+            found = coupled(model, self.exciter, given.inputs[0], min(given.frequencies_hz))
             source = self.exciter.source
-            return coupled.force_n, channel, coupled, [f"holds for the exciter of {source} alone", *coupled.notes]
+            return found.force_n, channel, found, [f"holds for the exciter of {source} alone", *found.notes]
         run: Simulation
         inputs = all_inputs(model, given.inputs, self.constants)
         if isinstance(model, PnlssModel):

@@ -13,15 +13,16 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.kinds import kinds_that_yield
 from rig.campaigns.plans import bench_of
 from rig.campaigns.sweep.plan import SweepPlan
-from rig.errors import ConfigurationError, RecordingError
+from rig.errors import RecordingError
 from rig.measurements import bench_of_recording, point_rows, sweeps
-from rig.measurements.experiments.build import FEWEST_SAMPLES_PER_PERIOD, rows_from_rest
+from rig.measurements.experiments.build import rows_from_rest
 from rig.measurements.experiments.records import sweep_pieces
 from rig.measurements.experiments.signals import Signals
 from rig.measurements.points_left_out import points_left_out
 from rig.recording.reader import Recording
-from rig.results.predictions.sweeps import Swept, force_and_drive, planned, strangers
-from rig.results.simulated.driven_models import DrivenModel, with_constants
+from rig.results.predictions.references import Swept
+from rig.results.predictions.sweeps import force_and_drive, planned, strangers
+from rig.results.simulated.driven_models import DrivenModel, check_rate, with_constants
 from rig.results.simulated.sweep_models import SimulatedSweepModels, SweepGiven
 from rig.tick.layout import SAMPLE_LOST
 from vibrolock.arrays import Float
@@ -54,12 +55,7 @@ def planned_simulated_sweeps(plan_source: str, models: SimulatedSweepModels) -> 
     Raises `ConfigurationError` if the plan is no sweep at constant voltage, or too fast for the sample rate of the model.
     """
     plan, rate_hz = planned(plan_source), models.model.sample_rate_hz
-    highest = max(plan.start_hz, plan.stop_hz)
-    if FEWEST_SAMPLES_PER_PERIOD * highest >= rate_hz:
-        raise ConfigurationError(
-            f"{plan_source}: goes up to {highest:g} Hz; a model at {rate_hz:g} Hz allows below "
-            f"{rate_hz / FEWEST_SAMPLES_PER_PERIOD:g} Hz"
-        )
+    check_rate(plan_source, max(plan.start_hz, plan.stop_hz), rate_hz)
     notes = strangers(bench_of(plan, plan_source), models.model.specimen, models.exciter, plan_source)
     row = find_role(models.model.outputs, "drive")
     for level_v in plan.levels:
@@ -74,7 +70,7 @@ def planned_simulated_sweeps(plan_source: str, models: SimulatedSweepModels) -> 
             initial_state=None,
             origin=f"planned {level_v:g} V, {plan.start_hz:g} to {plan.stop_hz:g} Hz, {rate}",
         )
-        yield Swept(models.predict(given), None, None, notes)
+        yield Swept(models.predict(given), notes=notes)
 
 
 def _waveform(plan: SweepPlan, rate_hz: float) -> tuple[Float, Float, int]:
