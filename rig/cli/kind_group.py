@@ -1,47 +1,81 @@
 """A command with a subcommand for each kind of model, and the same command without a kind."""
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import typer
 
 from rig.cli.group import Group
+from rig.cli.options import Json, Output, Overwrite, with_parameters
+
+if TYPE_CHECKING:
+    from rig.results.kind import Identification, Prediction
 
 _WITHOUT_KIND = ""
 """Name of the subcommand that is used when no kind is named."""
+
+Value = bool | int | float | str | Path | Sequence[object] | None
+"""Value of an option."""
+
+
+def parameter(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
+    """Return a parameter that all kinds have."""
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
 class KindGroup(Group):
     """Subcommands that are made when they are asked for, from the declarations of the kinds."""
 
-    def words(self) -> Mapping[str, str]:
-        """Return the words for the kinds, each with a sentence for the help."""
-        raise NotImplementedError
-
-    def function(self, word: str) -> Callable[..., None]:
-        """Return the function of a kind; of the command without a kind if the word is empty."""
-        raise NotImplementedError
-
-    after: ClassVar[str] = ""
+    text: ClassVar[str]
+    """What the command does."""
+    usage: ClassVar[str]
+    """How it is called."""
+    after: ClassVar[str]
     """What the help says after the kinds."""
+    files: ClassVar[inspect.Parameter]
+    """Parameter of the files that are read."""
+    kind: ClassVar[tuple[inspect.Parameter, ...]] = ()
+    """Parameter of the kind where no subcommand names it."""
+
+    def kinds(self) -> "Mapping[str, Identification] | Mapping[str, Prediction]":
+        """Return the kinds by their words."""
+        raise NotImplementedError
+
+    def run(self, word: str, output: Path, overwrite: bool, json: bool, values: dict[str, Value]) -> None:
+        """Run the command with the values of its other parameters; ``word`` is empty without a kind."""
+        raise NotImplementedError
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the words for the kinds."""
-        return list(self.words())
+        return list(self.kinds())
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of a kind."""
-        if cmd_name != _WITHOUT_KIND and cmd_name not in self.words():
+        from rig.cli.option_parameters import parameters_of
+
+        known = self.kinds()
+        if cmd_name != _WITHOUT_KIND and cmd_name not in known:
             return None
+        models = [known[cmd_name].options] if cmd_name else [one.options for one in known.values()]
+
+        def function(*, output: Path, overwrite: bool, json: bool, **values: Value) -> None:
+            self.run(cmd_name, output, overwrite, json, values)
+
+        parameters = [
+            *(self.files, parameter("output", Output), *(() if cmd_name else self.kind), *parameters_of(models)),
+            *(parameter("overwrite", Overwrite, False), parameter("json", Json, False)),
+        ]
+        text = known[cmd_name].text if cmd_name else self.text
         app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-        app.command(cmd_name or self.name, cls=KindCommand)(self.function(cmd_name))
+        app.command(cmd_name or self.name, cls=KindCommand)(with_parameters(function, parameters, text))
         return typer.main.get_command(app)
 
     @property
     def commands(self) -> dict[str, Any]:
         """All subcommands, and the command without a kind."""
-        return {word: self.get_command(None, word) for word in (*self.words(), _WITHOUT_KIND)}
+        return {word: self.get_command(None, word) for word in (*self.kinds(), _WITHOUT_KIND)}
 
     @commands.setter
     def commands(self, _: object) -> None:
@@ -49,18 +83,18 @@ class KindGroup(Group):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Take the command without a kind if the first word is neither a kind nor a question for help."""
-        named = args[:1] and (args[0] in self.words() or args[0] in ctx.help_option_names)
+        named = args[:1] and (args[0] in self.kinds() or args[0] in ctx.help_option_names)
         parsed: list[str] = super().parse_args(ctx, args if named else [_WITHOUT_KIND, *args])
         return parsed
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:
         """Write how the command is called."""
-        formatter.write_usage(ctx.command_path, "[KIND] FILE... -o OUTPUT [OPTIONS]")
+        formatter.write_usage(ctx.command_path, self.usage)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write the kinds and what all of them have in common."""
         with formatter.section("Kinds"):
-            formatter.write_dl(list(self.words().items()))
+            formatter.write_dl([(word, kind.text) for word, kind in self.kinds().items()])
         formatter.write_paragraph()
         formatter.write_text(self.after)
 
@@ -83,18 +117,8 @@ class KindCommand(typer.core.TyperCommand):
         return parsed
 
 
-def with_parameters(run: Callable[[dict[str, Any]], None], parameters: Sequence[inspect.Parameter], text: str) -> Any:
-    """Return a function of some parameters, with a text for its help, that passes their values on by name."""
-
-    def function(**values: Any) -> None:
-        run(values)
-
-    function.__doc__ = text
-    function.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    function.__annotations__ = {one.name: one.annotation for one in parameters}
-    return function
-
-
-def parameter(name: str, annotation: Any, default: Any = inspect.Parameter.empty) -> inspect.Parameter:
-    """Return a parameter that all kinds have."""
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+def kind_app(group: type[KindGroup]) -> typer.Typer:
+    """Return the application of such a group."""
+    app = typer.Typer(cls=group, help=group.text)
+    app.callback()(lambda: None)
+    return app

@@ -1,13 +1,18 @@
 """Options shared by several commands."""
 
 import contextlib
+import inspect
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from rig.bench import Bench
+    from rig.campaigns.planning.plan import Plan
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace OUTPUT where it exists.")]
@@ -27,6 +32,26 @@ def say_what_is_imported() -> None:
     log = logging.getLogger("simulators.sites.functions")
     log.setLevel(logging.INFO)
     log.handlers = [_Notes()]
+
+
+def with_parameters(
+    call: Callable[..., None], parameters: Sequence[inspect.Parameter], text: str | None
+) -> Callable[..., None]:
+    """Return a function with the parameters that typer shall read, and a text for its help."""
+    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
+    call.__doc__ = text
+    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return call
+
+
+def plan_and_bench(plan: str, bench: str | None) -> "tuple[Plan, Bench]":
+    """Load a plan, and the bench that it names or another one."""
+    from rig.bench import load_bench
+    from rig.campaigns.plans import bench_of, load_plan
+
+    loaded = load_plan(plan)
+    return loaded, bench_of(loaded, plan) if bench is None else load_bench(bench)
 
 
 def keep_existing(sources: Sequence[Path], output: Path, overwrite: bool) -> None:

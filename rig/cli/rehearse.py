@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import Json, Overwrite, keep_existing
+from rig.cli.options import Json, Overwrite, keep_existing, plan_and_bench
 
 if TYPE_CHECKING:
-    from rig.bench import Bench
-    from rig.campaigns.planning.plan import Plan
     from rig.rehearsal.forecast import Comparison
     from rig.rehearsal.rehearsal import Draw, Effect
     from rig.results.rehearsal.rehearse import Listener, Subject
@@ -55,7 +53,7 @@ def rehearse_(
     if compare is not None:
         _compare(Path(plan), compare, json)
         return
-    loaded, chosen = _plan_and_bench(plan, bench)
+    loaded, chosen = plan_and_bench(plan, bench)
     subject = Subject(
         plan=loaded,
         bench=chosen,
@@ -72,14 +70,6 @@ def rehearse_(
         return
     _check_outputs(subject, output, improve, figure, overwrite)
     _rehearse(subject, output, improve, figure, overwrite=overwrite, jobs=jobs, json=json)
-
-
-def _plan_and_bench(plan: str, bench: str | None) -> "tuple[Plan, Bench]":
-    from rig.bench import load_bench
-    from rig.campaigns.plans import bench_of, load_plan
-
-    loaded = load_plan(plan)
-    return loaded, load_bench(bench) if bench is not None else bench_of(loaded, plan)
 
 
 def _write_twin(subject: "Subject", number: int, output: Path, overwrite: bool) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rig.cli.options import Json, Output
-from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_run_options
+from rig.cli.options import Json, Output, plan_and_bench
+from rig.cli.run_options import of_a_further_part, of_a_recording, shown, with_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
@@ -21,7 +21,7 @@ Override = Annotated[
 ]
 
 
-@with_run_options(of_a_recording)
+@with_options(of_a_recording, monitored=True)
 def run(
     *,
     plan: Annotated[str, typer.Argument(help="Shipped plan (magnet-beam/backbone) or TOML file.")],
@@ -35,12 +35,9 @@ def run(
     json: Json = False,
 ) -> None:
     """Carry out a plan and record it."""
-    from rig.bench import load_bench
-    from rig.campaigns.plans import bench_of, load_plan
     from rig.campaigns.running.runner import run_plan
 
-    loaded = load_plan(plan)
-    chosen = load_bench(bench) if bench is not None else bench_of(loaded, plan)
+    loaded, chosen = plan_and_bench(plan, bench)
     if daq is not None:
         chosen = chosen.model_copy(update={"driver": chosen.driver.model_copy(update={"name": daq})})
     if check is not None:
@@ -51,7 +48,7 @@ def run(
     _carry(loaded.kind, options, lambda watched: run_plan(loaded, chosen, output, watched), json)
 
 
-@with_run_options(of_a_further_part)
+@with_options(of_a_further_part, monitored=True)
 def resume(
     *,
     output: Annotated[Path, typer.Argument(help="Recording of the interrupted run.")],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.monitor_process import monitor_process
-from rig.cli.options import Overwrite
+from rig.cli.options import Overwrite, with_parameters
 
 if TYPE_CHECKING:
     from rig.arming.arming import Arm, ArmingRequest
@@ -59,54 +59,33 @@ def of_a_further_part(
 
 
 def with_options(
-    build: Callable[..., object], *, later: bool = False
+    build: Callable[..., object], *, later: bool = False, monitored: bool = False
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Replace the parameter ``options`` of a command by those of ``build``; the command receives the result of ``build``.
 
-    With ``later`` it receives a function that returns that result.
+    With ``later`` it receives a function that returns that result; if ``monitored``, ``--monitor`` shows a page beside it.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         shared = inspect.signature(build).parameters
+        added = [*([_MONITOR] if monitored else []), *shared.values()]
         parameters: list[inspect.Parameter] = []
         for parameter in inspect.signature(command).parameters.values():
-            parameters += shared.values() if parameter.name == "options" else [parameter]
+            parameters += added if parameter.name == "options" else [parameter]
 
-        def call(**given: object) -> None:
+        def call(*, monitor: bool = False, **given: object) -> None:
             built = partial(build, **{name: given.pop(name) for name in shared})
-            command(**given, options=built if later else built())
-
-        return _with_parameters(call, command, parameters)
-
-    return decorate
-
-
-def with_run_options(build: "Callable[..., RunOptions]") -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """As `with_options`, with ``--monitor`` for a page beside the run."""
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        def call(monitor: Monitor = False, **given: object) -> None:
+            options = built if later else built()
             with monitor_process(monitor):
-                command(**given)
+                command(**given, options=options)
 
-        added = inspect.signature(call).parameters["monitor"]
-        parameters: list[inspect.Parameter] = []
-        for parameter in inspect.signature(command).parameters.values():
-            parameters += [added, parameter] if parameter.name == "options" else [parameter]
-        return with_options(build)(_with_parameters(call, command, parameters))
+        call.__name__ = command.__name__
+        return with_parameters(call, parameters, command.__doc__)
 
     return decorate
 
 
-def _with_parameters(
-    call: Callable[..., None], command: Callable[..., None], parameters: list[inspect.Parameter]
-) -> Callable[..., None]:
-    """Give ``call`` the name and text of a command, and the parameters that typer shall read."""
-    parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in parameters]
-    call.__name__, call.__doc__ = command.__name__, command.__doc__
-    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    return call
+_MONITOR = inspect.Parameter("monitor", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=Monitor)
 
 
 @contextmanager

@@ -24,7 +24,7 @@ class StudyCommand(TyperCommand):
         assert isinstance(found, TyperCommand)
         return found
 
-    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: bool) -> Any:
         """Return the context in which the installed command is run."""
         if self.installed is self:
             return super().make_context(info_name, args, parent, **extra)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rig.cli.options import Json, keep_existing
-from rig.cli.run_options import of_a_recording, shown, with_run_options
+from rig.cli.run_options import of_a_recording, shown, with_options
 
 if TYPE_CHECKING:
     from rig.arming.run_options import RunOptions
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rig.tuning.tuning import Tuning
 
 
-@with_run_options(of_a_recording)
+@with_options(of_a_recording, monitored=True)
 def tune_(
     *,
     bench: Annotated[str, typer.Option(help="Shipped bench or TOML file.")],

@@ -195,8 +195,8 @@ def _legend(page: "Figure", names: Sequence[str], levels: Sequence[str], found: 
     """Name files, levels and hollow points below the panels."""
     from matplotlib.lines import Line2D
 
-    def entry(look: _Look, text: str, **more: Any) -> Line2D:
-        return Line2D([], [], color=look.colour, marker=look.marker, ls=look.line, label=text, **more)
+    def entry(look: _Look, text: str, fill: str | None = None) -> Line2D:
+        return Line2D([], [], color=look.colour, marker=look.marker, ls=look.line, label=text, mfc=fill)
 
     entries = []
     if len(found) > 1:
@@ -212,6 +212,6 @@ def _legend(page: "Figure", names: Sequence[str], levels: Sequence[str], found: 
     lines = [line for curves in found for trace in curves.traces for line in trace.lines]
     if any(line.folded is not None and line.folded.any() for line in lines):
         entries.append(
-            entry(_Look(REJECTED, "o", ""), "folds back: unstable at a constant level of the force", mfc="white")
+            entry(_Look(REJECTED, "o", ""), "folds back: unstable at a constant level of the force", "white")
         )
     legend_below(page, handles=entries)
