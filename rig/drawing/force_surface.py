@@ -8,8 +8,8 @@ import numpy as np
 from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, IdentificationError
 from identification.response_control import LevelFit
 from rig.drawing.page import grid
-from rig.drawing.steady_curve import UNSTABLE
-from rig.drawing.style import COLOURS, REJECTED, engineering, plain_log, shade, title
+from rig.drawing.steady_curve import UNSTABLE, draw_stability
+from rig.drawing.style import COLOURS, REJECTED, legend_above, length_factor, plain_log, shade, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,8 +42,7 @@ def draw_force_surface(
     """
     columns = 1 if surface is None else 2
     axes = grid(page, 2, columns)
-    unit = engineering(np.concatenate([response.amplitude_m for response in responses]))[1]
-    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    scale, unit = length_factor(np.concatenate([response.amplitude_m for response in responses]))
     levels = sorted({response.level for response in responses})
     for response in responses:
         colour = shade(levels.index(response.level), len(levels))
@@ -54,8 +53,7 @@ def draw_force_surface(
         _fit(axes[0, 0], axes[1, 0], fit, scale, colour)
     axes[0, 0].set(xlabel="frequency, Hz", ylabel=f"receptance, {unit}/N", yscale="log")
     plain_log(axes[0, 0])
-    above = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "alignment": "left"}
-    axes[0, 0].legend(ncols=3, title="displacement held", handlelength=1.0, **above)
+    legend_above(axes[0, 0], 3, "displacement held")
     axes[1, 0].set(xlabel="frequency, Hz", ylabel="phase lag, deg")
     axes[1, 0].axhline(90.0, color=REJECTED, lw=0.8)
     if surface is not None:
@@ -99,14 +97,9 @@ def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> Non
     found = _within(surface)
     for index, curve in enumerate(found):
         response, colour = curve.response, shade(index, len(found))
-        for which, line in ((curve.stable, "-"), (~curve.stable, UNSTABLE)):
-            near = which | np.concatenate([which[1:], [False]])
-            shown = np.where(near, scale * response.amplitude_m, np.nan)
-            axis.plot(
-                response.frequency_hz, shown, ls=line, color=colour, label=response.label if line == "-" else None
-            )
-        ends = [0, -1]
-        axis.plot(response.frequency_hz[ends], scale * response.amplitude_m[ends], "s", color=colour)
+        amplitude = scale * response.amplitude_m
+        draw_stability(axis, response.frequency_hz, amplitude, curve.stable, colour, response.label)
+        axis.plot(response.frequency_hz[[0, -1]], amplitude[[0, -1]], "s", color=colour)
     resonance = surface.at_lag(90.0)
     axis.plot(resonance.frequency_hz, scale * resonance.amplitude_m, "--", color=REJECTED, lw=0.9, label="resonance")
     if any(not curve.stable.all() for curve in found):
@@ -114,15 +107,7 @@ def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> Non
     if found:
         axis.plot([], [], "s", color=REJECTED, label="end of the levels")
     axis.set(xlabel="frequency, Hz", ylabel=f"displacement, {unit}")
-    axis.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=2,
-        borderaxespad=0.2,
-        handlelength=1.0,
-        alignment="left",
-        title="constant force, cut from the surface",
-    )
+    legend_above(axis, 2, "constant force, cut from the surface")
 
 
 def _within(surface: ForceSurface) -> list[ConstantForceCurve]:

@@ -1,8 +1,26 @@
-"""Values at the lines of a spectrum, made fit for drawing."""
+"""Values at the lines of a spectrum, made fit for drawing, and poles of stabilisation diagrams."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identification import StabilisationDiagram
+from rig.drawing.style import MAIN, REJECTED, SECOND
 from vibrolock.arrays import Float
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_poles(axis: "Axes", diagram: StabilisationDiagram, in_frequency: str, in_all: str) -> None:
+    """Draw physical poles over the model order; the names are those of poles stable in frequency alone, and in all."""
+    for which, marker, colour, label in (
+        (~diagram.frequency_stable, ".", REJECTED, "new"),
+        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, in_frequency),
+        (diagram.stable, "o", MAIN, in_all),
+    ):
+        at = which & diagram.physical
+        axis.plot(diagram.frequency_hz[at], diagram.order[at], marker, mfc="none", color=colour, label=label)
 
 
 def pooled(errors: Float, lines: int = 21) -> Float:

@@ -33,7 +33,7 @@ def draw_curve(
         for which, line in ((response.stable[on], "-"), (~response.stable[on], UNSTABLE)):
             if not which.any():
                 continue
-            shown = np.where(_with_neighbours(which), values[on], np.nan)
+            shown = np.where(with_neighbours(which), values[on], np.nan)
             axis.plot(response.frequency_hz[on], shown, ls=line, color=colour, label=label)
             label = None
         beyond = np.where(response.range_use[on] > BEYOND, values[on], np.nan)
@@ -78,6 +78,16 @@ def why_it_ends(response: SteadyPrediction) -> list[str]:
     return list(dict.fromkeys(notes)) or [_EDGE]
 
 
-def _with_neighbours(which: np.ndarray) -> np.ndarray:
+def draw_stability(
+    axis: "Axes", x: np.ndarray, y: np.ndarray, stable: np.ndarray, colour: "ColorType", *names: str
+) -> None:
+    """Draw a curve that may fold: stable parts as a line, unstable parts dotted; ``names`` are those of both in a legend."""
+    axis.plot(x, np.where(with_neighbours(stable), y, np.nan), color=colour, label=names[0] if names else None)
+    if not stable.all():
+        shown = np.where(with_neighbours(~stable), y, np.nan)
+        axis.plot(x, shown, ls=UNSTABLE, color=colour, label=names[1] if len(names) > 1 else None)
+
+
+def with_neighbours(which: np.ndarray) -> np.ndarray:
     """True where a point or the one after it is selected, so that lines meet where stability changes."""
     return np.asarray(which | np.concatenate([which[1:], [False]]))

@@ -195,9 +195,26 @@ def shade(index: int, count: int) -> tuple[float, float, float, float]:
 
 def engineering(amplitude_m: np.ndarray) -> tuple[np.ndarray, str]:
     """Convert amplitudes to millimetres or micrometres, whichever reads better; also return the unit."""
-    if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4:
-        return amplitude_m * 1e6, "µm"
-    return amplitude_m * 1e3, "mm"
+    factor, unit = length_factor(amplitude_m)
+    return factor * amplitude_m, unit
+
+
+def length_factor(amplitude_m: np.ndarray) -> tuple[float, str]:
+    """Return factor and name of the unit, millimetres or micrometres, in which amplitudes read better."""
+    return (1e6, "µm") if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4 else (1e3, "mm")
+
+
+def legend_above(axis: "Axes", columns: int, heading: str | None = None) -> None:
+    """Put the legend above the panel, where it hides nothing."""
+    axis.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        title=heading,
+        handlelength=1.2,
+        borderaxespad=0.2,
+        alignment="left",
+    )
 
 
 def say_why_empty(axis: "Axes", text: str) -> None:

@@ -8,7 +8,7 @@ from identification import FrequencyResponse, pack_frequency_responses, unpack_f
 from identification.common import MOTION_UNIT
 from rig.drawing.curves import DISPLACEMENT, FREQUENCY, LAG, ONE_AMPLITUDE, Curves, Line, Panel, Trace, View
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import REJECTED, engineering, plain_log, shade, title
+from rig.drawing.style import REJECTED, length_factor, plain_log, shade, title
 from rig.results.kind import Exchange, Storage, Table
 from rig.text.column import Column
 from rig.text.console import print_rows
@@ -51,9 +51,7 @@ TABLE = Table(_summarise, _say)
 def draw_responses(page: "Figure", responses: tuple[FrequencyResponse, ...]) -> None:
     """Draw amplitude and phase lag over frequency."""
     top, bottom = grid(page, 2, 1, sharex=True)[:, 0]
-    everything = np.concatenate([response.amplitude_m for response in responses])
-    unit = engineering(everything)[1]
-    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    scale, unit = length_factor(np.concatenate([response.amplitude_m for response in responses]))
     for index, response in enumerate(responses):
         colour = shade(index, len(responses))
         order = np.argsort(response.frequency_hz)

@@ -19,9 +19,10 @@ from identification import (
     Transient,
 )
 from identification.common import MOTION_UNIT
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, shade, title, unit_text
+from rig.drawing.lines import draw_poles
+from rig.drawing.steady_curve import draw_stability
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, length_factor, shade, title, unit_text
 from rig.results.frequency_responses.views import draw_responses
-from rig.results.in_memory.axes import band, branches, length_factor
 from rig.results.predictions.figure import draw_predictions
 from simulators.analysis import PeriodicResponses
 
@@ -63,15 +64,15 @@ def draw_surface(page: "Figure", surface: ForceSurface) -> None:
     title(page, f"{surface.specimen or 'specimen'}: force surface, {len(surface.levels)} levels")
 
 
-def draw_constant_force(page: "Figure", curve: ConstantForceCurve) -> None:
+def draw_curve(page: "Figure", curve: ConstantForceCurve) -> None:
     """Draw amplitude over frequency with its 95 % band, and the lag; unstable parts are dotted."""
     size, lag = page.subplots(1, 2)
     found = curve.response
     factor, unit = length_factor(found.amplitude_m)
     amplitude, half = factor * found.amplitude_m, 1.96 * factor * curve.amplitude_std_m
     size.fill_between(found.frequency_hz, amplitude - half, amplitude + half, color=MAIN, alpha=0.2, lw=0)
-    branches(size, found.frequency_hz, amplitude, curve.stable, label=found.label, color=MAIN)
-    branches(lag, found.frequency_hz, found.phase_lag_deg, curve.stable, label=found.label, color=MAIN)
+    draw_stability(size, found.frequency_hz, amplitude, curve.stable, MAIN, found.label, "unstable")
+    draw_stability(lag, found.frequency_hz, found.phase_lag_deg, curve.stable, MAIN, found.label, "unstable")
     _label(size, lag, unit)
     title(page, f"{found.specimen or 'specimen'}: at constant force, cut from a force surface")
 
@@ -135,7 +136,9 @@ def draw_continuous(page: "Figure", found: ContinuousBackbone) -> None:
         half = 1.96 * 0.5 * np.sqrt(np.sum(std**2, axis=0))
         for way, marker, colour, label in zip(both, "^v", (SECOND, THIRD), ("ramp up", "ramp down"), strict=True):
             axis.plot(x, scale * way, marker + ":", color=colour, label=label)
-        band(axis, x, scale * both.mean(axis=0), scale * half, MAIN, label="mean, 95 % of the noise")
+        mean = scale * both.mean(axis=0)
+        axis.fill_between(x, mean - scale * half, mean + scale * half, color=MAIN, alpha=0.2, lw=0)
+        axis.plot(x, mean, "o-", color=MAIN, label="mean, 95 % of the noise")
         axis.set(xlabel=f"displacement amplitude, {unit}", xscale="log")
     frequency.set(ylabel="modal frequency, Hz")
     damping.set(ylabel="modal damping ratio, %")
@@ -147,10 +150,10 @@ def draw_periodic(page: "Figure", found: PeriodicResponses) -> None:
     """Draw amplitude and lag over the frequency, in the order of the points; unstable parts are dotted."""
     size, lag = page.subplots(1, 2)
     factor, unit = length_factor(found.amplitude_m)
-    stable = found.stable
-    branches(size, found.frequency_hz, factor * found.amplitude_m, stable, label="harmonic balance", color=MAIN)
+    stable = np.ones(found.amplitude_m.size, bool) if found.stable is None else found.stable
+    draw_stability(size, found.frequency_hz, factor * found.amplitude_m, stable, MAIN, "harmonic balance", "unstable")
     displacement_lag = (180.0 + found.phase_lag_deg) % 360.0
-    branches(lag, found.frequency_hz, displacement_lag, stable, label="harmonic balance", color=MAIN)
+    draw_stability(lag, found.frequency_hz, displacement_lag, stable, MAIN, "harmonic balance", "unstable")
     size.set(xlabel="frequency, Hz", ylabel=f"displacement amplitude, {unit}")
     size.legend()
     lag.axhline(90.0, color=REJECTED, lw=0.8)
@@ -187,13 +190,7 @@ def draw_distortion(page: "Figure", levels: DistortionLevels) -> None:
 def draw_stabilisation(page: "Figure", diagram: StabilisationDiagram) -> None:
     """Draw the poles over the order, and the singular values."""
     poles, singular = page.subplots(1, 2, width_ratios=(2.0, 1.0))
-    for which, marker, colour, label in (
-        (~diagram.frequency_stable, ".", REJECTED, "new"),
-        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "frequency stable"),
-        (diagram.stable, "o", MAIN, "frequency, damping and shape stable"),
-    ):
-        at = which & diagram.physical
-        poles.plot(diagram.frequency_hz[at], diagram.order[at], marker, mfc="none", color=colour, label=label)
+    draw_poles(poles, diagram, "frequency stable", "frequency, damping and shape stable")
     poles.set(xlabel="frequency, Hz", ylabel="model order")
     values = diagram.singular_values
     singular.semilogy(np.arange(1, values.size + 1), values / values[0], ".-", color=MAIN)

@@ -8,8 +8,8 @@ import numpy as np
 from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, StabilisationDiagram
 from identification.common import decode, encode
 from rig.drawing.areas import areas
-from rig.drawing.lines import pooled, without_wraps
-from rig.drawing.style import COLOURS, MAIN, REJECTED, SECOND, say_why_empty, shade, title, unit_text
+from rig.drawing.lines import draw_poles, pooled, without_wraps
+from rig.drawing.style import COLOURS, MAIN, REJECTED, legend_above, say_why_empty, shade, title, unit_text
 from rig.results.kind import Exchange, Table
 from rig.text.console import number, print_table
 from rig.text.contents import Contents
@@ -141,18 +141,11 @@ def _stabilisation(
         behind.set_axis_off()
         axis.set_zorder(behind.get_zorder() + 1)
         axis.patch.set_visible(False)
-    kinds = (
-        (~diagram.frequency_stable, ".", REJECTED, "new"),
-        (diagram.frequency_stable & ~diagram.stable, "+", SECOND, "stable in frequency"),
-        (diagram.stable, "o", MAIN, "stable in all"),
-    )
-    for which, marker, colour, label in kinds:
-        at = which & diagram.physical
-        axis.plot(diagram.frequency_hz[at], diagram.order[at], marker, mfc="none", ls="", color=colour, label=label)
+    draw_poles(axis, diagram, "stable in frequency", "stable in all")
     for frequency in modes.frequency_hz:
         axis.axvline(frequency, color=MAIN, lw=0.5, alpha=0.4)
     axis.set(xlabel="frequency, Hz", ylabel="model order", ylim=(0, 1.05 * diagram.orders.max()))
-    _legend_above(axis, 2)
+    legend_above(axis, 2)
 
 
 def _shapes(axis: "Axes", modes: LinearModes) -> None:
@@ -169,7 +162,7 @@ def _shapes(axis: "Axes", modes: LinearModes) -> None:
     axis.axhline(0.0, color=REJECTED, lw=0.8)
     axis.set_xticks(at, [channel.name for channel in modes.channels])
     axis.set_ylabel("shape, kg$^{-1/2}$")
-    _legend_above(axis, min(count, 2))
+    legend_above(axis, min(count, 2))
 
 
 def _mac(axis: "Axes", modes: LinearModes) -> None:
@@ -194,11 +187,6 @@ def _mac(axis: "Axes", modes: LinearModes) -> None:
             fontsize="small" if len(mac) < 9 else "xx-small",
             color=colour,
         )
-
-
-def _legend_above(axis: "Axes", columns: int) -> None:
-    """Put the legend above the panel, where it hides nothing."""
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, handlelength=1.2, borderaxespad=0.2)
 
 
 def _linear_modes(modes: LinearModes) -> Contents:

@@ -7,7 +7,7 @@ import numpy as np
 from identification import Predictions, ResponseBand
 from rig.drawing.areas import areas, broad, is_narrow
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends
-from rig.drawing.style import MARKERS, REJECTED, engineering, shade, title
+from rig.drawing.style import MARKERS, REJECTED, length_factor, shade, title
 from rig.results.predictions.runs_figure import draw_runs
 from rig.results.predictions.sweeps_figure import draw_sweeps, sweeps_shown
 
@@ -69,8 +69,7 @@ def _steady_on(area: Any, predictions: Predictions, *, beside: bool) -> None:
     else:
         size, phase = area.subplots(2, 1, sharex=True, height_ratios=(1.6, 1.0))
     top = max(response.amplitude_m().max() for response in predictions.steady)
-    unit = engineering(np.array([top]))[1]
-    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    scale, unit = length_factor(np.array([top]))
     count = len(predictions.steady)
     for index, response in enumerate(predictions.steady):
         colour, amplitude, lag = shade(index, count), scale * response.amplitude_m(), response.phase_lag_deg()

@@ -7,7 +7,7 @@ import numpy as np
 from identification import Predictions, SweepPrediction, Transient
 from identification.models import as_recorded
 from rig.drawing.areas import broad
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering
+from rig.drawing.style import MAIN, REJECTED, SECOND, length_factor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,8 +61,7 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
     if recorded is not None:
         measured, amplitude, force = as_recorded(sweep, recorded)
         top = max(float(amplitude.max()), float(measured.max()))
-    unit = engineering(np.array([top]))[1]
-    scale = {"mm": 1e3, "µm": 1e6}[unit]
+    scale, unit = length_factor(np.array([top]))
     if recorded is not None:
         wide: dict[str, Any] = {"color": REJECTED, "lw": broad(), "alpha": 0.5}
         axes[0].plot(recorded.frequency_hz, scale * measured, label="recorded", **wide)
