@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from rig.arming.checked_scale import CheckedScale
 from rig.bench import Bench
@@ -106,7 +106,12 @@ def memory_of(bench: Bench) -> BenchMemory:
         return BenchMemory(trip=RememberedTrip(now(), text, ""))
 
 
-def remember(bench: Bench, **changes: Any) -> None:
+class _Changes(TypedDict, total=False):
+    check: RememberedCheck | None
+    trip: RememberedTrip | None
+
+
+def remember(bench: Bench, **changes: Unpack[_Changes]) -> None:
     """Replace ``check`` or ``trip`` in the memory; raise `RecordingError` if it cannot be written."""
     path = memory_path(bench)
     memory = replace(memory_of(bench), **changes)

@@ -61,7 +61,6 @@ def doctor(
 
 
 def _examined(daq: str, seconds: float) -> tuple["Bench", "DeviceReport"]:
-    """Return a bench, and what was found of its device."""
     from rig.bench import load_bench
     from rig.loop.doctor import examine_bench
 
@@ -70,7 +69,6 @@ def _examined(daq: str, seconds: float) -> tuple["Bench", "DeviceReport"]:
 
 
 def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], output: Path | None) -> None:
-    """Refuse options that would have no effect."""
     from rig.errors import ConfigurationError
 
     if of_the_matrix and not matrix:
@@ -84,7 +82,6 @@ def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], out
 
 
 def _show(facts: "MachineReport | DeviceReport", json: bool) -> None:
-    """Print what was found of this machine, or of a device."""
     from rig.text.console import print_json
     from vibrolock.printable import printable_strings
 
@@ -108,7 +105,6 @@ def _print(name: str, value: object) -> None:
 
 
 def _print_advice(advice: "Advice") -> None:
-    """Print the recommended settings, each with its reason, what was tried, and lines for the bench file."""
     print("\nrecommended")
     settings: Mapping[str, object] = advice["settings"]
     reasons = advice["reasons"]
@@ -124,7 +120,6 @@ def _print_advice(advice: "Advice") -> None:
 
 
 def _tried(told: "Tried") -> str:
-    """Return one line on settings that were tried."""
     names = ("block", "queue_blocks", "watchdog_s", "sample_rate_hz")
     given: Mapping[str, object] = told
     what = ", ".join(f"{name} {given[name]:g}" for name in names if name in given)

@@ -124,7 +124,6 @@ def _block(bench: "Bench", ready: "Ready") -> int:
 
 
 def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> str:
-    """Return a bench file based on the emulated bench, with block size and driver options for the emulator."""
     from rig.emulator.emulated import driver_options
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench

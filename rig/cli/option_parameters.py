@@ -90,7 +90,6 @@ def _type_of(field: "FieldInfo", option: "Option") -> Any:
 
 
 def _marks(field: "FieldInfo", mark: object) -> bool:
-    """Return whether an alternative of the field's type carries a mark."""
     return any(mark in getattr(one, "__metadata__", ()) for one in get_args(field.annotation))
 
 
@@ -99,7 +98,6 @@ def _shown_default(field: "FieldInfo") -> str | bool:
 
 
 def _range(field: "FieldInfo") -> str:
-    """Return the range of a number as the help shows it."""
     low = next((f"{sign}{bound:g}" for one in field.metadata for sign, bound in _bounds(one)), "")
     return f" [x{low}]" if low else ""
 

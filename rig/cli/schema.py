@@ -93,7 +93,6 @@ def new(
 
 
 def _mapping(files: list[Path], output: Path, format_: str, overwrite: bool) -> None:
-    """Write a proposed mapping; print what is left to be filled in."""
     from rig.authoring.new_files import written
     from rig.errors import ConfigurationError
     from rig.exchange.proposal.proposal import proposed_mapping
@@ -110,7 +109,6 @@ def _mapping(files: list[Path], output: Path, format_: str, overwrite: bool) -> 
 
 
 def _identified(what: str, source: Path, bench: str | None, shaker: str, trust_code: bool) -> "Table":
-    """Return the table of a bench whose specimen is a structured model."""
     from rig.errors import ConfigurationError
     from rig.results.structured.virtual_bench import bench_like, structured_bench, structured_model
 

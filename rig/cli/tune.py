@@ -92,7 +92,6 @@ def tune_(
 
 
 def _rehearsal(found: "Tuning", plan: Path, recording: Path, rehearsed: Path, draws: int) -> "Summary":
-    """Rehearse the plan on twins of what was measured, write its verdict above the plan, and return the summary."""
     from rig.cli.rehearse import Rehearsing
     from rig.rehearsal.report import summary, verdict_in_one_line
     from rig.results.rehearsal.rehearse import Subject, rehearse_into, request_for

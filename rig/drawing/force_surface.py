@@ -84,7 +84,6 @@ def _points(
 
 
 def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: "ColorType") -> None:
-    """Draw the response of a level as fitted by the surface."""
     x = np.linspace(-1.0, 1.0, 81)
     frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)
     stiffness = np.polynomial.polynomial.polyval(x, fit.coefficients)
@@ -130,7 +129,6 @@ def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
 
 
 def _sections(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
-    """Draw the force over displacement at three lags, with one point per level."""
     from matplotlib.ticker import LogLocator
 
     for lag, marker, colour in zip(_SECTIONS_DEG, ("v", "o", "^"), COLOURS, strict=False):

@@ -69,7 +69,6 @@ def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
 
 
 def _draw_lag(axis: "Axes", mode: NonlinearMode) -> None:
-    """Draw the phase lag of the measured points, with its 95 % interval."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
     axis.axhline(90.0, color=REJECTED, lw=0.8)
@@ -81,7 +80,6 @@ def _draw_lag(axis: "Axes", mode: NonlinearMode) -> None:
 
 
 def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
-    """Draw the share of the fundamental in force and motion, with its 95 % interval."""
     order = np.argsort(mode.force_n)
     for name, label, colour, line in (
         ("force_purity", "force", MAIN, "o-"),

@@ -118,7 +118,6 @@ def _responses(source: Recording, view: View) -> Curves:
 
 
 def _broken(line: Line, breaks: np.ndarray) -> Line:
-    """Interrupt a line before some points."""
     folded = None if line.folded is None else np.insert(line.folded, breaks, False)
     return Line(np.insert(line.x, breaks, np.nan), np.insert(line.y, breaks, np.nan), None, folded)
 
@@ -136,7 +135,6 @@ def _points_between(folded: np.ndarray) -> np.ndarray:
 
 
 def _sweeps(source: Recording, view: View) -> Curves:
-    """Fundamentals of the channel and of the force over the frequency of each sweep."""
     view.only("channel", of="sweeps are evaluated at their fundamental")
     points = {point.number: point for point in points_of(source)}
     panels: tuple[Panel, ...] = ()
@@ -155,7 +153,6 @@ def _sweeps(source: Recording, view: View) -> Curves:
 
 
 def _transfer(source: Recording, view: View) -> Curves:
-    """Frequency response from the force to the channel: size and phase."""
     levels = {f"{level:g} V RMS": one for level, one in recorded_response_matrices(source).items()}
     return transfer_curves(levels, view, refused(points_of(source)))
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from identification import IdentificationError
 from rig.campaigns.evaluation.figure import draw_failure
@@ -52,6 +52,14 @@ def plot(
     size_in, draw = drawing_of(sources, lateness=lateness, labels=labels, view=view)
     with page_for(figure, size_in) as page:
         draw(page)
+
+
+class FileOptions(TypedDict, total=False):
+    """How files are drawn."""
+
+    lateness: bool
+    labels: Sequence[str]
+    view: View | None
 
 
 def drawing_of(

@@ -81,7 +81,6 @@ def overlay(
 
 
 def _names(sources: Sequence[Path]) -> list[str]:
-    """Return the names of the files, with their folders if two names are the same."""
     names = [path.stem for path in sources]
     return names if len(set(names)) == len(names) else [str(path.with_suffix("")) for path in sources]
 
@@ -192,7 +191,6 @@ def _axes(axis: "Axes", panel: Panel, view: View, unit: str) -> None:
 
 
 def _legend(page: "Figure", names: Sequence[str], levels: Sequence[str], found: Sequence[Curves], dense: bool) -> None:
-    """Name files, levels and hollow points below the panels."""
     from matplotlib.lines import Line2D
 
     def entry(look: _Look, text: str, fill: str | None = None) -> Line2D:

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 from identification import FrequencyResponse
 from rig.drawing.style import STYLE, page_in
-from rig.figures.files import drawing_of
+from rig.figures.files import FileOptions, drawing_of
 from rig.recording.reader import Recording
 from rig.results.kinds import kind_of_result
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Any) -> "tuple[Axes, ...]":
+def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Unpack[FileOptions]) -> "tuple[Axes, ...]":
     """Draw a result, a file or a run; return the axes of the figure, from the top left to the bottom right.
 
     Parameters
@@ -51,8 +51,7 @@ def plot(thing: Any, *others: Any, page: "Figure | None" = None, **options: Any)
     return tuple(page.axes)
 
 
-def _drawing_of(things: tuple[Any, ...], options: dict[str, Any]) -> tuple[tuple[float, float], Callable[[Any], None]]:
-    """Return the size of the page, inches, and what draws on it."""
+def _drawing_of(things: tuple[Any, ...], options: FileOptions) -> tuple[tuple[float, float], Callable[[Any], None]]:
     files = [found for found in map(_file_of, things) if found is not None]
     if len(files) == len(things):
         return drawing_of(files, **options)
@@ -70,7 +69,6 @@ def _drawing_of(things: tuple[Any, ...], options: dict[str, Any]) -> tuple[tuple
 
 
 def _file_of(thing: Any) -> Path | None:
-    """Return the file of a path, a run or a recording; None for anything else."""
     if isinstance(thing, str | Path):
         return Path(thing)
     recording = getattr(thing, "recording", thing)  # of a run

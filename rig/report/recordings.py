@@ -102,7 +102,6 @@ def _refused(points: Sequence[Point[object]], summary: Mapping[str, Any]) -> lis
 
 
 def _advice(parts: Sequence[Mapping[str, Any]]) -> list[Block]:
-    """Return the most likely cause of each trip and what to do first."""
     return [
         Text(f"{name}: {part[key]}", "bad")
         for part in parts
@@ -149,7 +148,6 @@ def _loop(path: Path, summary: Mapping[str, Any], pictures: Pictures) -> list[Bl
 
 
 def _check(recording: Recording, pictures: Pictures) -> Chapter:
-    """Return the chapter on a check: its verdict, and every test."""
     from rig.check.assessment import assess  # it needs scipy
 
     found = assess(recording)

@@ -49,7 +49,6 @@ def attempts_refused(point: Point[object]) -> list[str]:
 
 
 def _where(attempt: Attempt) -> str:
-    """Return frequency and force of a refused attempt as far as they are known."""
     told = [
         f"{value:.4g} {unit}"
         for value, unit in ((attempt.frequency_hz, "Hz"), (attempt.force_n, "N"))

@@ -69,7 +69,6 @@ def as_text(thing: object) -> str | None:
 
 
 def _blocks(thing: object) -> list[str | PrintedTable] | None:
-    """Return the lines and tables of a result; None if there are none for its type."""
     say = _say_of(thing)
     if say is None:
         return None
@@ -79,7 +78,6 @@ def _blocks(thing: object) -> list[str | PrintedTable] | None:
 
 
 def _say_of(thing: object) -> Callable[[], None] | None:
-    """Return what prints a result; None if there is nothing for its type."""
     recording = getattr(thing, "recording", thing)  # of a run
     if isinstance(recording, Recording):
         return lambda: _say_recording(recording)
@@ -102,7 +100,6 @@ def _say_kept(kind: ResultKind, thing: object) -> None:
 
 
 def _say_recording(recording: Recording) -> None:
-    """Print the points of a recording with their quality, and what concerns all of them."""
     found = printable_strings(summarise_recording(recording))
     ended = found["parts"][-1]["ended"] if found["parts"] else "nothing recorded"
     print(f"{found['kind']} of {found['specimen']} (bench {found['bench']}): {ended or 'cut short'}")
@@ -111,7 +108,6 @@ def _say_recording(recording: Recording) -> None:
 
 
 def _thinned(table: PrintedTable) -> PrintedTable:
-    """Return a table with `_MOST_ROWS` rows at most, the first and the last among them."""
     count = len(table.rows)
     if count <= _MOST_ROWS:
         return table

@@ -114,7 +114,6 @@ def summarise_recording(recording: Recording) -> dict[str, Any]:
 
 
 def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[object]]) -> list[str]:
-    """Return the names of what ended the run early or spoilt points, by which the documentation explains them."""
     failed = [point for point in points if not point.accepted]
     names = [*(end["reason"] for end in ends[-1:]), *(page for point in failed for page in pages_on(point.reason))]
     names += [str(point.quality) for point in failed]
@@ -122,7 +121,6 @@ def _messages(ends: Sequence[Mapping[str, Any]], points: Sequence[Point[object]]
 
 
 def _sensors(channels: Sequence[Mapping[str, Any]], day: str) -> list[dict[str, Any]]:
-    """Return what the bench says of the sensors that have a serial number or a calibration."""
     keys = ("sensor", "serial_number", "sensitivity", "amplifier_gain", "calibrated", "calibration_due", "certificate")
     return [
         {
@@ -165,7 +163,6 @@ def _mode_shape(recording: Recording, points: Sequence[Point[object]], kind: str
 
 
 def _changes(recording: Recording) -> dict[int, list[str]]:
-    """Return the changed keys of the plan, by the number of the part."""
     plans = [plan_from(dict(said.plan), "plan of the recording").model_dump() for said in recording.plans]
     pairs = zip(recording.plans[1:], plans, plans[1:], strict=False)
     return {said.part: changed_keys(before, after) for said, before, after in pairs}

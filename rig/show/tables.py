@@ -47,7 +47,6 @@ def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
 
 
 def _counted(counters: Mapping[str, int]) -> list[str]:
-    """Return what a driver has counted, one line for each counter; frames out of order are one line."""
     order = (OUT_OF_ORDER_FRAMES, REORDERED_BLOCKS, LATE_FRAMES, LATE_BLOCKS)
     out = []
     for name, count in counters.items():
@@ -134,7 +133,6 @@ def print_summary(summary: dict[str, Any]) -> None:
 
 
 def _sensor_line(sensor: Mapping[str, Any]) -> str:
-    """Return make and model, serial number, sensitivity and calibration of a sensor in one line."""
     told = {
         "serial_number": "no. ",
         "calibrated": "calibrated ",
@@ -147,19 +145,16 @@ def _sensor_line(sensor: Mapping[str, Any]) -> str:
 
 
 def _print_advice(part: Mapping[str, Any]) -> None:
-    """After a trip, print the most likely cause and what to do first."""
     if part.get("likely_cause"):
         print(f"  likely cause: {part['likely_cause']}\n  what to do: {part['what_to_do']}")
 
 
 def _print_where_explained(summary: Mapping[str, Any]) -> None:
-    """Print the pages that explain what ended the run or spoilt points."""
     if pages := where_explained(summary["messages"]):
         print(f"  {pages}")
 
 
 def _print_drift(drift: dict[str, Any] | None) -> None:
-    """Print the changes from the first point to its repetition at the end."""
     if drift is None:
         return
     told = [
@@ -170,7 +165,6 @@ def _print_drift(drift: dict[str, Any] | None) -> None:
 
 
 def _print_mode_shape(shape: dict[str, Any] | None) -> None:
-    """Print the mode shape that damping was computed with, and which points were evaluated with another."""
     if shape is None:
         return
     print(shape["text"])

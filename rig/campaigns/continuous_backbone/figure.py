@@ -1,7 +1,7 @@
 """Figure of a continuous backbone: the results of the way up and of the way down, their mean, and its 95 % band."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -161,8 +161,12 @@ def _line(
     scale_m: float,
     values: Sequence[float] | np.ndarray,
     label: str | None,
-    **style: Any,
+    *,
+    marker: str,
+    color: str,
+    ls: str = "-",
+    mfc: str | None = None,
 ) -> None:
     if points:
         x = [scale_m * vibration_of(point).amplitude_m for point in points]
-        axis.plot(x, values, label=label, **style)
+        axis.plot(x, values, label=label, marker=marker, color=color, ls=ls, mfc=mfc)

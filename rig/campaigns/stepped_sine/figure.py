@@ -1,7 +1,7 @@
 """Figure of a stepped-sine test: force, displacement, lag and accelerance over frequency."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from vibrolock.arrays import Float
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.typing import ColorType
 
 
 _JUMP = 1.5  # times the amplitude of the previous point
@@ -39,13 +40,12 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
     micro = max(float(np.max(item.amplitude_m)) for item in responses) < 5e-4
     for number, item in enumerate(responses):
         colour = shade(number, len(responses))
-        style: dict[str, Any] = {"marker": ".", "color": colour}
         label = item.label or f"{item.level:g} {item.level_unit}"
         acceleration = item.amplitude_m * (2.0 * np.pi * item.frequency_hz) ** 2
-        _stepped(force, item, item.force_n, label=label, **style)
-        _stepped(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), **style)
-        _stepped(lag, item, item.phase_lag_deg, **style)
-        _stepped(accelerance, item, acceleration / item.force_n, **style)
+        _stepped(force, item, item.force_n, colour, label)
+        _stepped(amplitude, item, item.amplitude_m * (1e6 if micro else 1e3), colour)
+        _stepped(lag, item, item.phase_lag_deg, colour)
+        _stepped(accelerance, item, acceleration / item.force_n, colour)
     for axis in (force, amplitude, accelerance):
         log_axis(axis)
     for axis in (force, amplitude, lag, accelerance):
@@ -61,13 +61,15 @@ def draw_stepped_sine(page: "Figure", responses: Sequence[FrequencyResponse], *,
     heading(page, title)
 
 
-def _stepped(axis: "Axes", measured: FrequencyResponse, values: Float, **style: Any) -> None:
+def _stepped(
+    axis: "Axes", measured: FrequencyResponse, values: Float, colour: "ColorType", label: str | None = None
+) -> None:
     """Draw points in the order of measurement. Two points between which the amplitude jumps are joined by a dotted line."""
     frequency_hz, amplitude_m = measured.frequency_hz, measured.amplitude_m
     at = jumps(amplitude_m)
-    axis.plot(np.insert(frequency_hz, at, np.nan), np.insert(values, at, np.nan), **style)
+    axis.plot(np.insert(frequency_hz, at, np.nan), np.insert(values, at, np.nan), marker=".", color=colour, label=label)
     for k in at:
-        axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", color=style["color"])
+        axis.plot(frequency_hz[k - 1 : k + 1], values[k - 1 : k + 1], ":", color=colour)
 
 
 def jumps(amplitude_m: Float) -> NDArray[np.intp]:

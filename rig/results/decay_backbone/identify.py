@@ -73,7 +73,6 @@ def _measured(path: Path, options: DecayOptions) -> DecayBackbone:
 
 
 def _record_of(path: Path, point: int | None) -> _Record:
-    """Return one record of time data."""
     from rig.results.simulated.data_files import time_records_in  # loads what recordings need not wait for
 
     found = time_records_in(path)
@@ -90,7 +89,6 @@ def _record_of(path: Path, point: int | None) -> _Record:
 
 
 def _recorded(path: Path, point: int | None) -> _Record:
-    """Return all recorded rows of a point."""
     kind = kind_of(path)
     if kind not in CAMPAIGNS:
         raise RecordingError(f"{path}: holds a {kind}; a decay comes from a recording or from time data")

@@ -109,7 +109,6 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
 
 
 def _on_the_rig(size: "Axes", phase: "Axes", exciter: Exciter) -> None:
-    """Draw force per volt with the structure attached: measured, modelled from the measured motion, and what is left."""
     lines = exciter.lines
     assert lines is not None
     f, measured = lines.frequency_hz, lines.force_per_volt

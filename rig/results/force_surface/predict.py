@@ -70,7 +70,6 @@ def _as_prediction(curve: ConstantForceCurve, measured: MeasuredSurface) -> Stea
 
 
 def _interpolated(curve: ConstantForceCurve) -> tuple[str, ...]:
-    """Return a note on how much the curve changes if every second level is left out."""
     if not np.isfinite(curve.amplitude_change).any():
         return ()
     amplitude = 100.0 * float(np.nanmax(curve.amplitude_change))

@@ -40,7 +40,6 @@ def _summarise(measured: MeasuredSurface) -> dict[str, Any]:
 
 
 def _points_at(responses: Sequence[FrequencyResponse], amplitudes_m: np.ndarray) -> list[int]:
-    """Return the number of measured points of every level."""
     nearest = [int(np.argmin(np.abs(amplitudes_m - response.level))) for response in responses]
     return [
         sum(response.frequency_hz.size for response, at in zip(responses, nearest, strict=True) if at == index)

@@ -131,7 +131,6 @@ def _stabilisation(
     diagram: StabilisationDiagram | None,
     responses: FrequencyResponseMatrix | None,
 ) -> None:
-    """Draw the poles over the model order, with the sum of the responses behind them."""
     if diagram is None:
         say_why_empty(axis, "no stabilisation diagram: modes were given")
         return
@@ -166,7 +165,6 @@ def _shapes(axis: "Axes", modes: LinearModes) -> None:
 
 
 def _mac(axis: "Axes", modes: LinearModes) -> None:
-    """Draw the MAC of every mode with every other mode."""
     unit = modes.shapes / np.linalg.norm(modes.shapes, axis=0)
     mac = (unit.T @ unit) ** 2
     axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")

@@ -53,7 +53,6 @@ def identify(paths: Sequence[Path], options: NonlinearModeOptions, progress: Pro
 
 
 def _mode_of_decay(paths: Sequence[Path], options: NonlinearModeOptions) -> NonlinearMode:
-    """Return one mode of a decay, or of several decays, as a nonlinear mode."""
     if len(options.near) > 1:
         raise ConfigurationError(f"`near`: {len(options.near)} given, a nonlinear mode is one")
     near = next(iter(options.near), None)

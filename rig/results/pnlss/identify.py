@@ -79,7 +79,6 @@ def remark(found: IdentifiedPnlss, path: Path) -> Remark | None:
 
 
 def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
-    """Return what the data mean for the model."""
     first, said = data.training[0], []
     if not data.validation:
         said.append("no data to choose the iterate by: the last one is taken, however it does on other data")
@@ -92,7 +91,6 @@ def _remarks(data: FitData, paths: Sequence[Path]) -> list[str]:
 
 
 def _earlier(path: Path) -> IdentifiedPnlss:
-    """Load the fit to be continued."""
     if not path.exists():
         raise RecordingError(f"{path}: there is nothing to resume; leave `resume` out")
     found: IdentifiedPnlss = load_as(IdentifiedPnlss, path)

@@ -31,7 +31,6 @@ def poles_of(model: PnlssModel) -> list[dict[str, float]]:
 
 
 def _features(features: Features) -> dict[str, Any]:
-    """Count the features of each kind."""
     functions = Counter(features.functions or ("tanh",) * len(features.weights))
     degrees = Counter(int(degree) for degree in features.exponents.sum(axis=1))
     return {
@@ -77,7 +76,6 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
 
 
 def _said(features: dict[str, Any]) -> str:
-    """Describe features in words."""
     parts = [f"{count} of degree {degree}" for degree, count in features["monomials"].items()]
     parts += [f"{count} {name}" for name, count in features["functions"].items()]
     return (", ".join(parts) or "none") + (", bounded" if features["bounded"] else "")
@@ -120,7 +118,6 @@ def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
 
 
 def _history(axis: "Axes", fit: "PnlssFit") -> None:
-    """Draw training and validation error over the iterations, and mark the chosen iteration."""
     from matplotlib.ticker import MaxNLocator
 
     past = fit.history

@@ -49,7 +49,6 @@ def draw_predictions(page: "Figure", predictions: Predictions) -> None:
 
 
 def _areas(page: "Figure", kinds: list[str], sweeps: int, narrow: bool) -> dict[str, Any]:
-    """Give each kind an area: sweeps below, frequency responses and multisines beside one another above them."""
     panels = {"steady": 3, "sweeps": 3 * sweeps + 1, "runs": 2}
     if narrow:
         return dict(zip(kinds, areas(page, [panels[kind] for kind in kinds], [1.0] * len(kinds)), strict=True))
@@ -63,7 +62,6 @@ def _areas(page: "Figure", kinds: list[str], sweeps: int, narrow: bool) -> dict[
 
 
 def _steady_on(area: Any, predictions: Predictions, *, beside: bool) -> None:
-    """Draw amplitude and phase over frequency, with the names of the curves above both."""
     if beside:
         size, phase = area.subplots(1, 2)
     else:
@@ -115,7 +113,6 @@ def _name(predictions: Predictions, index: int) -> str | None:
 
 
 def _measured(index: int, count: int) -> str | None:
-    """Return the name of measured points; of many curves none has one."""
     return "measured" if count == 1 else f"measured, curve {index + 1}" if count <= _MOST_NAMED else None
 
 
@@ -136,7 +133,6 @@ def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, 
 
 
 def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> None:
-    """Draw the drive point's largest identified amplitude if the curves come near it."""
     highest = max(predictions.steady, key=lambda response: float(response.range_use.max()))
     where = int(np.argmax(highest.range_use))
     limit = scale * float(highest.amplitude_m()[where] / highest.range_use[where])
@@ -145,7 +141,6 @@ def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> 
 
 
 def _show_references(size: "Axes", predictions: Predictions) -> None:
-    """If every response has a reference, limit the frequency axis to the range of the references and a small margin."""
     found = [reference.frequency_hz for reference in predictions.steady_references if reference is not None]
     if len(found) == len(predictions.steady):
         every = np.concatenate(found)
@@ -154,7 +149,6 @@ def _show_references(size: "Axes", predictions: Predictions) -> None:
 
 
 def _explain(size: "Axes", predictions: Predictions) -> None:
-    """Add legend entries that explain lines and marks."""
     if not all(response.stable.all() for response in predictions.steady):
         size.plot([], [], ls=UNSTABLE, color=REJECTED, label="unstable")
     if any(response.fold_frequency_hz.size for response in predictions.steady):

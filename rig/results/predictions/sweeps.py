@@ -110,7 +110,6 @@ def strangers(bench: Bench, specimen: str, exciter: Exciter | None, source: str)
 
 
 def _between_crossings(recording: Recording, number: int, which: str) -> HalfPeriods:
-    """Return the force of a recorded sweep between its zero crossings."""
     bench = bench_of_recording(recording)
     column = next(index for index, channel in enumerate(bench.channels) if channel.role == "force")
     force = bridged(point_rows(recording, number))[:, column]

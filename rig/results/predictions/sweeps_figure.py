@@ -54,7 +54,6 @@ def _first(shown: int) -> str:
 
 
 def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
-    """Draw amplitudes over the instantaneous frequency, smoothed like the recording if there is one."""
     sweep, recorded = predictions.sweeps[index], predictions.sweep_references[index]
     amplitude, force = np.abs(sweep.drive_m), np.abs(sweep.force)
     top = float(amplitude.max())
@@ -90,7 +89,6 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
 
 
 def _differences(axis: Any, sweep: SweepPrediction, recorded: Transient) -> None:
-    """Draw the differences of displacement and force amplitudes, in percent of the largest recorded one."""
     measured, amplitude, force = as_recorded(sweep, recorded)
     measured_n = np.abs(recorded.force)
     for predicted, known, colour, line, label in (
@@ -111,7 +109,6 @@ def _origin(origin: str) -> str:
 
 
 def _heading(predictions: Predictions, index: int) -> str:
-    """Return the name of a sweep with its error, or with the part of the identified range that it uses."""
     sweep, error = predictions.sweeps[index], predictions.sweep_errors[index]
     name = sweep.origin.removeprefix("planned ") if error is None else error.name
     if sweep.unbounded_at_s is not None:

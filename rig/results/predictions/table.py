@@ -178,7 +178,6 @@ def _say_multisines(runs: Sequence[dict[str, Any]]) -> None:
 
 
 def _say_planned(runs: Sequence[dict[str, Any]]) -> None:
-    """Print what the outputs reach in multisines that have not been measured."""
     if not runs:
         return
     print("planned multisines: RMS and largest value of the outputs, in their units")

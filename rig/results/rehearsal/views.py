@@ -92,7 +92,6 @@ STORAGE = Storage(_pack, _unpack)
 
 
 def _say(found: dict[str, Any]) -> None:
-    """Print the page; the specimen stands above it."""
     for line in lines(Summary.model_validate(found)):
         print(line)
 

@@ -57,7 +57,6 @@ def channels_of(model: "Simulator") -> str:
 
 
 def _title(found: "SimulatedModel", heading: str, left_out: "Sequence[str]") -> str:
-    """Return what the model is, on which data it is drawn, and what is left out."""
     lines = [heading]
     data, outputs = found.spectra or found.stretch, found.model.outputs
     if data is not None:
@@ -70,23 +69,19 @@ def _title(found: "SimulatedModel", heading: str, left_out: "Sequence[str]") -> 
 
 
 def _drawn(model: "Simulator") -> "Channel":
-    """Return the output that is drawn."""
     return next((channel for channel in model.outputs if channel.role == "drive"), model.outputs[0])
 
 
 def _unit(channel: "Channel") -> str:
-    """Return the unit of a channel; an empty string if it is unknown."""
     return "N" if channel.role == "force" else MOTION_UNIT.get(channel.motion, "") if channel.motion else ""
 
 
 def _with_unit(channel: "Channel") -> str:
-    """Return the name of a channel with its unit, if it is known."""
     unit = _unit(channel)
     return f"{channel.name}, {unit_text(unit)}" if unit else channel.name
 
 
 def _spectra(axis: "Axes", spectra: "ErrorSpectra", channel: "Channel") -> None:
-    """Draw the amplitudes of one output: measured, model, errors of model and linear start, noise."""
     row, f = spectra.outputs.index(channel.name), spectra.frequency_hz
     dots = (
         (spectra.measured, REJECTED, 3.0, "measured"),
@@ -112,12 +107,10 @@ def _spectra(axis: "Axes", spectra: "ErrorSpectra", channel: "Channel") -> None:
 
 
 def _positive(values: np.ndarray) -> np.ndarray:
-    """Replace values that a logarithmic axis cannot show by NaN."""
     return np.where(values > 0.0, values, np.nan)
 
 
 def _stretch(axis: "Axes", stretch: "OutputStretch", channel: "Channel") -> None:
-    """Draw one output over time: measured, model, and the residual."""
     row = stretch.outputs.index(channel.name)
     measured, simulated = stretch.measured[row], stretch.simulated[row]
     axis.plot(stretch.time_s, measured, color=REJECTED, lw=3.0, alpha=0.6, label="measured")
@@ -131,7 +124,6 @@ def _stretch(axis: "Axes", stretch: "OutputStretch", channel: "Channel") -> None
 
 
 def _errors(axis: "Axes", found: "SimulatedModel") -> None:
-    """Draw the largest error of any output over the range used, one mark per experiment."""
     bounded = [run for run in found.runs if run.bounded]
     lost = len(found.runs) - len(bounded)
     if not bounded:

@@ -145,7 +145,6 @@ def _check_alive(experiments: Sequence[Experiment]) -> None:
 def _check_files(
     paths: Sequence[Path], validation: Sequence[Path], what: str, wanted: Sequence[str], *, needs_lines: bool
 ) -> None:
-    """Refuse files of other kinds, of other specimens, and validation files that are also used for training."""
     kinds = {path: kind_of(path) for path in (*paths, *validation)}
     for path, kind in kinds.items():
         if kind not in wanted:
@@ -191,7 +190,6 @@ def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment]
 
 
 def _alike(found: Sequence[Experiment]) -> list[list[Experiment]]:
-    """Group realisations by level and period."""
     alike: dict[tuple[float, int], list[Experiment]] = {}
     for one in found:
         if one.period_samples:

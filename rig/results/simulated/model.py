@@ -27,7 +27,6 @@ from vibrolock.results import Result
 
 
 def _check_parts(_: Arrays, attributes: Attributes) -> None:
-    """Raise `IdentificationError` if a file holds neither a fit nor a model, or no errors by experiment."""
     if not {"fit", "model"} & attributes.keys():
         raise IdentificationError("file of a model: holds neither a fit nor a model")
     if "runs" not in attributes:
@@ -133,7 +132,6 @@ class SimulatedModel(Result):
         return found.on(training, validation, recordings)
 
     def _of(self, recording: str) -> Simulator:
-        """Return the model of a recording, with its shifts if there is scatter."""
         return self.model if self.scatter is None else self.scatter.model_of(cast(Any, self.model), recording)
 
     def on(

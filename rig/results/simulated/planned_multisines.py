@@ -57,7 +57,6 @@ def planned_multisines(
 
 
 def _period_samples(source: str, plan: MultisinePlan, rate_hz: float) -> int:
-    """Number of samples of a period at the model's rate."""
     check_rate(source, plan.highest_hz, rate_hz)
     samples = rate_hz / plan.resolution_hz
     if abs(samples - round(samples)) > 1e-6:

@@ -88,7 +88,6 @@ def predict(path: Path, request: SimulatedPrediction) -> Predictions:
 
 
 def _others(found: SimulatedModel, asked: bool, path: Path) -> Sequence[DrivenModel]:
-    """Return models of fresh runs, or else, if asked for, models that the fit allows."""
     if found.scatter is not None:
         return list(found.scatter.fresh(cast(DrivenModel, found.model), _DRAWS))
     if not asked:
@@ -110,7 +109,6 @@ def _band(others: Sequence[DrivenModel], level: Level, fixed: Fixed) -> Response
 
 
 def _check(request: SimulatedPrediction, model: DrivenModel, path: Path) -> None:
-    """Refuse requests that the model's channels do not allow."""
     steady = bool(request.forces_n or request.voltages_v or request.references)
     swept = bool(request.sweeps or request.planned)
     inputs, outputs = ([channel.role for channel in channels] for channels in (model.inputs, model.outputs))
@@ -148,7 +146,6 @@ def _asked(request: SimulatedPrediction, alone: Sequence[float], measured: Frequ
 
 
 def _default(request: SimulatedPrediction, held: Held) -> tuple[str, ...]:
-    """Return a note on the held force if it was chosen by default."""
     if request.held is not None or held != "pure-sine":
         return ()
     return (

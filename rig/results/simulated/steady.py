@@ -119,7 +119,6 @@ def _point_by_point(model: DrivenModel, fixed: Fixed, held: Held, measured: Freq
 
 
 def _between(begin: tuple[float, float], end: tuple[float, float]) -> list[tuple[float, float]]:
-    """Return frequencies and forces in steps from one point to the next, without the first."""
     return [
         (begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]))
         for share in (np.arange(1, _STEPS + 1) / _STEPS).tolist()
@@ -127,7 +126,6 @@ def _between(begin: tuple[float, float], end: tuple[float, float]) -> list[tuple
 
 
 def _said(points: int, several: int, stable: np.ndarray, range_use: np.ndarray) -> tuple[str, ...]:
-    """Return notes on vibrations that were predicted point by point."""
     missing, unstable = points - stable.size, int(np.count_nonzero(~stable))
     notes = [f"at {missing} of {points} points no vibration was found"] if missing else []
     if several:

@@ -116,7 +116,6 @@ class SimulatedSweepModels:
         return run.outputs[row], channel, run, []
 
     def _outside(self, given: SweepGiven) -> list[str]:
-        """Return a note if the sweep covers frequencies outside the training data."""
         band = self.model.excited_hz if isinstance(self.model, PnlssModel) else None
         if not band or (band[0] * 0.999 <= min(given.frequencies_hz) and max(given.frequencies_hz) <= band[1] * 1.001):
             return []

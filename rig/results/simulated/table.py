@@ -81,6 +81,5 @@ def say_errors(summary: dict[str, Any]) -> None:
 
 
 def _error(run: dict[str, Any], before: dict[str, Any] | None, name: str) -> str:
-    """Return one error of the model, with the error of the linear start in brackets."""
     own = "unbounded" if run["unbounded"] else number(run["errors"][name], ".3f", 100.0)
     return own if before is None else f"{own} ({number(before['errors'][name], '.2f', 100.0)})"

@@ -60,7 +60,6 @@ def identify(
 
 
 def _modes_in(path: Path) -> LinearModes:
-    """Load linear modes; if there are none, say how to make them."""
     if not path.exists() or (kind := kind_of(path)) != "linear-modes":
         what = f"is a file of kind {kind}" if path.exists() else "does not exist"
         raise RecordingError(f"{path}: {what}, wanted are {MODES_OF_A_STRUCTURE}")

@@ -68,7 +68,6 @@ def _differ(one: _Modes, other: _Modes) -> bool:
 
 
 def _element(element: NonlinearElement) -> dict[str, Any]:
-    """Describe an element in numbers."""
     return {
         "direction": element.direction.tolist(),
         "scale_m": element.scale_m,
@@ -152,7 +151,6 @@ def _say(summary: dict[str, Any]) -> None:
 
 
 def _say_trials(trials: list[dict[str, Any]]) -> None:
-    """Say what further elements brought on the validation data."""
     for trial in (trial for trial in trials if np.isfinite(trial["gain"])):
         sure = f", {trial['at_least']:.3g} at least (95 %)" if np.isfinite(trial["at_least"]) else ", one experiment"
         what = "kept" if trial["kept"] else "left out"

@@ -109,7 +109,6 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
 
 
 def _structure(model: StructuredModel, directions: dict[str, Float]) -> Table:
-    """Return the modes at the places of outputs and elements, with a free mode for what lies below the band."""
     order = np.argsort(model.frequency_hz, kind="stable")
     shapes = {c.name: model.output_shapes[row, order] for row, c in enumerate(model.outputs)}
     shapes |= {name: direction[order] for name, direction in directions.items()}
@@ -158,7 +157,6 @@ def _drive_of(model: StructuredModel) -> str:
 
 
 def _channels(model: StructuredModel, like: Bench) -> list[Channel]:
-    """Return the force channel and one channel per output, with the numbers of the bench's sensors."""
     known = {channel.name: channel for channel in like.channels if channel.role in ("drive", "response")}
     usual = like.channels[like.index_of("drive")]
     out = [_virtual(like.channels[like.index_of("force")])]
@@ -177,7 +175,6 @@ def _virtual(channel: Channel) -> Channel:
 
 
 def _sensor(channel: Channel) -> Table:
-    """Return the virtual sensor on a channel."""
     same = ("name", "sensitivity_v_per_unit", "range_v", "noise_rms", "high_pass_hz")
     of_force = channel.role == "force"
     place = {} if of_force else {"at": channel.name}
@@ -216,7 +213,6 @@ _DEVICE = ("queue_blocks", "delay_samples", "faults")
 
 
 def _nonlinear(model: StructuredModel, points: list[str]) -> Table:
-    """Return elements and friction joints at the points of the model's elements."""
     tables = model.system.tables
     elements: list[Table] = []
     friction: list[Table] = []
@@ -289,7 +285,6 @@ def _description(model: StructuredModel, like: Bench) -> str:
 
 
 def _with_modes(bench: Bench, model: StructuredModel) -> Table:
-    """Return the table of a bench with frequency and shapes of the tested mode of its virtual rig."""
     rig = VirtualDAQ(bench).rig
     modes = rig.linear_modes
     mode = modes.nearest(bench.specimen.linear_frequency_hz)

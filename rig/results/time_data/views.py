@@ -124,7 +124,6 @@ def draw_time_data(page: "Figure", data: TimeRecords) -> None:
 
 
 def _spread(count: int, most: int) -> list[int]:
-    """Return at most ``most`` numbers below ``count``, with the first and the last."""
     return sorted({round(at) for at in np.linspace(0, count - 1, min(count, most))})
 
 
