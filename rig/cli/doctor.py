@@ -10,7 +10,6 @@ from rig.cli.options import Json
 from rig.system.studies import load_study
 
 if TYPE_CHECKING:
-    from rig.bench import Bench
     from rig.loop.doctor import MachineReport
     from rig.loop.worker.probe import Advice, DeviceReport, Tried
 
@@ -48,24 +47,18 @@ def doctor(
 
     With --daq it also recommends block, queue, watchdog and the largest sample rate, and says whether they held when tried.
     """
-    from rig.loop.doctor import examine
+    from rig.bench import load_bench
+    from rig.loop.doctor import examine, examine_bench
 
     _check_options(daq, matrix, [*(others or ()), *(firmware or ()), *([Path("--verify")] if verify else ())], output)
-    device = None if daq is None else _examined(daq, seconds)
+    bench = None if daq is None else load_bench(daq)
+    device = None if bench is None else (bench, examine_bench(bench, seconds=seconds))
     if matrix:
         load_study("matrix", "--matrix").compare(device, others or [], firmware or [], verify, output, json)
         return
     if device is not None and output is not None:
         load_study("matrix", "-o").write_device(device, output)
     _show(device[1] if device else examine(Path.cwd()), json)
-
-
-def _examined(daq: str, seconds: float) -> tuple["Bench", "DeviceReport"]:
-    from rig.bench import load_bench
-    from rig.loop.doctor import examine_bench
-
-    bench = load_bench(daq)
-    return bench, examine_bench(bench, seconds=seconds)
 
 
 def _check_options(daq: str | None, matrix: bool, of_the_matrix: list[Path], output: Path | None) -> None:
@@ -90,18 +83,15 @@ def _show(facts: "MachineReport | DeviceReport", json: bool) -> None:
     else:
         advice = facts.get("recommendation")
         for name, value in printable_strings({**facts}).items():
-            if name != "recommendation":
-                _print(name, value)
+            if name == "recommendation":
+                continue
+            text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
+            text = "; ".join(value) or "none" if isinstance(value, list) else text
+            print(f"{name.replace('_', ' '):22} {text}")
         if advice is not None:
             _print_advice(printable_strings(advice))
     if facts.get("failure"):
         raise typer.Exit(1)
-
-
-def _print(name: str, value: object) -> None:
-    text = ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, dict) else value
-    text = "; ".join(value) or "none" if isinstance(value, list) else text
-    print(f"{name.replace('_', ' '):22} {text}")
 
 
 def _print_advice(advice: "Advice") -> None:

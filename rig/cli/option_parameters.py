@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _UNIT = re.compile(r"_(hz|s|n_m|ohm)$")
 """Unit at the end of a field, which the option does not have."""
+_BOUNDS = ((">=", "ge"), (">", "gt"))
+"""Signs of lower bounds, with their names at a field."""
 
 
 def parameters_of(models: Iterable["type[Options]"]) -> list[inspect.Parameter]:
@@ -55,12 +57,14 @@ def _parameter(name: str, field: "FieldInfo", text: str) -> inspect.Parameter:
     flag = option.flag or f"--{_UNIT.sub('', name).replace('_', '-')}"
     if kind is bool and field.default is True:
         name, flag, text = f"no_{name}", f"--no-{flag[2:]}", option.help
+    bounds = [f"{sign}{getattr(one, name):g}" for one in field.metadata for sign, name in _BOUNDS if hasattr(one, name)]
+    shown = str(field.default) if field.default not in (None, (), False, True) else False
     default = typer.Option(
         False if kind is bool else None,
         flag,
-        help=" ".join(text.split()) + _range(field),
+        help=" ".join(text.split()) + (f" [x{bounds[0]}]" if bounds else ""),
         metavar=option.metavar or None,
-        show_default=option.default or _shown_default(field),
+        show_default=option.default or shown,
     )
     hint = bool if kind is bool else kind | None
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
@@ -81,26 +85,10 @@ def _type_of(field: "FieldInfo", option: "Option") -> Any:
     if get_origin(hint) is not tuple:
         return hint
     inner = get_args(hint)
-    if Listed in field.metadata or _marks(field, Listed):
+    inside = (mark for one in get_args(field.annotation) for mark in getattr(one, "__metadata__", ()))
+    if Listed in (*field.metadata, *inside):
         return str
     if inner[-1] is not Ellipsis:
         return hint
     item = get_args(inner[0])[0] if get_origin(inner[0]) is Annotated else inner[0]
     return list.__class_getitem__(item)
-
-
-def _marks(field: "FieldInfo", mark: object) -> bool:
-    return any(mark in getattr(one, "__metadata__", ()) for one in get_args(field.annotation))
-
-
-def _shown_default(field: "FieldInfo") -> str | bool:
-    return str(field.default) if field.default not in (None, (), False, True) else False
-
-
-def _range(field: "FieldInfo") -> str:
-    low = next((f"{sign}{bound:g}" for one in field.metadata for sign, bound in _bounds(one)), "")
-    return f" [x{low}]" if low else ""
-
-
-def _bounds(mark: object) -> list[tuple[str, float]]:
-    return [(sign, getattr(mark, name)) for sign, name in ((">=", "ge"), (">", "gt")) if hasattr(mark, name)]

@@ -14,7 +14,6 @@ from rig.drawing.style import COLOURS, REJECTED, legend_above, length_factor, pl
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.typing import ColorType
 
 _CURVES = 4
 _SECTIONS_DEG = (30.0, 90.0, 150.0)
@@ -46,11 +45,16 @@ def draw_force_surface(
     levels = sorted({response.level for response in responses})
     for response in responses:
         colour = shade(levels.index(response.level), len(levels))
-        _points(axes[0, 0], axes[1, 0], response, scale, colour, _name(response, levels, scale, unit))
+        named = len(levels) <= _MOST_NAMED or response.level in (levels[0], levels[-1])
+        name = f"{scale * response.level:.4g} {unit}" if named else None
+        receptance = scale * response.amplitude_m / response.force_n
+        axes[0, 0].plot(response.frequency_hz, receptance, ".", color=colour, label=name)
+        axes[1, 0].plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour)
     fits = () if surface is None else surface.levels
     for index, fit in enumerate(fits):
-        colour = shade(index, len(fits))
-        _fit(axes[0, 0], axes[1, 0], fit, scale, colour)
+        frequency_hz, stiffness = fitted_stiffness(fit)
+        axes[0, 0].plot(frequency_hz, scale / np.abs(stiffness), color=shade(index, len(fits)), lw=0.9)
+        axes[1, 0].plot(frequency_hz, np.degrees(np.angle(stiffness)), color=shade(index, len(fits)), lw=0.9)
     axes[0, 0].set(xlabel="frequency, Hz", ylabel=f"receptance, {unit}/N", yscale="log")
     plain_log(axes[0, 0])
     legend_above(axes[0, 0], 3, "displacement held")
@@ -68,27 +72,10 @@ def draw_measured_surface(page: "Figure", measured: MeasuredSurface) -> None:
     draw_force_surface(page, measured.responses, measured.surface)
 
 
-def _name(response: FrequencyResponse, levels: list[float], scale: float, unit: str) -> str | None:
-    """Return the name of a level. Of many levels only the first and the last are named."""
-    if len(levels) > _MOST_NAMED and response.level not in (levels[0], levels[-1]):
-        return None
-    return f"{scale * response.level:.4g} {unit}"
-
-
-def _points(
-    size: "Axes", lag: "Axes", response: FrequencyResponse, scale: float, colour: "ColorType", name: str | None
-) -> None:
-    receptance = scale * response.amplitude_m / response.force_n
-    size.plot(response.frequency_hz, receptance, ".", color=colour, label=name)
-    lag.plot(response.frequency_hz, response.phase_lag_deg, ".", color=colour)
-
-
-def _fit(size: "Axes", lag: "Axes", fit: LevelFit, scale: float, colour: "ColorType") -> None:
+def fitted_stiffness(fit: LevelFit) -> tuple[np.ndarray, np.ndarray]:
+    """Return frequencies, Hz, and complex dynamic stiffness, N/m, of a level as fitted by the surface."""
     x = np.linspace(-1.0, 1.0, 81)
-    frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)
-    stiffness = np.polynomial.polynomial.polyval(x, fit.coefficients)
-    size.plot(frequency_hz, scale / np.abs(stiffness), color=colour, lw=0.9)
-    lag.plot(frequency_hz, np.degrees(np.angle(stiffness)), color=colour, lw=0.9)
+    return (fit.centre + x * fit.half_range) / (2.0 * np.pi), np.polynomial.polynomial.polyval(x, fit.coefficients)
 
 
 def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import NonlinearMode
+from rig.drawing.axes import widen
 from rig.drawing.page import grid
 from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, say_why_empty, title
 
@@ -30,7 +31,9 @@ def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
     axes[1, 0].plot(mode.force_n[order], amplitude[order], "o-", color=MAIN)
     axes[1, 0].set(xlabel="force amplitude (fundamental), N", ylabel=f"displacement, {unit}")
     _harmonics(axes[1, 1], mode)
-    change, shape_text = _change_of_shape(mode)
+    away = 1.0 - mode.mac[np.isfinite(mode.mac)]
+    change = bool(away.size) and away.max() > SHAPE_FLOOR
+    shape_text = f"; shape as the linear one (1 - MAC below {SHAPE_FLOOR:g})" if away.size and not change else ""
     if pure:
         _draw_purity(axes[1, 2], mode)
         if change:
@@ -38,21 +41,8 @@ def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
         else:
             _draw_lag(axes[0, 2], mode)
     count = mode.force_n.size
-    title(
-        page,
-        f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {count} point{'' if count == 1 else 's'}"
-        + shape_text,
-    )
-
-
-def _change_of_shape(mode: NonlinearMode) -> tuple[bool, str]:
-    """Return whether the shape changes by more than sensors can tell, and otherwise a text that says so."""
-    away = 1.0 - mode.mac[np.isfinite(mode.mac)]
-    if not away.size:
-        return False, ""
-    if away.max() > SHAPE_FLOOR:
-        return True, ""
-    return False, f"; shape as the linear one (1 - MAC below {SHAPE_FLOOR:g})"
+    points = f"{count} point{'' if count == 1 else 's'}"
+    title(page, f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {points}{shape_text}")
 
 
 def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
@@ -100,48 +90,30 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
     left.errorbar(amplitude, mode.modal_frequency_hz[order], mode.bound_95("modal_frequency_hz")[order], **error)
     left.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal frequency, Hz")
     if np.isfinite(mode.damping_ratio).any():
-        right.errorbar(
-            amplitude,
-            100 * mode.damping_ratio[order],
-            100 * mode.bound_95("damping_ratio")[order],
-            label="one-mode fit" if mode.source == "stepped sine" else "from the fundamental's power",
-            **error,
-        )
-        if np.isfinite(mode.damping_ratio_total_power).any():
-            right.errorbar(
-                amplitude,
-                100 * mode.damping_ratio_total_power[order],
-                100 * mode.bound_95("damping_ratio_total_power")[order],
-                label="from the power of all harmonics",
-                **{**error, "fmt": "s--", "color": SECOND},
-            )
+        own = "one-mode fit" if mode.source == "stepped sine" else "from the fundamental's power"
+        for name, label, style in (
+            ("damping_ratio", own, error),
+            ("damping_ratio_total_power", "from the power of all harmonics", {"fmt": "s--", "color": SECOND}),
+        ):
+            damping = 100 * getattr(mode, name)[order]
+            if np.isfinite(damping).any():
+                right.errorbar(amplitude, damping, 100 * mode.bound_95(name)[order], label=label, **style)
         right.legend()
     else:
         say_why_empty(right, "damping needs the specimen's drive_mode_shape")
     right.set(xlabel=f"displacement amplitude, {unit}", ylabel="modal damping, %")
-    _keep_small_changes_small(right)
-
-
-def _keep_small_changes_small(axis: "Axes") -> None:
-    """Let the axis span at least a fifth of its middle value, so that scatter does not look like a trend."""
-    low, high = axis.get_ylim()
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.1 * abs(low + high))
-    axis.set_ylim(max(0.0, middle - half), middle + half)
+    widen(right, 0.4)
+    right.set_ylim(bottom=max(0.0, right.get_ylim()[0]))
 
 
 def _harmonics(axis: "Axes", mode: NonlinearMode) -> None:
     order = np.argsort(mode.force_n)
     drawn = False
-    for harmonic, marker in ((2, "^"), (3, "v")):
+    for harmonic, marker, colour in ((2, "^", MAIN), (3, "v", SECOND)):
         if mode.force_harmonics.shape[1] > harmonic and np.isfinite(mode.force_harmonics).any():
             ratio = np.abs(mode.force_harmonics[:, harmonic]) / np.abs(mode.force_harmonics[:, 1])
-            axis.plot(
-                mode.force_n[order],
-                ratio[order],
-                marker + "-",
-                color=MAIN if harmonic == 2 else SECOND,
-                label=f"harmonic {harmonic}, |F{harmonic}|/|F1|",
-            )
+            label = f"harmonic {harmonic}, |F{harmonic}|/|F1|"
+            axis.plot(mode.force_n[order], ratio[order], marker + "-", color=colour, label=label)
             drawn = True
     if drawn:
         axis.set(xlabel="force amplitude (fundamental), N", ylabel="harmonics of force")

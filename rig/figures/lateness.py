@@ -54,8 +54,10 @@ def draw_lateness(page: "Figure", recording: Recording) -> None:
     )
     legend_below(page, beyond)
     overruns = sum(loop["overruns"] for loop in loops)
+    count = int(sum(sum(loop["histograms"]["execution"]["count"]) for loop in loops))
+    pacings = {PACED.get(loop["real_time"]["pacing"], loop["real_time"]["pacing"]) for loop in loops}
     specimen = recording.configuration["bench"]["specimen"]["name"]
-    title(page, f"{specimen}: {sum(map(_blocks, loops))} blocks, {overruns} overruns, {_pacing(loops)}")
+    title(page, f"{specimen}: {count} blocks, {overruns} overruns, {' and '.join(sorted(pacings))}")
 
 
 def together(histograms: Sequence[StoredTable]) -> tuple[np.ndarray, np.ndarray]:
@@ -70,13 +72,3 @@ def exceedance(counts: np.ndarray) -> np.ndarray:
     """Share of all blocks that lie beyond each bin; NaN, which is not drawn, if none does."""
     share = 1.0 - np.cumsum(counts) / counts.sum()
     return np.where(share > 0.5 / counts.sum(), share, np.nan)
-
-
-def _blocks(loop: StoredTable) -> int:
-    return int(sum(loop["histograms"]["execution"]["count"]))
-
-
-def _pacing(loops: Sequence[StoredTable]) -> str:
-    return " and ".join(
-        sorted({PACED.get(pacing, pacing) for pacing in (loop["real_time"]["pacing"] for loop in loops)})
-    )

@@ -12,7 +12,7 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.findings import is_check
-from rig.drawing.style import MAIN, REJECTED, SECOND, title, unit_text
+from rig.drawing.style import COLOURS, MARKERS, REJECTED, title, unit_text
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.report.document import Chapter, Section, Table
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = (MAIN, SECOND, "#009e73", "#e69f00", "#7b3f98", "#56b4e9")
-MARKERS = "os^Dv<>P"
-"""A recording has its own colour and its own marker, so that either suffices."""
 MAX_PANELS = 3  # quantities that are compared; chosen
 _LEVEL = Column("level", "level", "", ".4g")
 
@@ -49,14 +46,11 @@ def comparisons(paths: Sequence[Path], pictures: Pictures) -> list[Chapter]:
     kinds: dict[str, list[Path]] = {}
     for path in paths:
         kind = kind_of(path)
-        if kind not in KINDS and not _of_a_check(path):
-            kinds.setdefault(kind, []).append(path)
+        if kind not in KINDS:
+            with Recording(path) as recording:
+                if not is_check(recording):
+                    kinds.setdefault(kind, []).append(path)
     return [_chapter(kind, some, pictures) for kind, some in kinds.items() if len(some) > 1]
-
-
-def _of_a_check(path: Path) -> bool:
-    with Recording(path) as recording:
-        return is_check(recording)
 
 
 def _chapter(kind: str, paths: Sequence[Path], pictures: Pictures) -> Chapter:

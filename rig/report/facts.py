@@ -14,13 +14,15 @@ def subject_section(recording: Recording) -> Section:
     """Return what was tested, by whom, on which bench, when, and how it ended."""
     bench, plan = recording.configuration["bench"], recording.configuration["plan"]
     abouts = _abouts(recording)
+    devices = [", ".join(f"{key} {value}" for key, value in (about.get("device") or {}).items()) for about in abouts]
+    told = {name: dict.fromkeys(str(about.get(name)) for about in abouts if about.get(name)) for name in About.single()}
     rows = [
         ("specimen", bench["specimen"]["name"]),
-        *((name.replace("_", " "), _each(abouts, name)) for name in About.single()),
+        *((name.replace("_", " "), ", ".join(values)) for name, values in told.items()),
         ("test", recording.kind + (f": {plan['description']}" if plan.get("description") else "")),
         ("bench", bench["name"] + (f": {bench['description']}" if bench.get("description") else "")),
         ("driver", bench["driver"]["name"]),
-        ("device", "; ".join(dict.fromkeys(filter(None, (_device(about) for about in abouts))))),
+        ("device", "; ".join(dict.fromkeys(filter(None, devices)))),
         ("started", recording.started),
         ("ended", "; ".join(endings(recording))),
         ("notes", "; ".join(note for about in abouts for note in about.get("notes") or ())),
@@ -43,7 +45,9 @@ def bench_section(recording: Recording) -> Section:
     bench = recording.configuration["bench"]
     day = recording.started[:10]
     channels = bench["channels"]
-    overdue = frozenset(i for i, one in enumerate(channels) if _overdue(one, day))
+    overdue = frozenset(
+        i for i, one in enumerate(channels) if one.get("calibration_due") and str(one["calibration_due"]) < day
+    )
     sensors = Table(
         "Channels and sensors",
         ("channel", "role", "sensor", "serial number", "sensitivity", "range\nV", "calibrated", "due"),
@@ -55,7 +59,10 @@ def bench_section(recording: Recording) -> Section:
                 str(one.get("serial_number") or "-"),
                 _sensitivity(one),
                 number(one.get("range_v"), "g"),
-                _calibrated(one),
+                (
+                    str(one.get("calibrated") or "") + (f" ({one['certificate']})" if one.get("certificate") else "")
+                ).strip()
+                or "-",
                 str(one.get("calibration_due") or "-") + (" (overdue)" if i in overdue else ""),
             )
             for i, one in enumerate(channels)
@@ -77,11 +84,6 @@ def bench_section(recording: Recording) -> Section:
     return Section("Bench and sensors", blocks)
 
 
-def _calibrated(channel: StoredTable) -> str:
-    certificate = f" ({channel['certificate']})" if channel.get("certificate") else ""
-    return (str(channel.get("calibrated") or "") + certificate).strip() or "-"
-
-
 def _sensitivity(channel: StoredTable) -> str:
     """Return the sensitivity as on the data sheet, or else in mV per unit."""
     if sheet := channel.get("sensitivity"):
@@ -89,10 +91,6 @@ def _sensitivity(channel: StoredTable) -> str:
         return f"{sheet}{gain}" + (", inverted" if channel.get("inverted") else "")
     unit = str(channel["unit"])
     return f"{number(channel['sensitivity_v_per_unit'], '.6g', 1e3)} mV/{f'({unit})' if '/' in unit else unit}"
-
-
-def _overdue(channel: StoredTable, day: str) -> bool:
-    return bool(channel.get("calibration_due")) and str(channel["calibration_due"]) < day
 
 
 def safety_section(recording: Recording) -> Section:
@@ -134,11 +132,3 @@ def files_and_versions(recording: Recording, files: Table) -> Section:
 
 def _abouts(recording: Recording) -> Sequence[StoredAbout]:
     return [part.information.get("about") or {} for part in recording.parts]
-
-
-def _each(abouts: Sequence[StoredAbout], name: str) -> str:
-    return ", ".join(dict.fromkeys(str(value) for about in abouts if (value := about.get(name))))
-
-
-def _device(about: StoredAbout) -> str:
-    return ", ".join(f"{key} {value}" for key, value in (about.get("device") or {}).items())

@@ -35,8 +35,15 @@ def write_report(sources: Sequence[Path], output: Path, title: str = "") -> None
     files = [source for source in sources if not source.is_dir()]
     chapters = comparisons(files, pictures) if len(files) > 1 else []
     for source in sources:
-        chapters += _study(source) if source.is_dir() else [_chapter(source, pictures)]
-    text = _rendered(title or _usual_title(chapters, sources), chapters, sources, output)
+        if source.is_dir():
+            chapters += load_study("report", str(source)).study_chapters(source)
+        else:
+            chapters.append(_chapter(source, pictures))
+    if not title and len(chapters) == 1:
+        title = f"Report: {chapters[0].title}"
+    elif not title:
+        title = f"Report on {sources[0].name}" if len(sources) == 1 else f"Report on {len(sources)} files"
+    text = _rendered(title, chapters, sources, output)
     with whole_file(output) as path:
         path.write_text(text, encoding="utf-8")
 
@@ -47,17 +54,6 @@ def _chapter(path: Path, pictures: Pictures) -> Chapter:
         return model_chapter(path, pictures)
     with understood(path, f"recording of kind {kind}"):
         return recording_chapter(path, pictures)
-
-
-def _study(folder: Path) -> list[Chapter]:
-    found: list[Chapter] = load_study("report", str(folder)).study_chapters(folder)
-    return found
-
-
-def _usual_title(chapters: Sequence[Chapter], sources: Sequence[Path]) -> str:
-    if len(chapters) == 1:
-        return f"Report: {chapters[0].title}"
-    return f"Report on {sources[0].name}" if len(sources) == 1 else f"Report on {len(sources)} files"
 
 
 def _rendered(title: str, chapters: Sequence[Chapter], sources: Sequence[Path], output: Path) -> str:

@@ -64,8 +64,20 @@ class Remark(NamedTuple):
     """Whether it was interrupted."""
 
 
+class _WithOptions:
+    """Has the address of a class of options."""
+
+    options_address: str
+
+    @property
+    def options(self) -> "type[Options]":
+        """Class of its options."""
+        options: type[Options] = resolve_name(self.options_address)
+        return options
+
+
 @dataclass(frozen=True)
-class Identification:
+class Identification(_WithOptions):
     """How such models are identified by ``rig identify``."""
 
     word: str
@@ -76,15 +88,8 @@ class Identification:
     """Address of the class of its options."""
     identify_address: str
     """Address of the function that identifies, ``(paths, options, progress)``."""
-
     remark_address: str = ""
     """Address of the function that returns what the user is told of how it ended, ``(result, path)``; empty: nothing."""
-
-    @property
-    def options(self) -> "type[Options]":
-        """Class of its options."""
-        options: type[Options] = resolve_name(self.options_address)
-        return options
 
     def remark(self, result: object, path: Path) -> "Remark | None":
         """Return what the user is told of how the identification ended."""
@@ -97,7 +102,7 @@ class Identification:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(_WithOptions):
     """How such models predict by ``rig predict``."""
 
     text: str
@@ -106,12 +111,6 @@ class Prediction:
     """Address of the class of its options."""
     predict_address: str
     """Address of the function that predicts with the model in a file, ``(path, options)``."""
-
-    @property
-    def options(self) -> "type[Options]":
-        """Class of its options."""
-        options: type[Options] = resolve_name(self.options_address)
-        return options
 
     def predict(self, model: Path, options: "Options") -> "Predictions":
         """Predict with the model in a file."""

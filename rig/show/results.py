@@ -1,6 +1,7 @@
 """Results in memory as tables: HTML for notebooks, text for terminals. Both show what ``rig show`` prints of such a file."""
 
 from collections.abc import Callable
+from functools import partial
 
 from rig.recording.reader import Recording
 from rig.results.kind import ResultKind
@@ -69,23 +70,20 @@ def as_text(thing: object) -> str | None:
 
 
 def _blocks(thing: object) -> list[str | PrintedTable] | None:
-    say = _say_of(thing)
+    recording = getattr(thing, "recording", thing)  # of a run
+    kind = kind_of_result(thing)
+    say: Callable[[], None] | None
+    if isinstance(recording, Recording):
+        say = partial(_say_recording, recording)
+    elif kind is None:
+        say = getattr(thing, "print_summary", None)  # of an analysis
+    else:
+        say = None if isinstance(thing, tuple) else partial(_say_kept, kind, thing)
     if say is None:
         return None
     with collected() as blocks:
         say()
     return [_thinned(block) if isinstance(block, PrintedTable) else block for block in blocks]
-
-
-def _say_of(thing: object) -> Callable[[], None] | None:
-    recording = getattr(thing, "recording", thing)  # of a run
-    if isinstance(recording, Recording):
-        return lambda: _say_recording(recording)
-    kind = kind_of_result(thing)
-    if kind is None:
-        say: Callable[[], None] | None = getattr(thing, "print_summary", None)  # of an analysis
-        return say
-    return None if isinstance(thing, tuple) else lambda: _say_kept(kind, thing)
 
 
 def _say_kept(kind: ResultKind, thing: object) -> None:

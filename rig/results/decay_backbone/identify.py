@@ -1,7 +1,6 @@
 """Evaluate free decays in recordings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +18,8 @@ from rig.recording.reader import Recording
 from rig.results.decay_backbone.options import DecayOptions
 from rig.results.kind import Progress
 
-
-@dataclass(frozen=True, eq=False)
-class _Record:
-    """Samples float[n_channels, n] in SI units."""
-
-    samples: NDArray[np.float64]
-    channels: tuple[Channel, ...]
-    sample_rate_hz: float
-    specimen: str
+_Record = tuple[NDArray[np.float64], tuple[Channel, ...], float, str]
+"""Samples float[n_channels, n] in SI units, channels, sample rate (Hz), and name of the specimen."""
 
 
 def identify(paths: Sequence[Path], options: DecayOptions, progress: Progress | None = None) -> DecayBackbone:
@@ -40,19 +32,17 @@ def identify(paths: Sequence[Path], options: DecayOptions, progress: Progress | 
         raise ConfigurationError(f"`kind` decay: {len(paths)} files given, allowed is one")
     if kind_of(paths[0]) in kinds_that_yield(DecayBackbone):
         return _measured(paths[0], options)
-    if kind_of(paths[0]) == "time-data":
-        record = _record_of(paths[0], options.point)
-    else:
-        record = _recorded(paths[0], options.point)
+    read = _record_of if kind_of(paths[0]) == "time-data" else _recorded
+    samples, channels, sample_rate_hz, specimen = read(paths[0], options.point)
     return decay_backbone(
-        record.samples,
-        record.channels,
-        sample_rate_hz=record.sample_rate_hz,
+        samples,
+        channels,
+        sample_rate_hz=sample_rate_hz,
         near_hz=options.near or None,
         start_s=options.start_s,
         stop_s=options.stop_s,
         drive_mode_shape=options.drive_mode_shape,
-        specimen=record.specimen,
+        specimen=specimen,
         number=options.levels,
     )
 
@@ -85,7 +75,7 @@ def _record_of(path: Path, point: int | None) -> _Record:
             f"`point` = {point}: {path} has {len(found.records)} records, allowed are their numbers"
         )
     samples = found.records[(point or 1) - 1].samples
-    return _Record(samples, found.channels, found.sample_rate_hz, found.specimen)
+    return samples, found.channels, found.sample_rate_hz, found.specimen
 
 
 def _recorded(path: Path, point: int | None) -> _Record:
@@ -107,4 +97,4 @@ def _recorded(path: Path, point: int | None) -> _Record:
     samples = np.asarray(rows["inputs"].T, np.float64)
     if np.isnan(samples).any():
         raise RecordingError(f"{path}: {point_name(number)}: samples were lost; a decay needs all of them")
-    return _Record(samples, channels_of(bench), bench.sample_rate_hz, bench.specimen.name)
+    return samples, channels_of(bench), bench.sample_rate_hz, bench.specimen.name

@@ -19,6 +19,7 @@ from identification import (
     Transient,
 )
 from identification.common import MOTION_UNIT
+from rig.drawing.force_surface import fitted_stiffness
 from rig.drawing.lines import draw_poles
 from rig.drawing.steady_curve import draw_stability
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, length_factor, shade, title, unit_text
@@ -44,14 +45,12 @@ def draw_response(page: "Figure", response: FrequencyResponse) -> None:
 def draw_surface(page: "Figure", surface: ForceSurface) -> None:
     """Draw stiffness and lag of every level as fitted, and the force over the displacement at three lags."""
     size, section = page.subplots(1, 2)
-    x = np.linspace(-1.0, 1.0, 81)
     factor, unit = length_factor(surface.amplitude_m)
     for index, fit in enumerate(surface.levels):
-        stiffness = np.abs(np.polynomial.polynomial.polyval(x, fit.coefficients))
+        frequency_hz, stiffness = fitted_stiffness(fit)
         named = index in (0, len(surface.levels) - 1)
         label = f"{factor * fit.amplitude_m:.3g} {unit}" if named else None
-        frequency_hz = (fit.centre + x * fit.half_range) / (2.0 * np.pi)
-        size.plot(frequency_hz, factor / stiffness, color=shade(index, len(surface.levels)), label=label)
+        size.plot(frequency_hz, factor / np.abs(stiffness), color=shade(index, len(surface.levels)), label=label)
     size.set(xlabel=_FREQUENCY, ylabel=f"receptance, {unit}/N")
     size.legend(title="displacement held")
     for index, lag in enumerate(_LAGS_DEG):

@@ -11,7 +11,7 @@ from rig.drawing.style import MAIN, REJECTED, SECOND, plain_log
 from rig.results.kind import Table
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.simulated.figure import channels_of, draw_simulated
-from rig.results.simulated.table import errors_in, say_errors, say_scatter, scatter_in
+from rig.results.simulated.table import say_errors, say_scatter, summary_of
 from rig.text.console import number
 
 if TYPE_CHECKING:
@@ -44,11 +44,8 @@ def _features(features: Features) -> dict[str, Any]:
 def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
     model, fit = found.model, found.fit
     return {
-        "specimen": model.specimen,
+        **summary_of(found, model),
         "states": model.states,
-        "inputs": [channel.name for channel in model.inputs],
-        "outputs": [channel.name for channel in model.outputs],
-        "sample_rate_hz": model.sample_rate_hz,
         "state_features": _features(model.state_features),
         "output_features": _features(model.output_features),
         "nonlinear_coefficients": model.nonlinear_coefficients,
@@ -65,12 +62,8 @@ def _summarise(found: IdentifiedPnlss) -> dict[str, Any]:
             "interrupted": fit.interrupted,
             "seconds": float(fit.history.seconds[-1]),
         },
-        "scatter": scatter_in(found),
-        **errors_in(found),
-        "training": list(model.training),
         "state_range": model.state_range.tolist(),
         "input_range": model.input_range.tolist(),
-        "seconds": found.seconds,
         "notes": list(dict.fromkeys([*found.notes, *model.notes])),
     }
 

@@ -72,12 +72,8 @@ def _drawn(model: "Simulator") -> "Channel":
     return next((channel for channel in model.outputs if channel.role == "drive"), model.outputs[0])
 
 
-def _unit(channel: "Channel") -> str:
-    return "N" if channel.role == "force" else MOTION_UNIT.get(channel.motion, "") if channel.motion else ""
-
-
 def _with_unit(channel: "Channel") -> str:
-    unit = _unit(channel)
+    unit = "N" if channel.role == "force" else MOTION_UNIT.get(channel.motion, "") if channel.motion else ""
     return f"{channel.name}, {unit_text(unit)}" if unit else channel.name
 
 

@@ -98,28 +98,30 @@ def fit_data(
     held = options.hold_out if options.hold_out is not None else (0 if options.validation else 1)
     training: list[Experiment] = []
     validation: list[Experiment] = []
-    of_training: list[str] = []
-    of_validation: list[str] = []
+    recordings: dict[int, str] = {}
     notes: list[str] = []
     most = 0
     for path in paths:
         found, missing = experiments_in(path, rate_hz, inputs, outputs)
+        recordings |= {id(one): str(path) for one in found}
         notes += missing
         most = max(most, *(len(same) for same in _alike(found)), 0)
         kept, out = _held_out(found, held)
-        training, of_training = training + kept, of_training + [str(path)] * len(kept)
-        validation, of_validation = validation + out, of_validation + [str(path)] * len(out)
+        training += kept
+        validation += out
     if options.hold_out is not None and options.hold_out >= max(most, 2):
         raise ConfigurationError(
             f"`hold_out` = {options.hold_out}: no level has more than {most} realisations; allowed is 0 to {max(most - 1, 1)}"
         )
     for path in options.validation:
         found, _ = experiments_in(path, rate_hz, inputs, outputs)
-        validation, of_validation = validation + list(found), of_validation + [str(path)] * len(found)
+        recordings |= {id(one): str(path) for one in found}
+        validation += found
     _check_alive([*training, *validation])
+    runs = tuple(recordings[id(one)] for one in (*training, *validation))
     if options.relative:
         training, validation = list(_relative(training)), list(_relative(validation) if validation else ())
-    return FitData(tuple(training), tuple(validation), (*of_training, *of_validation), tuple(notes))
+    return FitData(tuple(training), tuple(validation), runs, tuple(notes))
 
 
 def fitted(fit: Callable[..., Fit], data: FitData, scatter: Sequence[RunEffect]) -> tuple[Fit, RunScatter | None]:

@@ -24,36 +24,24 @@ def simulated_multisines(
     ``specimen``: that of the model. ``constants``: inputs that are no channels of the recordings, with their values.
     Raises `RecordingError` for recordings that are no multisines.
     """
+    model, uses = identified.model, identified.uses
     runs: list[SimulatedRun] = []
     notes: list[str] = []
     for path in paths:
-        more, said = _of_one(path, identified, specimen, constants)
-        runs += more
-        notes += said
+        with Recording(path) as recording:
+            if recording.kind not in kinds_that_yield(PeriodicSpectra):
+                raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
+            found = experiments(
+                recording,
+                inputs=[channel.name for channel in driving(model.inputs, constants)],
+                outputs=[channel.name for channel in model.outputs],
+                rate_hz=model.sample_rate_hz,
+            )
+            notes += strangers(bench_of_recording(recording), specimen, None, str(path))
+            notes += points_left_out(recording)
+        for one in found:
+            whole = with_constants(one, model, constants)
+            runs.append(simulated_run(model, whole, use=uses.get(fingerprint(whole), "test" if uses else "unknown")))
+        if not uses:
+            notes.append("the model does not say what it was identified with: these may be its training data")
     return tuple(runs), tuple(notes)
-
-
-def _of_one(
-    path: Path, identified: SimulatedModel, specimen: str, constants: Mapping[str, float]
-) -> tuple[list[SimulatedRun], tuple[str, ...]]:
-    model = identified.model
-    with Recording(path) as recording:
-        if recording.kind not in kinds_that_yield(PeriodicSpectra):
-            raise RecordingError(f"{path}: holds a {recording.kind}, wanted is a multisine recording")
-        found = experiments(
-            recording,
-            inputs=[channel.name for channel in driving(model.inputs, constants)],
-            outputs=[channel.name for channel in model.outputs],
-            rate_hz=model.sample_rate_hz,
-        )
-        notes = (
-            *strangers(bench_of_recording(recording), specimen, None, str(path)),
-            *points_left_out(recording),
-        )
-    uses = identified.uses
-    other = "test" if uses else "unknown"
-    whole = [with_constants(one, model, constants) for one in found]
-    runs = [simulated_run(model, one, use=uses.get(fingerprint(one), other)) for one in whole]
-    if not uses:
-        notes = (*notes, "the model does not say what it was identified with: these may be its training data")
-    return runs, notes

@@ -3,13 +3,10 @@
 from typing import Any
 
 from identification import RunScatter
+from rig.results.simulated.driven_models import DrivenModel
 from rig.results.simulated.model import SimulatedModel
-from rig.text.console import number, print_table
-
-
-def scatter_in(found: SimulatedModel) -> list[dict[str, Any]] | None:
-    """Return the widths of the scatter as ``rig show --json`` prints them."""
-    return None if found.scatter is None else rows_of_scatter(found.scatter)
+from rig.text.column import Column
+from rig.text.console import number, print_rows, print_table
 
 
 def rows_of_scatter(of: RunScatter) -> list[dict[str, Any]]:
@@ -36,27 +33,30 @@ def say_scatter(rows: list[dict[str, Any]] | None) -> None:
         f"shifts from run to run, {rows[0]['recordings']} runs; the model is that of a run in the middle, errors are those "
         "with each run's shifts"
     )
-    print_table(
-        ("shift of", "standard deviation %", "95 % interval", "+- of the middle %"),
-        [
-            (
-                row["effect"],
-                number(row["width"], ".3g", 100.0),
-                f"{number(row['width_low'], '.3g', 100.0)} to {number(row['width_high'], '.3g', 100.0)}",
-                number(row["mean_std"], ".2g", 196.0),
-            )
-            for row in rows
-        ],
+    ends = [[number(row[end], ".3g", 100.0) for end in ("width_low", "width_high")] for row in rows]
+    print_rows(
+        [{**row, "interval": " to ".join(pair)} for row, pair in zip(rows, ends, strict=True)],
+        Column("effect", "shift of"),
+        Column("width", "standard deviation", "%", ".3g", 100.0),
+        Column("interval", "95 % interval"),
+        Column("mean_std", "+- of the middle", "%", ".2g", 196.0),
     )
     if not rows[0]["settled"]:
         print("the shifts had not settled when the fit ended")
 
 
-def errors_in(found: SimulatedModel) -> dict[str, Any]:
-    """Return the errors as ``rig show --json`` prints them."""
+def summary_of(found: SimulatedModel, model: DrivenModel) -> dict[str, Any]:
+    """Return what ``rig show --json`` prints of every such model: channels, rate, scatter and errors."""
     return {
+        "specimen": model.specimen,
+        "inputs": [channel.name for channel in model.inputs],
+        "outputs": [channel.name for channel in model.outputs],
+        "sample_rate_hz": model.sample_rate_hz,
+        "scatter": None if found.scatter is None else rows_of_scatter(found.scatter),
         "errors": [run.row() for run in found.runs],
         "linear_errors": [run.row() for run in found.linear_runs],
+        "training": list(model.training),
+        "seconds": found.seconds,
     }
 
 

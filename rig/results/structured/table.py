@@ -9,10 +9,10 @@ import numpy as np
 from identification import IdentificationError, NonlinearElement, StructuredFit, StructuredModel
 from identification.models import Joint, std_of
 from rig.results.kind import Table
-from rig.results.simulated.table import errors_in, say_errors, say_scatter, scatter_in
+from rig.results.simulated.table import say_errors, say_scatter, summary_of
 from rig.results.structured.model import IdentifiedStructured
 from rig.text.column import Column
-from rig.text.console import number, print_rows, print_table
+from rig.text.console import number, print_rows
 
 _LEAST_SUPPORT_N_M = 1e-3
 """Stiffness of the support below which it counts as none."""
@@ -82,10 +82,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
     model, fit = found.model, found.fit
     fitted, at_rest = _linear_part(model, fit), _small_vibrations(found)
     return {
-        "specimen": model.specimen,
-        "inputs": [channel.name for channel in model.inputs],
-        "outputs": [channel.name for channel in model.outputs],
-        "sample_rate_hz": model.sample_rate_hz,
+        **summary_of(found, model),
         "steps": model.steps,
         "modes": at_rest,
         "linear_part": None if at_rest is not None and not _differ(fitted, at_rest) else fitted,
@@ -102,14 +99,7 @@ def _summarise(found: IdentifiedStructured) -> dict[str, Any]:
             "seconds": fit.seconds,
             "trials": [asdict(trial) for trial in fit.trials],
         },
-        "scatter": scatter_in(found),
-        **errors_in(found),
-        "training": list(model.training),
-        "seconds": found.seconds,
-        "notes": [
-            *found.notes,
-            *(f"names a function, {one}: simulations import it" for one in found.functions),
-        ],
+        "notes": [*found.notes, *(f"names a function, {one}: simulations import it" for one in found.functions)],
     }
 
 
@@ -130,18 +120,21 @@ def _say(summary: dict[str, Any]) -> None:
         _say_modes(summary["linear_part"])
     print("elements")
     modes = len(summary["modes"] or summary["linear_part"])
-    print_table(
-        ("element", "laws", "largest mm", "reach mm", *(f"direction {i + 1}" for i in range(modes))),
+    print_rows(
         [
-            (
-                str(index),
-                ", ".join(law["kind"] for law in element["laws"]),
-                number(element["largest_m"], ".4f", 1e3),
-                number(element["reach_m"], ".4f", 1e3),
-                *(number(value, ".4f") for value in element["direction"]),
-            )
+            {
+                **element,
+                "number": index,
+                "named": ", ".join(law["kind"] for law in element["laws"]),
+                **{str(i): value for i, value in enumerate(element["direction"])},
+            }
             for index, element in enumerate(summary["elements"], 1)
         ],
+        Column("number", "element"),
+        Column("named", "laws"),
+        Column("largest_m", "largest", "mm", ".4f", 1e3),
+        Column("reach_m", "reach", "mm", ".4f", 1e3),
+        *(Column(str(i), f"direction {i + 1}", "", ".4f") for i in range(modes)),
     )
     _say_trials([] if summary["fit"] is None else summary["fit"]["trials"])
     if summary["support_n_m"] > _LEAST_SUPPORT_N_M:
