@@ -195,10 +195,12 @@ class Rehearsing:
 def _compare(rehearsal: Path, recording: Path, json: bool) -> None:
     from dataclasses import asdict
 
-    from rig.results.rehearsal.rehearse import compare_with, load_rehearsal
+    from rig.rehearsal.rehearsal import Rehearsal
+    from rig.results.files import load_as
+    from rig.results.rehearsal.rehearse import compare_with
     from rig.text.console import print_json
 
-    found = compare_with(load_rehearsal(rehearsal), recording)
+    found = compare_with(load_as(Rehearsal, rehearsal), recording)
     if json:
         print_json(asdict(found))
         return

@@ -86,9 +86,10 @@ def resume(
 def _with_rehearsal(options: "RunOptions", rehearsal: Path | None, override: str) -> "RunOptions":
     if rehearsal is not None:
         from rig.rehearsal.forecasting import rehearsed_in
-        from rig.results.rehearsal.rehearse import load_rehearsal
+        from rig.rehearsal.rehearsal import Rehearsal
+        from rig.results.files import load_as
 
-        options = replace(options, rehearsal=rehearsed_in(load_rehearsal(rehearsal), str(rehearsal)))
+        options = replace(options, rehearsal=rehearsed_in(load_as(Rehearsal, rehearsal), str(rehearsal)))
     return replace(options, override_rehearsal=override)
 
 

@@ -99,9 +99,7 @@ class Curves:
     """All curves of one file."""
 
     panels: tuple[Panel, ...]
-    """The panels."""
     traces: tuple[Trace, ...]
-    """The curves."""
     specimen: str
     """Name of what was tested."""
     omitted: str = ""

@@ -43,24 +43,10 @@ def overlay(
 ) -> tuple[tuple[float, float], Callable[["Figure"], None]]:
     """Return the size (inches) of the page for the curves of some files, and the function that draws them on an empty page.
 
-    Parameters
-    ----------
-    sources
-        Recordings of one kind, or recordings and models with the same axes: backbones (recorded, continuous, measured
-        elsewhere, a nonlinear mode, or that of a structured model), stepped sines and stepped phase, response-controlled
-        tests, multisines, sweeps.
-    labels
-        Names in the legend, one for each file; none: the names of the files.
-    view
-        Axes, channel and harmonic.
-
-    Raises
-    ------
-    RecordingError
-        If a file cannot be read, the files do not have the same axes, the number of labels is wrong, or a file does not hold
-        what the view asks for.
-    IdentificationError
-        If no point of a file was accepted.
+    The files are recordings of one kind, or recordings and models with the same axes (`rig.figures.curves_of_files`).
+    ``labels`` are names in the legend, by default those of the files. Raises `RecordingError` if a file cannot be read, the
+    files do not have the same axes, the number of labels is wrong, or a file does not hold what the view asks for, and
+    `IdentificationError` if no point of a file was accepted.
     """
     if labels and len(labels) != len(sources):
         raise RecordingError(f"`label`: {len(labels)} for {len(sources)} files; give one for each file, in their order")

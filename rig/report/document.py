@@ -30,7 +30,6 @@ class Text:
 
     kind: ClassVar[str] = "text"
     text: str
-    """Its text."""
     role: str = ""
     """How it is set: ``good``, ``bad``, ``note`` or plain."""
 
@@ -43,7 +42,6 @@ class Facts:
     caption: str
     """What they are; empty if the heading above says it."""
     rows: Sequence[tuple[str, str]]
-    """Name and value."""
     code: bool = False
     """Whether the names are keys of a file."""
     dense: bool = False
@@ -60,7 +58,6 @@ class Table:
     headings: Sequence[str]
     """Of the columns; a line end parts a name from its unit."""
     rows: Sequence[Sequence[str]]
-    """The cells."""
     marked: frozenset[int] = frozenset()
     """Rows that are set off: those of points that are not used, of tests that failed."""
 
@@ -85,7 +82,6 @@ class Picture:
 
     kind: ClassVar[str] = "picture"
     caption: str
-    """What it shows."""
     svg: str = ""
     """The figure as an element of the page."""
     source: str = ""
@@ -100,7 +96,6 @@ class Section:
     """A heading with blocks."""
 
     heading: str
-    """The heading."""
     blocks: list[Block] = field(default_factory=list)
     """What stands below it."""
 
@@ -110,9 +105,7 @@ class Chapter:
     """All that a report says of one file, or of several together."""
 
     title: str
-    """The heading."""
     subtitle: str
-    """The file or files."""
     lead: list[Block]
     """What somebody reads who reads nothing else."""
     sections: list[Section]

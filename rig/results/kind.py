@@ -136,7 +136,7 @@ class ResultKind:
     whole: str = ""
     """Address of the function that makes an object of the first type from one of the others."""
     table: str
-    """Address of its `Table`."""
+    """Address of its `Table`, or of the function that prints a result for which there is no summary."""
     draw: str
     """Address of the function that draws a result on an empty page, ``(page, result)``."""
     figure_in: tuple[float, float] = (9.0, 6.4)
@@ -176,8 +176,8 @@ class ResultKind:
         return Storage(encode, partial(decode, self.types[0]))
 
     def _table(self) -> Table[Any, Any]:
-        table: Table[Any, Any] = resolve_name(self.table)
-        return table
+        found = resolve_name(self.table)
+        return found if isinstance(found, Table) else Table(lambda result: result, found)
 
     def pack(self, result: object) -> "tuple[Arrays, Attributes]":
         """Convert a result to arrays and JSON-able attributes."""

@@ -25,33 +25,22 @@ def unit_of(name: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """The content of one exported object.
-
-    Parameters
-    ----------
-    kind
-        Kind of the object, for example ``nonlinear-mode``.
-    title
-        Description for a person: specimen, point or level.
-    arrays
-        Arrays of the object, by name.
-    attributes
-        Everything else, ready for JSON.
-    rows
-        For every array that belongs in a table: the array's axis along the table's rows.
-    units
-        Units of arrays: one, or several that broadcast to the axes other than the rows. Without an entry `unit_of` applies.
-    labels
-        Names along the axes other than the rows.
-    """
+    """The content of one exported object."""
 
     kind: str
+    """Kind of the object, for example ``nonlinear-mode``."""
     title: str
+    """Description for a person: specimen, point or level."""
     arrays: Mapping[str, Array]
+    """Arrays of the object, by name."""
     attributes: Mapping[str, Any]
+    """Everything else, ready for JSON."""
     rows: Mapping[str, int]
+    """For every array that belongs in a table: the array's axis along the table's rows."""
     units: Mapping[str, str | Array] = field(default_factory=dict)
+    """Units of arrays: one, or several that broadcast to the axes other than the rows. Without an entry `unit_of` applies."""
     labels: Mapping[str, Labels] = field(default_factory=dict)
+    """Names along the axes other than the rows."""
 
     def unit(self, name: str) -> str | Array:
         """Return the unit of an array, or the units of its columns."""

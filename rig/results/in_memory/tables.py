@@ -1,7 +1,6 @@
 """Tables of results that have no file."""
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from identification import (
 )
 from rig.check import report as checks
 from rig.results.in_memory.figures import as_predictions
-from rig.results.kind import Table
 from rig.results.predictions.table import ERRORS, TABLE as PREDICTIONS
 from rig.text.column import Column
 from rig.text.console import number, print_columns, print_rows, print_table
@@ -30,10 +28,12 @@ from rig.tuning.report import lines
 from simulators.analysis import PeriodicResponses
 from vibrolock.printable import printable
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from rig.check.assessment import Assessment
 
 
-def _say_response(found: FrequencyResponse) -> None:
+def say_response(found: FrequencyResponse) -> None:
+    """Print the points of a frequency response."""
     print(f"frequency response of {found.specimen or 'an unnamed specimen'}, {found.label or found.level_unit}")
     print_columns(
         ("frequency Hz", ".4f", found.frequency_hz),
@@ -43,7 +43,8 @@ def _say_response(found: FrequencyResponse) -> None:
     )
 
 
-def _say_surface(found: ForceSurface) -> None:
+def say_surface(found: ForceSurface) -> None:
+    """Print the levels of a force surface at phase resonance."""
     resonance = found.at_lag(90.0)
     print(
         f"force surface of {found.specimen or 'an unnamed specimen'}, {len(found.levels)} levels; at phase resonance:"
@@ -55,7 +56,8 @@ def _say_surface(found: ForceSurface) -> None:
     )
 
 
-def _say_curve(found: ConstantForceCurve) -> None:
+def say_curve(found: ConstantForceCurve) -> None:
+    """Print a curve at constant force with its 95 % intervals."""
     response = found.response
     print(f"{response.label}, cut from a force surface; +- are 95 %")
     columns = (
@@ -71,7 +73,8 @@ def _say_curve(found: ConstantForceCurve) -> None:
     )
 
 
-def _say_continuous(found: ContinuousBackbone) -> None:
+def say_continuous(found: ContinuousBackbone) -> None:
+    """Print modal frequency and damping of both ramps."""
     print(f"continuous backbone of {found.backbone.specimen or 'an unnamed specimen'}, {found.periods:.0f} periods")
     omega = np.sqrt(found.stiffness)
     frequency, damping = omega / (2.0 * np.pi), 50.0 * found.damping_1_s / omega
@@ -84,7 +87,8 @@ def _say_continuous(found: ContinuousBackbone) -> None:
     )
 
 
-def _say_distortion(found: DistortionLevels) -> None:
+def say_distortion(found: DistortionLevels) -> None:
+    """Print distortion over signal of every channel."""
     print(f"distortion of what is driven by {found.input}, over the signal, root mean square of the band")
     names = [channel.name for channel in found.channels]
     print_table(
@@ -96,12 +100,14 @@ def _say_distortion(found: DistortionLevels) -> None:
     )
 
 
-def _say_comparison(found: Comparison) -> None:
+def say_comparison(found: Comparison) -> None:
+    """Print the errors of a prediction."""
     use = Column("range_use", "range use", "", ".2f")
     print_rows([dict(found.error.row())], Column("name", "prediction"), *ERRORS, use, Column("verdict", ""))
 
 
-def _say_band(found: ResponseBand) -> None:
+def say_band(found: ResponseBand) -> None:
+    """Print the uncertainty of a peak."""
     print(f"of {found.draws} draws; +- are 95 %")
     print_columns(
         ("peak +- mm", ".2g", [1.96e3 * found.peak_amplitude_std_m]),
@@ -109,7 +115,8 @@ def _say_band(found: ResponseBand) -> None:
     )
 
 
-def _say_stabilisation(found: StabilisationDiagram) -> None:
+def say_stabilisation(found: StabilisationDiagram) -> None:
+    """Print the stable poles of the highest order."""
     print(
         f"{found.order.size} poles, orders {found.orders.min()} to {found.orders.max()}; stable ones of the last order"
     )
@@ -119,7 +126,8 @@ def _say_stabilisation(found: StabilisationDiagram) -> None:
     )
 
 
-def _say_periodic(found: PeriodicResponses) -> None:
+def say_periodic(found: PeriodicResponses) -> None:
+    """Print vibrations by harmonic balance."""
     print(f"harmonic balance, {found.frequency_hz.size} points")
     print_columns(
         ("force N", ".4f", found.force_n),
@@ -129,7 +137,8 @@ def _say_periodic(found: PeriodicResponses) -> None:
     )
 
 
-def _say_spectra(found: PeriodicSpectra) -> None:
+def say_spectra(found: PeriodicSpectra) -> None:
+    """Print the RMS of every channel."""
     realisations, periods, _, lines = found.spectra.shape
     print(
         f"spectra of {realisations} realisations, {periods} periods each; {found.excited.sum()} of {lines} lines excited"
@@ -140,7 +149,8 @@ def _say_spectra(found: PeriodicSpectra) -> None:
     )
 
 
-def _say_transient(found: Transient) -> None:
+def say_transient(found: Transient) -> None:
+    """Print the extremes of every channel in a sweep."""
     first, last = found.frequency_hz[[0, -1]]
     print(f"fundamentals from {first:.4g} to {last:.4g} Hz in {found.time_s[-1] - found.time_s[0]:.4g} s")
     rows = zip(found.channels, np.abs(found.fundamentals), strict=True)
@@ -153,31 +163,17 @@ def _say_transient(found: Transient) -> None:
     )
 
 
-def _summarise_prediction(found: SteadyPrediction | SweepPrediction) -> dict[str, Any]:
-    return PREDICTIONS.summarise(as_predictions(found))
+def say_prediction(found: SteadyPrediction | SweepPrediction) -> None:
+    """Print a single prediction as a file of predictions is printed."""
+    PREDICTIONS.say(PREDICTIONS.summarise(as_predictions(found)))
 
 
-def _say_tuning(found: Tuning) -> None:
+def say_tuning(found: Tuning) -> None:
+    """Print what was tuned."""
     for line in lines(found):
         print(printable(line))
 
 
-def _table(say: Callable[[T], None]) -> Table[T, T]:
-    """Return the table of a result that is printed without a summary."""
-    return Table(lambda result: result, say)
-
-
-RESPONSE = _table(_say_response)
-SURFACE = _table(_say_surface)
-CURVE = _table(_say_curve)
-BACKBONE = _table(_say_continuous)
-DISTORTION = _table(_say_distortion)
-COMPARISON = _table(_say_comparison)
-BAND = _table(_say_band)
-POLES = _table(_say_stabilisation)
-PERIODIC = _table(_say_periodic)
-SPECTRA = _table(_say_spectra)
-SWEEP = _table(_say_transient)
-PREDICTION = Table(_summarise_prediction, PREDICTIONS.say)
-TUNING = _table(_say_tuning)
-CHECK = Table(checks.summary, checks.print_summary)
+def say_check(found: "Assessment") -> None:
+    """Print the findings of a check."""
+    checks.print_summary(checks.summary(found))

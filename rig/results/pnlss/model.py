@@ -9,18 +9,11 @@ from rig.results.simulated.model import SimulatedModel
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedPnlss(SimulatedModel):
-    """A nonlinear state-space model and its origin.
-
-    Parameters
-    ----------
-    model
-        The model.
-    fit
-        The fit of which the model is the best iterate; None for a model from another source.
-    """
+    """A nonlinear state-space model and its origin."""
 
     model: PnlssModel
     fit: PnlssFit | None = None
+    """The fit of which the model is the best iterate; None for a model from another source."""
 
     @property
     def linear(self) -> PnlssModel | None:

@@ -79,9 +79,8 @@ def _steady_on(area: Any, predictions: Predictions, *, beside: bool) -> None:
             _uncertainty(size, phase, band, scale, colour)
         if measured is not None:
             mark = MARKERS[index % len(MARKERS)]
-            size.plot(
-                measured.frequency_hz, scale * measured.amplitude_m, mark, label=_measured(index, count), **_MARKED
-            )
+            name = "measured" if count == 1 else f"measured, curve {index + 1}" if count <= _MOST_NAMED else None
+            size.plot(measured.frequency_hz, scale * measured.amplitude_m, mark, label=name, **_MARKED)
             phase.plot(measured.frequency_hz, measured.phase_lag_deg % 360.0, mark, **_MARKED)
         else:
             draw_ends(size, response, amplitude, colour)
@@ -110,10 +109,6 @@ def _name(predictions: Predictions, index: int) -> str | None:
         return f"{name}, predicted"
     error_text = f"peak {100 * error.peak_error:+.2g} %" if np.isfinite(error.peak_error) else "no peak"
     return f"{name}, predicted: {error_text}"
-
-
-def _measured(index: int, count: int) -> str | None:
-    return "measured" if count == 1 else f"measured, curve {index + 1}" if count <= _MOST_NAMED else None
 
 
 def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, colour: Any) -> None:

@@ -32,7 +32,6 @@ class SweepModels:
     """Models and options with which sweeps are predicted."""
 
     mode: NonlinearMode
-    """The nonlinear mode."""
     modes: LinearModes | None
     """Linear model with the other modes."""
     exciter: Exciter | None

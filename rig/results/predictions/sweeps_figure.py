@@ -40,17 +40,15 @@ def draw_sweeps(area: Any, predictions: Predictions, shown: int, *, narrow: bool
     for axis in axes.ravel() if narrow else axes[-1]:
         axis.set_xlabel("frequency, Hz")
     count = len(predictions.sweeps)
-    heading = None if count == shown else f"{_first(shown)} of {count} sweeps, for want of room"
+    heading = (
+        None if count == shown else f"the first{f' {shown}' if shown > 1 else ''} of {count} sweeps, for want of room"
+    )
     handles: dict[str, Any] = {}
     for axis in axes.ravel():
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     columns = 1 if narrow else 3
     area.legend(list(handles.values()), list(handles), loc="outside upper left", ncols=columns, title=heading)
-
-
-def _first(shown: int) -> str:
-    return "the first" if shown == 1 else f"the first {shown}"
 
 
 def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
@@ -69,7 +67,8 @@ def _sweep(axes: Any, predictions: Predictions, index: int) -> None:
     elif len(axes) > 2:
         axes[2].set_axis_off()
         axes[2].text(0.5, 0.5, "not recorded", ha="center", color=REJECTED, transform=axes[2].transAxes)
-    axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, label=_origin(sweep.origin))
+    source = "the plan" if sweep.origin.startswith("planned") else sweep.origin
+    axes[0].plot(sweep.frequency_hz, scale * amplitude, color=MAIN, label=f"predicted from {source}")
     axes[1].plot(sweep.frequency_hz, force, color=MAIN)
     if np.isfinite(sweep.largest_identified):
         limit = scale * top / sweep.range_use
@@ -102,10 +101,6 @@ def _differences(axis: Any, sweep: SweepPrediction, recorded: Transient) -> None
     shown = np.abs(axis.get_ylim()).max()
     if shown > 100.0 * _MOST_SHOWN:
         axis.set_ylim(-100.0 * _MOST_SHOWN, 100.0 * _MOST_SHOWN)
-
-
-def _origin(origin: str) -> str:
-    return "predicted from the plan" if origin.startswith("planned") else f"predicted from {origin}"
 
 
 def _heading(predictions: Predictions, index: int) -> str:

@@ -18,7 +18,7 @@ from rig.rehearsal.hypotheses import Hypotheses, load_hypotheses
 from rig.rehearsal.knowledge import collect_knowledge
 from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalRequest, discard_draws, draws_path, rehearse
 from rig.rehearsal.remedies import improve
-from rig.results.files import load, load_as, save
+from rig.results.files import load, save
 from rig.results.kinds import KINDS
 
 FURTHER_SEED = 1
@@ -30,9 +30,7 @@ class Subject:
     """What is to be rehearsed, and on what knowledge."""
 
     plan: Plan
-    """The plan."""
     bench: Bench
-    """The bench."""
     sources: Sequence[Path] = ()
     """Recordings and models that tell of the rig."""
     exact: bool = False
@@ -150,14 +148,6 @@ def twin_into(request: RehearsalRequest, number: int, output: Path) -> dict[str,
     unknowns = [f"{name} = {value:.6g}" for name, value in twin.unknowns.items()]
     write_bench(twin.bench, output, [f"{twin.bench.description}; run it with seed {twin.number}", *unknowns])
     return dict(twin.unknowns)
-
-
-def load_rehearsal(path: Path) -> Rehearsal:
-    """Load a rehearsal; raise `RecordingError` for anything else."""
-    found = load_as(Rehearsal, path)
-    if not isinstance(found, Rehearsal):
-        raise RecordingError(f"{path}: holds no rehearsal")
-    return found
 
 
 def compare_with(rehearsal: Rehearsal, path: Path) -> Comparison:

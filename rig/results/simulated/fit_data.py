@@ -65,27 +65,10 @@ def fit_data(
 ) -> FitData:
     """Return the experiments of all files at one sample rate, split into training and validation data.
 
-    Parameters
-    ----------
-    paths
-        Recordings.
-    options
-        Which of their data to take.
-    what
-        Kind of model, for messages.
-    like
-        Earlier model whose sample rate and channels are used.
-    kinds
-        Kinds of recordings that such a model is fitted to.
-
-    Raises
-    ------
-    RecordingError
-        For files with other contents.
-    ConfigurationError
-        For files and options that do not fit together.
-    identification.IdentificationError
-        If the data does not allow the identification.
+    ``what`` names the kind of model in messages, ``like`` is an earlier model whose sample rate and channels are used, and
+    ``kinds`` are those of recordings that such a model is fitted to. Raises `RecordingError` for files with other contents,
+    `ConfigurationError` for files and options that do not fit together, `identification.IdentificationError` if the data does
+    not allow the identification.
     """
     _check_files(paths, options.validation, what, kinds, needs_lines=like is None)
     inputs, outputs = options.inputs, options.outputs

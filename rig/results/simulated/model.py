@@ -36,40 +36,27 @@ def _check_parts(_: Arrays, attributes: Attributes) -> None:
 @stored(shared={"model": "fit"}, upgrade=_check_parts)
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SimulatedModel(Result):
-    """A model with its errors on the data with which it was identified.
-
-    Parameters
-    ----------
-    model
-        The model.
-    runs, linear_runs
-        Every experiment as simulated by the model, and by the linear start; the latter may be empty.
-    spectra
-        Spectra of one periodic experiment, of validation data if there is any; None if there is no periodic experiment.
-    stretch
-        A short stretch of one experiment over time, of validation data if there is any; None if it was not kept.
-    seconds
-        Wall time of the identification; NaN if unknown.
-    notes
-        Remarks on the data for the user, one line each.
-    data
-        Fingerprint that identifies the data of the fit; empty if unknown.
-    uses
-        ``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown.
-    scatter
-        Shifts of the model from run to run; None if it has none. Then ``model`` is that of a run in the middle.
-    """
+    """A model with its errors on the data with which it was identified."""
 
     model: Simulator
     runs: tuple[SimulatedRun, ...] = ()
+    """Every experiment as simulated by the model."""
     linear_runs: tuple[SimulatedRun, ...] = ()
+    """The same by the linear start; may be empty."""
     spectra: ErrorSpectra | None = None
+    """Spectra of one periodic experiment, of validation data if there is any; None if there is no periodic experiment."""
     stretch: OutputStretch | None = None
+    """A short stretch of one experiment over time, of validation data if there is any; None if it was not kept."""
     seconds: float = float("nan")
+    """Wall time of the identification; NaN if unknown."""
     notes: tuple[str, ...] = ()
+    """Remarks on the data for the user, one line each."""
     data: str = ""
+    """Fingerprint that identifies the data of the fit; empty if unknown."""
     uses: Mapping[str, str] = field(default_factory=dict)
+    """``training`` or ``validation``, by the fingerprint of each experiment; empty if unknown."""
     scatter: RunScatter | None = None
+    """Shifts of the model from run to run; None if it has none. Then ``model`` is that of a run in the middle."""
 
     @property
     def linear(self) -> Simulator | None:

@@ -46,7 +46,6 @@ class SimulatedSweepModels:
     """Models with which sweeps are simulated."""
 
     model: DrivenModel
-    """The model."""
     exciter: Exciter | None
     """Exciter that drives a force-driven model from the voltage; without it, the recorded force drives the model."""
     constants: Mapping[str, float] = field(default_factory=dict)

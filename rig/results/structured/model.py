@@ -10,21 +10,13 @@ from rig.results.simulated.model import SimulatedModel
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiedStructured(SimulatedModel):
-    """A structured model and its origin.
-
-    Parameters
-    ----------
-    model
-        The model.
-    fit
-        Its fit; None for a model from another source.
-    linear
-        Modes with which the fit began, without elements; None if unknown.
-    """
+    """A structured model and its origin."""
 
     model: StructuredModel
     fit: StructuredFit | None = None
+    """Its fit; None for a model from another source."""
     linear: StructuredModel | None = None
+    """Modes with which the fit began, without elements; None if unknown."""
 
     @property
     def functions(self) -> list[str]:

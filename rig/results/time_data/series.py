@@ -18,21 +18,6 @@ from rig.text.contents import Array, Contents
 class TimeData:
     """Evenly sampled signals.
 
-    Parameters
-    ----------
-    channels
-        One per row of ``samples``.
-    samples
-        float[n_channels, n], in the SI unit of each channel; NaN where samples were lost in transfer.
-    sample_rate_hz
-        Samples per second.
-    start_s
-        Time of the first sample.
-    point
-        Stored number of the point, from 0.
-    specimen
-        Name of the specimen.
-
     Raises
     ------
     IdentificationError
@@ -40,11 +25,17 @@ class TimeData:
     """
 
     channels: tuple[Channel, ...]
+    """One per row of ``samples``."""
     samples: NDArray[np.floating]
+    """float[n_channels, n], in the SI unit of each channel; NaN where samples were lost in transfer."""
     sample_rate_hz: float
+    """Samples per second."""
     start_s: float = 0.0
+    """Time of the first sample."""
     point: int = 0
+    """Stored number of the point, from 0."""
     specimen: str = ""
+    """Name of the specimen."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", tuple(self.channels))

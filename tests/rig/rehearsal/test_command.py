@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from rig.campaigns.plans import load_plan
-from rig.results.rehearsal.rehearse import load_rehearsal
+from rig.rehearsal.rehearsal import Rehearsal
+from rig.results.files import load_as
 from tests.rig.rehearsal.plans import SHORT_TEXT
 
 
@@ -40,8 +41,8 @@ def test_a_twin_is_written_and_an_improved_plan_too(command):
     command("rehearse hasty.toml --exact -n 2 -o r.h5 --improve patient.toml --jobs 1").succeeded()
     assert load_plan("patient.toml").settle.longest_periods == 120.0
     assert "# taken: three times as long to settle, ends well 0 -> 100 %" in Path("patient.toml").read_text()
-    assert len(load_rehearsal(Path("patient.h5")).draws) == 2
-    assert any(one.taken for one in load_rehearsal(Path("r.h5")).tried)
+    assert len(load_as(Rehearsal, Path("patient.h5")).draws) == 2
+    assert any(one.taken for one in load_as(Rehearsal, Path("r.h5")).tried)
     assert "twin 1 written to t.toml" in command("rehearse plan.toml --exact --twin 1 -o t.toml").succeeded().out
     command("run plan.toml --bench t.toml -o run.h5").succeeded()
 
@@ -84,4 +85,4 @@ def test_an_existing_file_stays_without_overwrite(command):
     assert "r.h5: exists already" in again.err
     assert Path("r.h5").read_bytes() == before
     command("rehearse plan.toml --exact -n 2 -o r.h5 --overwrite --jobs 1").succeeded()
-    assert len(load_rehearsal(Path("r.h5")).draws) == 2
+    assert len(load_as(Rehearsal, Path("r.h5")).draws) == 2
