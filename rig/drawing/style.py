@@ -46,45 +46,26 @@ class Preset:
     """Settings of matplotlib."""
 
 
+def _sizes(
+    text: float, small: float, title: float, axes: float, line: float, marker: float, grid: float, dpi: float
+) -> dict[str, object]:
+    """Return settings of matplotlib for sizes of text, lines and markers, points, and dots per inch."""
+    return {
+        **dict.fromkeys(("font.size", "axes.titlesize", "figure.labelsize"), text),
+        **dict.fromkeys(("legend.fontsize", "xtick.labelsize", "ytick.labelsize"), small),
+        "figure.titlesize": title,
+        "axes.linewidth": axes,
+        "lines.linewidth": line,
+        "lines.markersize": marker,
+        "grid.linewidth": grid,
+        "figure.dpi": dpi,
+    }
+
+
 PRESETS = {
     "screen": Preset(),
-    "paper": Preset(
-        85.0,
-        None,
-        {
-            "font.size": 7.5,
-            "legend.fontsize": 6.5,
-            "xtick.labelsize": 6.5,
-            "ytick.labelsize": 6.5,
-            "axes.titlesize": 7.5,
-            "figure.titlesize": 7.5,
-            "figure.labelsize": 7.5,
-            "axes.linewidth": 0.6,
-            "lines.linewidth": 0.9,
-            "lines.markersize": 2.8,
-            "grid.linewidth": 0.4,
-            "legend.handlelength": 1.6,
-            "figure.dpi": 600,
-        },
-    ),
-    "slide": Preset(
-        338.667,
-        190.5,
-        {
-            "font.size": 15.0,
-            "legend.fontsize": 13.0,
-            "xtick.labelsize": 13.0,
-            "ytick.labelsize": 13.0,
-            "axes.titlesize": 15.0,
-            "figure.titlesize": 18.0,
-            "figure.labelsize": 15.0,
-            "axes.linewidth": 1.1,
-            "lines.linewidth": 2.0,
-            "lines.markersize": 6.5,
-            "grid.linewidth": 0.9,
-            "figure.dpi": 144,
-        },
-    ),
+    "paper": Preset(85.0, None, {**_sizes(7.5, 6.5, 7.5, 0.6, 0.9, 2.8, 0.4, 600), "legend.handlelength": 1.6}),
+    "slide": Preset(338.667, 190.5, _sizes(15.0, 13.0, 18.0, 1.1, 2.0, 6.5, 0.9, 144)),
 }
 """The looks by name: ``screen`` (each figure at its own size), ``paper`` (one column, 85 mm), ``slide`` (16:9, 1920 x 1080)."""
 

@@ -9,14 +9,16 @@ from pathlib import Path
 from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
 from rig.report.comparison import comparisons
-from rig.report.document import Chapter, typeset
-from rig.report.models import model_chapter
+from rig.report.document import Chapter, Facts, Section, Text, blocks_of, typeset
+from rig.report.files import table_of_files
 from rig.report.pictures import Pictures
 from rig.report.recordings import recording_chapter
 from rig.results.files import understood
 from rig.results.kinds import KINDS
+from rig.show.summary import summarise
 from rig.system.studies import load_study
 from rig.system.whole_file import whole_file
+from rig.text.console import collected
 from vibrolock import __version__
 
 
@@ -51,9 +53,30 @@ def write_report(sources: Sequence[Path], output: Path, title: str = "") -> None
 def _chapter(path: Path, pictures: Pictures) -> Chapter:
     kind = kind_of(path)
     if kind in KINDS:
-        return model_chapter(path, pictures)
+        return _model_chapter(path, pictures)
     with understood(path, f"recording of kind {kind}"):
         return recording_chapter(path, pictures)
+
+
+def _model_chapter(path: Path, pictures: Pictures) -> Chapter:
+    """Return all that `rig show` says of a file that is no recording, with its figure; raise `RecordingError` as that does."""
+    summary = summarise(path)
+    kind = summary["kind"]
+    with understood(path, kind), collected() as printed:
+        KINDS[kind].say(summary)
+    specimen = summary["specimen"] or "an unnamed specimen"
+    notes = [Text(note, "note") for note in summary["notes"]]
+    return Chapter(
+        f"{kind} of {specimen}",
+        str(path),
+        [],
+        [
+            Section("Figure", [pictures.of_file(path, f"The {kind}, as rig plot draws it.")]),
+            Section("What it is, how well it fits, and where it holds", blocks_of(printed, "Values")),
+            Section("Notes", [*notes]),
+            Section("File", [Facts("", [("integrity", summary["integrity"])]), table_of_files([path])]),
+        ],
+    )
 
 
 def _rendered(title: str, chapters: Sequence[Chapter], sources: Sequence[Path], output: Path) -> str:

@@ -17,6 +17,12 @@ from rig.text.disorder import LATE_BLOCKS, LATE_FRAMES, OUT_OF_ORDER_FRAMES, REO
 from rig.text.message_pages import where_explained
 from vibrolock.printable import printable, printable_strings
 
+_OWN_UNITS = (
+    *("frames", "blocks", "lines", "bytes", "errors"),
+    *("answers", "retries", "versions", "malformed", "resynchronised"),
+)
+"""Ends of the names of counters that do not count samples."""
+
 
 def say_how_it_ended(summary: dict[str, Any], path: Path) -> None:
     """Print how a run ended, its results, its speed, and the warnings counted on the way."""
@@ -60,19 +66,7 @@ def _counted(counters: Mapping[str, int]) -> list[str]:
 
 def _unit(name: str) -> str:
     """Return the unit of a counter: its name says it, or it counts samples."""
-    said = (
-        "frames",
-        "blocks",
-        "lines",
-        "bytes",
-        "errors",
-        "answers",
-        "retries",
-        "versions",
-        "malformed",
-        "resynchronised",
-    )
-    return "" if name.endswith(said) else " samples"
+    return "" if name.endswith(_OWN_UNITS) else " samples"
 
 
 def _pace(loop: Mapping[str, Any]) -> str:
@@ -133,14 +127,9 @@ def print_summary(summary: dict[str, Any]) -> None:
 
 
 def _sensor_line(sensor: Mapping[str, Any]) -> str:
-    told = {
-        "serial_number": "no. ",
-        "calibrated": "calibrated ",
-        "calibration_due": "due ",
-        "certificate": "certificate ",
-    }
-    keys = ("sensor", "serial_number", "sensitivity", "amplifier_gain", "calibrated", "calibration_due", "certificate")
-    line = ", ".join(f"{told.get(key, '')}{sensor[key]}" for key in keys if sensor[key])
+    told = {"serial_number": "no.", "calibrated": "calibrated", "calibration_due": "due", "certificate": "certificate"}
+    facts = {key: value for key, value in sensor.items() if value and key not in ("channel", "overdue")}
+    line = ", ".join(f"{told.get(key, '')} {value}".lstrip() for key, value in facts.items())
     return line + (" (overdue)" if sensor["overdue"] else "")
 
 
