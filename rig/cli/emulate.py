@@ -50,6 +50,7 @@ def emulate(
     from rig.bench.configuration import validated
     from rig.emulator.process import run_emulator
     from rig.emulator.settings import EmulatorSettings
+    from rig.errors import ConfigurationError
 
     behind = load_bench(bench)
     given = {name: value for name, value in context.params.items() if name in EmulatorSettings.model_fields}
@@ -61,7 +62,10 @@ def emulate(
     def when_ready(ready: "Ready") -> None:
         block = _block(behind, ready)
         if bench_file is not None:
-            _write_bench(bench_file, _bench_text(bench, block, ready, as_hardware))
+            try:
+                bench_file.write_text(_bench_text(bench, block, ready, as_hardware), encoding="utf-8")
+            except OSError as error:
+                raise ConfigurationError(f"--bench-file {bench_file}: cannot be written: {error.strerror}") from error
         if json:
             facts = {"wire": wire, **ready.options, "block": block, "process": ready.process}
             print(jsonlib.dumps(facts), flush=True)
@@ -106,15 +110,6 @@ def _check_bench_file(path: Path | None) -> None:
         )
 
 
-def _write_bench(path: Path, text: str) -> None:
-    from rig.errors import ConfigurationError
-
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(f"--bench-file {path}: cannot be written: {error.strerror}") from error
-
-
 def _block(bench: "Bench", ready: "Ready") -> int:
     """Return the samples per block: those of the bench in lockstep, else at least 2 ms if the wire's frames can hold it."""
     if ready.lockstep:
@@ -128,15 +123,8 @@ def _bench_text(bench: str, block: int, ready: "Ready", as_hardware: bool) -> st
 
     base = str(Path(bench).absolute()) if bench.endswith(".toml") else bench
     options = driver_options(ready.options, lockstep=ready.lockstep, as_hardware=as_hardware) | {"queue_blocks": "auto"}
-    lines = [f"{key} = {jsonlib.dumps(value)}" for key, value in options.items()]
-    head = [
-        WRITTEN,
-        f"base = {jsonlib.dumps(base)}",
-        f"block = {block}",
-        "",
-        "[driver]",
-        f"name = {jsonlib.dumps(ready.wire)}",
-        "",
-        "[driver.options]",
-    ]
-    return "\n".join([*head, *lines, ""])
+    lines = "".join(f"{key} = {jsonlib.dumps(value)}\n" for key, value in options.items())
+    return (
+        f"{WRITTEN}\nbase = {jsonlib.dumps(base)}\nblock = {block}\n\n"
+        f"[driver]\nname = {jsonlib.dumps(ready.wire)}\n\n[driver.options]\n{lines}"
+    )

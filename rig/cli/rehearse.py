@@ -68,7 +68,6 @@ def rehearse_(
     if twin is not None:
         _write_twin(subject, twin, output, overwrite)
         return
-    _check_outputs(subject, output, improve, figure, overwrite)
     _rehearse(subject, output, improve, figure, overwrite=overwrite, jobs=jobs, json=json)
 
 
@@ -84,12 +83,23 @@ def _write_twin(subject: "Subject", number: int, output: Path, overwrite: bool) 
     print(f"twin {number} written to {output}; rig run PLAN --bench {output} --seed {number - 1}")
 
 
-def _check_outputs(
-    subject: "Subject", output: Path, improve: Path | None, figure: Path | None, overwrite: bool
+def _rehearse(
+    subject: "Subject",
+    output: Path,
+    improve: Path | None,
+    figure: Path | None,
+    *,
+    overwrite: bool,
+    jobs: int,
+    json: bool,
 ) -> None:
-    """Refuse what could not be written before anything is computed."""
     from rig.errors import ConfigurationError
+    from rig.figures.files import plot
+    from rig.rehearsal.report import lines, summary
+    from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
+    from rig.text.console import print_json
     from rig.tuning.figure import check_figure
+    from vibrolock.printable import printable
 
     if output.suffix != ".h5":
         raise ConfigurationError(f"-o {output}: rehearsals are written as .h5")
@@ -105,24 +115,6 @@ def _check_outputs(
         keep_existing([], improve.with_suffix(".h5"), overwrite)
     if figure is not None:
         check_figure(figure, overwrite)
-
-
-def _rehearse(
-    subject: "Subject",
-    output: Path,
-    improve: Path | None,
-    figure: Path | None,
-    *,
-    overwrite: bool,
-    jobs: int,
-    json: bool,
-) -> None:
-    from rig.figures.files import plot
-    from rig.rehearsal.report import lines, summary
-    from rig.results.rehearsal.rehearse import improve_into, rehearse_into, request_for
-    from rig.text.console import print_json
-    from vibrolock.printable import printable
-
     request = request_for(subject)
     with Rehearsing(subject.draws) as listener:
         found = rehearse_into(request, output, overwrite=overwrite, listener=listener, jobs=jobs)

@@ -32,12 +32,34 @@ def _in_a_line(column: "Column", point: Point[object]) -> str:
     return text if column.plain else f"{column.heading} {text}"
 
 
-class RunProgress:
+class _StatusLine:
+    """A line at the bottom of a terminal. An output whose reader has gone is no error: what is shown continues."""
+
+    def __init__(self) -> None:
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
+
+    def close(self) -> None:
+        """Clear the status line."""
+        if self._terminal:
+            self._status("")
+
+    def _status(self, text: str) -> None:
+        with contextlib.suppress(OSError):
+            sys.stderr.write(f"\r\x1b[2K{text}")
+            sys.stderr.flush()
+
+    def _print(self, line: str) -> None:
+        self.close()
+        with contextlib.suppress(OSError):
+            print(printable(line), file=sys.stderr, flush=True)
+
+
+class RunProgress(_StatusLine):
     """Writes a line for each point and, on a terminal, a status line below that follows the loop."""
 
     def __init__(self, columns: "Sequence[Column]" = ()) -> None:
+        super().__init__()
         self._columns = columns
-        self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._finished = 0
 
     def point(self, point: Point[object], number_done: int, total: int) -> None:
@@ -64,7 +86,7 @@ class RunProgress:
         seconds = tick.sample / tick.bench.sample_rate_hz
         state = LOCK_WORDS[int(last["lock"])]
         self._status(
-            f"\r\x1b[2K{seconds:8.1f} s  {float(last['frequency_hz']):9.4f} Hz  "
+            f"{seconds:8.1f} s  {float(last['frequency_hz']):9.4f} Hz  "
             f"{abs(complex(last['command_v'])):7.4f} V  {state}  {self._finished} points done"
         )
 
@@ -72,23 +94,8 @@ class RunProgress:
         """Print a remark of the driver on the bench."""
         self._print(f"note: {text}")
 
-    def close(self) -> None:
-        """Clear the status line."""
-        if self._terminal:
-            self._status("\r\x1b[2K")
 
-    def _status(self, text: str) -> None:
-        with contextlib.suppress(OSError):  # the reader of the output has gone; the run continues
-            sys.stderr.write(text)
-            sys.stderr.flush()
-
-    def _print(self, line: str) -> None:
-        self.close()
-        with contextlib.suppress(OSError):
-            print(printable(line), file=sys.stderr, flush=True)
-
-
-class FitLines:
+class FitLines(_StatusLine):
     """Shows the progress of a fit: a status line on a terminal, otherwise a line per ten iterations or ten seconds.
 
     ``check`` is called at every iteration and may raise an error to end the fit.
@@ -97,8 +104,8 @@ class FitLines:
     _EVERY, _LONGEST_S = 10, 10.0
 
     def __init__(self, check: "Callable[[], None]" = lambda: None) -> None:
+        super().__init__()
         self._check = check
-        self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._best = (float("inf"), 0)
         self._stage = ""
         self._said_s = 0.0
@@ -115,20 +122,11 @@ class FitLines:
             f"{stage}iteration {at.iteration:>3}/{at.iterations}  training {_percent(at.training_error)}  "
             f"validation {_percent(at.validation_error)}  best at {self._best[1]}  {at.seconds:.1f} s"
         )
-        with contextlib.suppress(OSError):
-            if self._terminal:
-                sys.stderr.write(f"\r\x1b[2K{line}")
-                sys.stderr.flush()
-            elif at.iteration % self._EVERY == 0 or at.seconds - self._said_s >= self._LONGEST_S:
-                self._said_s = at.seconds
-                print(line, file=sys.stderr, flush=True)
-
-    def close(self) -> None:
-        """Clear the status line."""
         if self._terminal:
-            with contextlib.suppress(OSError):
-                sys.stderr.write("\r\x1b[2K")
-                sys.stderr.flush()
+            self._status(line)
+        elif at.iteration % self._EVERY == 0 or at.seconds - self._said_s >= self._LONGEST_S:
+            self._said_s = at.seconds
+            self._print(line)
 
 
 def _percent(error: float) -> str:

@@ -31,6 +31,8 @@ _DIGITS = 10
 """Significant digits of the numbers in the table; chosen."""
 _LEAST_FREE = 0.01
 """Mass line below the band, over that of the modes, from which on it becomes a mode."""
+_OF_A_SENSOR = {"name", "sensitivity_v_per_unit", "range_v", "noise_rms", "high_pass_hz"}
+"""Keys of a channel that its virtual sensor has, too."""
 _LEAST_SLIDER = 1e-12
 """Stiffness of a slider below which it is none, over that of all."""
 
@@ -94,12 +96,24 @@ def structured_bench(model: StructuredModel, like: Bench, *, shaker: str = "") -
         "structure": _structure(model, {name: element.direction for name, element in points.items()}),
         **_nonlinear(model, list(points)),
         **_exciter(like, shaker, drive),
-        "sensors": [_sensor(channel) for channel in sensors],
+        "sensors": [
+            {
+                "kind": "force" if channel.role == "force" else "acceleration",
+                **({} if channel.role == "force" else {"at": channel.name}),
+                **channel.model_dump(include=_OF_A_SENSOR),
+            }
+            for channel in sensors
+        ],
     }
+    feeds = [
+        f"{value:.2g} {c.unit} per N to {c.name}" for c, value in zip(model.outputs, model.direct[:, 0], strict=True)
+    ]
+    left = f"; left out: {', '.join(feeds)}" if np.any(model.direct) and not _free_mode(model) else ""
+    what = f"structured model of {model.specimen or 'a specimen'} behind the exciter of the bench {like.name}{left}"
     bench = like.model_copy(
         update={
             "name": f"{like.name}-identified",
-            "description": _description(model, like),
+            "description": what,
             "driver": DriverChoice(name="virtual", options=options),
             "channels": tuple(sensors),
             "emergency_stop": None,
@@ -174,13 +188,6 @@ def _virtual(channel: Channel) -> Channel:
     )
 
 
-def _sensor(channel: Channel) -> Table:
-    same = ("name", "sensitivity_v_per_unit", "range_v", "noise_rms", "high_pass_hz")
-    of_force = channel.role == "force"
-    place = {} if of_force else {"at": channel.name}
-    return {"kind": "force" if of_force else "acceleration", **place, **{key: getattr(channel, key) for key in same}}
-
-
 def _exciter(like: Bench, shaker: str, drive: str) -> Table:
     """Return exciter, stinger and converter: those of a virtual bench, else a shaker by name behind a steel stinger."""
     if like.driver.name != "virtual":
@@ -223,14 +230,8 @@ def _nonlinear(model: StructuredModel, points: list[str]) -> Table:
             elements.append(_force_table(at, element, force_n, float(tables.limits[e, 1] / scale**2)))
         if np.any(damping):
             kept = _kept(element, damping, _FAITHFUL_DAMPING, smooth=False)
-            elements.append(
-                {
-                    "kind": "damping-table",
-                    "at": at,
-                    **_deflections(element, kept),
-                    "damping_n_s_m": _short(damping[kept]),
-                }
-            )
+            numbers = {"deflection_m": _deflections(element, kept), "damping_n_s_m": _short(damping[kept])}
+            elements.append({"kind": "damping-table", "at": at, **numbers})
         stiffness, strength = (tables.sliders[tables.first[e] : tables.first[e + 1]] / [scale**2, scale]).T
         some = stiffness > _LEAST_SLIDER * np.sum(stiffness)
         if np.any(some):
@@ -247,8 +248,8 @@ def _force_table(at: str, element: NonlinearElement, force_n: Float, beyond_n_m:
     force_n = force_n.copy()
     force_n[middle] = 0.0
     kept = _kept(element, force_n, _FAITHFUL, smooth=True)
-    numbers = {"force_n": _short(force_n[kept]), "beyond_n_m": beyond_n_m}
-    return {"kind": "force-table", "at": at, **_deflections(element, kept), **numbers}
+    numbers = {"deflection_m": _deflections(element, kept), "force_n": _short(force_n[kept]), "beyond_n_m": beyond_n_m}
+    return {"kind": "force-table", "at": at, **numbers}
 
 
 def _kept(element: NonlinearElement, values: Float, tolerance: float, *, smooth: bool) -> slice:
@@ -266,22 +267,14 @@ def _kept(element: NonlinearElement, values: Float, tolerance: float, *, smooth:
     return kept
 
 
-def _deflections(element: NonlinearElement, kept: slice) -> Table:
+def _deflections(element: NonlinearElement, kept: slice) -> list[float]:
     z = element.nodes * element.scale_m
     z[z.size // 2] = 0.0
-    return {"deflection_m": _short(z[kept])}
+    return _short(z[kept])
 
 
 def _short(values: Float) -> list[float]:
     return [float(f"{value:.{_DIGITS}g}") for value in values]
-
-
-def _description(model: StructuredModel, like: Bench) -> str:
-    feeds = [
-        f"{value:.2g} {c.unit} per N to {c.name}" for c, value in zip(model.outputs, model.direct[:, 0], strict=True)
-    ]
-    left = f"; left out: {', '.join(feeds)}" if np.any(model.direct) and not _free_mode(model) else ""
-    return f"structured model of {model.specimen or 'a specimen'} behind the exciter of the bench {like.name}{left}"
 
 
 def _with_modes(bench: Bench, model: StructuredModel) -> Table:
