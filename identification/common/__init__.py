@@ -14,7 +14,13 @@ if TYPE_CHECKING:
         find_role as find_role,
     )
     from identification.frequency_responses import Controlled as Controlled
-    from identification.storage import decode as decode, encode as encode, stored as stored
+    from identification.storage import (
+        Arrays as Arrays,
+        Attributes as Attributes,
+        decode as decode,
+        encode as encode,
+        stored as stored,
+    )
     from identification.validation import one_specimen as one_specimen, positive as positive
 else:
     __getattr__, __dir__, __all__ = on_use(__name__)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from identification import IdentificationError
-from rig.results.arrays import Arrays, Attributes
+from identification.common import Arrays, Attributes
 from rig.results.kinds import exchanges
 from rig.text.contents import Contents
 

@@ -1,8 +1,12 @@
 """Who tested what on which bench with which sensors: the facts of a recording, of any kind."""
 
+import hashlib
 from collections.abc import Sequence
+from pathlib import Path
 
 from rig.arming.run_facts import About
+from rig.errors import RecordingError
+from rig.recording.journal import journal_path
 from rig.recording.reader import Recording
 from rig.recording.stored import About as StoredAbout, StoredTable
 from rig.report.document import Block, Facts, Section, Table, Text
@@ -128,6 +132,26 @@ def files_and_versions(recording: Recording, files: Table) -> Section:
         ("integrity", recording.integrity),
     ]
     return Section("Versions and files", [Facts("", facts), files])
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the files of a recording or model that exist: the HDF5 file, and the journal of a run without an end."""
+    return [one for one in (path, journal_path(path)) if one.is_file()]
+
+
+def _digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal digits; raise `RecordingError` if it cannot be read."""
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def table_of_files(paths: Sequence[Path]) -> Table:
+    """Return names, sizes and digests of files."""
+    rows = [(path.name, f"{path.stat().st_size}", _digest_of(path)) for path in paths]
+    return Table("Files", ("file", "size\nbytes", "SHA-256"), rows)
 
 
 def _abouts(recording: Recording) -> Sequence[StoredAbout]:

@@ -8,8 +8,16 @@ from rig.campaigns.evaluation.point import Point, point_name
 from rig.check.findings import is_check
 from rig.recording.reader import Recording
 from rig.report.document import Block, Chapter, Section, Table, Text, blocks_of
-from rig.report.facts import bench_section, endings, files_and_versions, plan_section, safety_section, subject_section
-from rig.report.files import files_of, table_of_files
+from rig.report.facts import (
+    bench_section,
+    endings,
+    files_and_versions,
+    files_of,
+    plan_section,
+    safety_section,
+    subject_section,
+    table_of_files,
+)
 from rig.report.pictures import Pictures
 from rig.show.loop_table import print_loop
 from rig.show.point_table import attempts_refused, point_rows, points_from, shown_columns

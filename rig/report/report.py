@@ -10,7 +10,7 @@ from rig.errors import RecordingError
 from rig.recording.arrays import kind_of
 from rig.report.comparison import comparisons
 from rig.report.document import Chapter, Facts, Section, Text, blocks_of, typeset
-from rig.report.files import table_of_files
+from rig.report.facts import table_of_files
 from rig.report.pictures import Pictures
 from rig.report.recordings import recording_chapter
 from rig.results.files import understood

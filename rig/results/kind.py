@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification import FitProgress, Predictions
+    from identification.common import Arrays, Attributes
     from rig.drawing.curves import Curves, View
-    from rig.results.arrays import Arrays, Attributes
     from rig.results.options import Options
     from rig.text.contents import Contents
 

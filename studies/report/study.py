@@ -9,7 +9,7 @@ from typing import Any
 
 from rig.errors import RecordingError
 from rig.report.document import Block, Chapter, Facts, Picture, Section, Table, Text
-from rig.report.files import table_of_files
+from rig.report.facts import table_of_files
 from rig.results.files import understood
 from rig.system.text_files import read_bytes, read_text
 from rig.text.console import number

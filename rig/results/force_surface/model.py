@@ -10,7 +10,7 @@ from identification import (
     pack_frequency_responses,
     unpack_frequency_responses,
 )
-from rig.results.arrays import Arrays, Attributes
+from identification.common import Arrays, Attributes
 from rig.results.kind import Storage
 from vibrolock.results import Result
 

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from identification import PnlssModel
-from identification.common import decode, encode
-from rig.results.arrays import Arrays, Attributes
+from identification.common import Arrays, Attributes, decode, encode
 from rig.results.kind import Exchange
 from rig.text.contents import Contents
 

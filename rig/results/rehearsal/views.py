@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from identification.common import Arrays, Attributes
 from rig.rehearsal.rehearsal import Draw, Effect, Rehearsal, RehearsalFacts
 from rig.rehearsal.report import Summary, lines, summary
 from rig.rehearsal.trial import Trial, TrialPoint
 from rig.rehearsal.truth import TrueBackbone
-from rig.results.arrays import Arrays, Attributes
 from rig.results.kind import Storage, Table
 
 _FACTS, _TRIED = TypeAdapter(RehearsalFacts), TypeAdapter(tuple[Effect, ...])

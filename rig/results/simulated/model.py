@@ -19,10 +19,9 @@ from identification import (
     output_stretch,
     simulated_run,
 )
-from identification.common import stored
+from identification.common import Arrays, Attributes, stored
 from identification.experiments import Simulator
 from rig.errors import ConfigurationError
-from rig.results.arrays import Arrays, Attributes
 from vibrolock.results import Result
 
 

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from identification import StructuredModel
-from identification.common import decode, encode
+from identification.common import Arrays, Attributes, decode, encode
 from identification.models import Damper, Joint, Spring, UserSpring
-from rig.results.arrays import Arrays, Attributes
 from rig.results.kind import Exchange
 from rig.text.contents import Contents
 

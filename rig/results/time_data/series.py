@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import Channel, IdentificationError, TimeRecord, TimeRecords
-from identification.common import decode, encode
+from identification.common import Arrays, Attributes, decode, encode
 from rig.campaigns.evaluation.point import point_name
-from rig.results.arrays import Arrays, Attributes
 from rig.results.kind import Exchange
 from rig.text.contents import Array, Contents
 

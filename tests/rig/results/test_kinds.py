@@ -13,7 +13,7 @@ from rig.results.kinds import KINDS, all_kinds
 FOLDER = Path(rig.results.__file__).parent
 ABOVE = {"identify", "predict", "in_memory"}
 """What stands above the kinds."""
-SHARED = {"simulated", "predictions", "measured", "files", "kinds", "kind", "arrays", "options"}
+SHARED = {"simulated", "predictions", "measured", "files", "kinds", "kind", "options"}
 """What kinds share, one of which is a kind as well."""
 OWN = {name.replace("-", "_") for name in KINDS} - SHARED
 
