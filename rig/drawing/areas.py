@@ -1,20 +1,16 @@
 """Areas of a page for parts of a figure that differ in kind; on a narrow page they stand below one another."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.drawing.page import NARROW_IN
-from rig.drawing.style import height_is_free, rc
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+from rig.drawing.style import Figure, SubFigure, height_is_free, rc
 
 _PANEL_IN = 1.65
 
 
-def is_narrow(page: "Figure") -> bool:
+def is_narrow(page: Figure) -> bool:
     """Return whether a page is as narrow as a paper's column."""
     return bool(page.get_figwidth() < NARROW_IN)
 
@@ -24,7 +20,7 @@ def broad(times: float = 3.5) -> float:
     return float(times * rc("lines.linewidth"))
 
 
-def areas(page: "Figure", panels: Sequence[int], sizes: Sequence[float], *, beside: bool = False) -> "list[SubFigure]":
+def areas(page: Figure, panels: Sequence[int], sizes: Sequence[float], *, beside: bool = False) -> list[SubFigure]:
     """Give an area (a subfigure) for each part of a figure, from top to bottom, or ``beside`` one another.
 
     ``sizes`` are the relative heights (or widths) of the areas. On a narrow page, areas are below one another and as tall as

@@ -1,14 +1,13 @@
 """Limits and ticks of axes that many figures need, to be set after the data are drawn."""
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from rig.drawing.style import Axes
 
 
-def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
+def log_axis(axis: Axes, which: Literal["x", "y"] = "y", *, least_span: float = 2.0) -> None:
     """Make an axis logarithmic that spans at least a factor, with plain numbers at 1, 2, 5 where it spans few decades."""
     from matplotlib.ticker import AutoLocator, LogLocator, NullFormatter, NullLocator, StrMethodFormatter
 
@@ -29,14 +28,14 @@ def log_axis(axis: "Axes", which: Literal["x", "y"] = "y", *, least_span: float 
         ticks.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
-def from_zero(axis: "Axes", *values: np.ndarray) -> None:
+def from_zero(axis: Axes, *values: np.ndarray) -> None:
     """Let an axis of amplitudes begin at zero, with room above the largest of the values."""
     largest = max((float(np.nanmax(one)) for one in values if np.isfinite(one).any()), default=0.0)
     if largest > 0.0:
         axis.set_ylim(0.0, 1.08 * largest)
 
 
-def widen(axis: "Axes", least: float) -> None:
+def widen(axis: Axes, least: float) -> None:
     """Let the vertical axis span at least a part ``least`` of its middle value, so that scatter does not look like a trend."""
     low, high = axis.get_ylim()
     middle = 0.5 * (low + high)

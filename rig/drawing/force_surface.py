@@ -1,7 +1,7 @@
 """Figure of a response-controlled test: quasi-linear responses by level, and curves at constant force cut from them."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -9,11 +9,7 @@ from identification import ConstantForceCurve, ForceSurface, FrequencyResponse, 
 from identification.response_control import LevelFit
 from rig.drawing.page import grid
 from rig.drawing.steady_curve import UNSTABLE, draw_stability
-from rig.drawing.style import COLOURS, REJECTED, legend_above, length_factor, plain_log, shade, title
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from rig.drawing.style import COLOURS, REJECTED, Axes, Figure, legend_above, length_factor, plain_log, shade, title
 
 _CURVES = 4
 _SECTIONS_DEG = (30.0, 90.0, 150.0)
@@ -33,7 +29,7 @@ class MeasuredSurface(Protocol):
 
 
 def draw_force_surface(
-    page: "Figure", responses: Sequence[FrequencyResponse], surface: ForceSurface | None, *, text: str = ""
+    page: Figure, responses: Sequence[FrequencyResponse], surface: ForceSurface | None, *, text: str = ""
 ) -> None:
     """Draw receptance and lag of every level on the left; constant-force curves and the force over displacement on the right.
 
@@ -67,7 +63,7 @@ def draw_force_surface(
     title(page, text or f"{specimen}: response-controlled test, {len(levels)} levels")
 
 
-def draw_measured_surface(page: "Figure", measured: MeasuredSurface) -> None:
+def draw_measured_surface(page: Figure, measured: MeasuredSurface) -> None:
     """Draw a force surface from a file."""
     draw_force_surface(page, measured.responses, measured.surface)
 
@@ -78,7 +74,7 @@ def fitted_stiffness(fit: LevelFit) -> tuple[np.ndarray, np.ndarray]:
     return (fit.centre + x * fit.half_range) / (2.0 * np.pi), np.polynomial.polynomial.polyval(x, fit.coefficients)
 
 
-def _curves(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
+def _curves(axis: Axes, surface: ForceSurface, scale: float, unit: str) -> None:
     """Draw amplitude over frequency at forces within the surface; unstable parts are dotted."""
     found = _within(surface)
     for index, curve in enumerate(found):
@@ -115,7 +111,7 @@ def _within(surface: ForceSurface) -> list[ConstantForceCurve]:
     return out
 
 
-def _sections(axis: "Axes", surface: ForceSurface, scale: float, unit: str) -> None:
+def _sections(axis: Axes, surface: ForceSurface, scale: float, unit: str) -> None:
     from matplotlib.ticker import LogLocator
 
     for lag, marker, colour in zip(_SECTIONS_DEG, ("v", "o", "^"), COLOURS, strict=False):

@@ -1,18 +1,13 @@
 """Values at the lines of a spectrum, made fit for drawing, and poles of stabilisation diagrams."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from identification import StabilisationDiagram
-from rig.drawing.style import MAIN, REJECTED, SECOND
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes
 from vibrolock.arrays import Float
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
-
-def draw_poles(axis: "Axes", diagram: StabilisationDiagram, in_frequency: str, in_all: str) -> None:
+def draw_poles(axis: Axes, diagram: StabilisationDiagram, in_frequency: str, in_all: str) -> None:
     """Draw physical poles over the model order; the names are those of poles stable in frequency alone, and in all."""
     for which, marker, colour, label in (
         (~diagram.frequency_stable, ".", REJECTED, "new"),

@@ -1,24 +1,20 @@
 """Figure of a nonlinear mode: modal properties over the amplitude, and the harmonics of the force."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification import NonlinearMode
 from rig.drawing.axes import widen
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, engineering, say_why_empty, title
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, engineering, say_why_empty, title
 
 _GAIN_ERROR = 0.02
 SHAPE_FLOOR = _GAIN_ERROR**2 / 4.0
 """1 - MAC of two equal components, one of them wrong by 2 %: a smaller change of shape is not told from a sensor's error."""
 
 
-def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
+def draw_mode(page: Figure, mode: NonlinearMode) -> None:
     """Draw a nonlinear mode. Without harmonics of the force, purity and phase lag are left out.
 
     The change of the mode shape has a panel if it exceeds `SHAPE_FLOOR`; otherwise the title says that there is none.
@@ -45,7 +41,7 @@ def draw_mode(page: "Figure", mode: NonlinearMode) -> None:
     title(page, f"{mode.specimen or 'specimen'}: nonlinear mode from {mode.source}, {points}{shape_text}")
 
 
-def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
+def _draw_mac(axis: Axes, mode: NonlinearMode) -> None:
     """Draw one minus the MAC with its 95 % interval, over the floor below which it means nothing."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
@@ -58,7 +54,7 @@ def _draw_mac(axis: "Axes", mode: NonlinearMode) -> None:
     axis.legend()
 
 
-def _draw_lag(axis: "Axes", mode: NonlinearMode) -> None:
+def _draw_lag(axis: Axes, mode: NonlinearMode) -> None:
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
     axis.axhline(90.0, color=REJECTED, lw=0.8)
@@ -69,7 +65,7 @@ def _draw_lag(axis: "Axes", mode: NonlinearMode) -> None:
     axis.set_ylim(min(low, 85.0), max(high, 95.0))
 
 
-def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
+def _draw_purity(axis: Axes, mode: NonlinearMode) -> None:
     order = np.argsort(mode.force_n)
     for name, label, colour, line in (
         ("force_purity", "force", MAIN, "o-"),
@@ -82,7 +78,7 @@ def _draw_purity(axis: "Axes", mode: NonlinearMode) -> None:
     axis.legend(title="fundamental over RMS of all")
 
 
-def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: str = MAIN) -> None:
+def draw_properties(left: Axes, right: Axes, mode: NonlinearMode, colour: str = MAIN) -> None:
     """Draw modal frequency and damping over the amplitude, with their 95 % intervals."""
     order = np.argsort(mode.amplitude_m)
     amplitude, unit = engineering(mode.amplitude_m[order])
@@ -106,7 +102,7 @@ def draw_properties(left: "Axes", right: "Axes", mode: NonlinearMode, colour: st
     right.set_ylim(bottom=max(0.0, right.get_ylim()[0]))
 
 
-def _harmonics(axis: "Axes", mode: NonlinearMode) -> None:
+def _harmonics(axis: Axes, mode: NonlinearMode) -> None:
     order = np.argsort(mode.force_n)
     drawn = False
     for harmonic, marker, colour in ((2, "^", MAIN), (3, "v", SECOND)):

@@ -7,17 +7,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-from rig.drawing.style import STYLE, height_is_free, lines_on, page_in, points
+from rig.drawing.style import STYLE, Artist, Axes, Figure, height_is_free, lines_on, page_in, points
 from rig.errors import RecordingError
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 NARROW_IN = 5.0
 """On narrower pages panels stand below one another."""
@@ -57,7 +52,7 @@ def check_replaceable(figure: Path) -> None:
 
 
 @contextmanager
-def page_for(file: Path, size_in: tuple[float, float]) -> Iterator["Figure"]:
+def page_for(file: Path, size_in: tuple[float, float]) -> Iterator[Figure]:
     """Give an empty page, and write what has been drawn on it into a file (png, pdf or svg, by its suffix).
 
     ``size_in`` is the size of this figure (inches); `rig.drawing.style.restyle` can ask for another page.
@@ -76,7 +71,7 @@ def page_for(file: Path, size_in: tuple[float, float]) -> Iterator["Figure"]:
             raise RecordingError(f"{file}: cannot be written: {error.strerror}") from None
 
 
-def svg_of(draw: Callable[["Figure"], None], size_in: tuple[float, float], name: str) -> str:
+def svg_of(draw: Callable[[Figure], None], size_in: tuple[float, float], name: str) -> str:
     """Return what ``draw`` draws on an empty page of a size (inches) as an ``<svg>`` element for an HTML document.
 
     ``name`` (letters and digits) begins every id in it and must differ from those of the document's other figures. Nothing in
@@ -97,7 +92,7 @@ def svg_of(draw: Callable[["Figure"], None], size_in: tuple[float, float], name:
 
 
 def grid(
-    page: "Figure",
+    page: Figure,
     rows: int,
     columns: int = 1,
     *,
@@ -125,7 +120,7 @@ def grid(
     return np.asarray(page.subplots(rows, columns, sharex=sharex, squeeze=False, height_ratios=height_ratios))
 
 
-def legend_below(page: "Figure", *panels: "Axes", handles: Sequence["Artist"] = ()) -> None:
+def legend_below(page: Figure, *panels: Axes, handles: Sequence[Artist] = ()) -> None:
     """Write one legend below all panels, in as many columns as the page has room for.
 
     It names each thing that the ``panels`` label once, or the ``handles``. Names are not read as formulas.
@@ -142,14 +137,14 @@ def legend_below(page: "Figure", *panels: "Axes", handles: Sequence["Artist"] = 
     _grow(page, 1.6 * points("legend.fontsize") / 72.0 * -(-len(names) // columns))
 
 
-def text_below(page: "Figure", text: str) -> None:
+def text_below(page: Figure, text: str) -> None:
     """Write a text below all panels, in as many lines as it needs."""
     shown = lines_on(page, text, "figure.labelsize")
     page.supxlabel(shown, x=0.01, ha="left", parse_math=False)
     _grow(page, 1.4 * points("figure.labelsize") / 72.0 * (1 + shown.count("\n")))
 
 
-def _grow(page: "Figure", by_in: float) -> None:
+def _grow(page: Figure, by_in: float) -> None:
     """Make room on a narrow page whose height is free."""
     if height_is_free() and page.get_figwidth() < NARROW_IN:
         page.set_figheight(page.get_figheight() + by_in)
@@ -161,7 +156,7 @@ def columns_for(names: Sequence[str], width_in: float) -> int:
     return min(len(names), max(1, int(width_in / entry_in)))
 
 
-def _lay_out(page: "Figure") -> None:
+def _lay_out(page: Figure) -> None:
     """Lay out the page once; with a layout engine, savefig would draw all of it a second time.
 
     Labels that are longer than their axes are broken into two lines, and ticks whose numbers touch are thinned out; this takes
@@ -185,7 +180,7 @@ def _lay_out(page: "Figure") -> None:
     page.set_layout_engine(None)
 
 
-def _break_labels(page: "Figure") -> bool:
+def _break_labels(page: Figure) -> bool:
     """Break vertical labels that are longer than their axes into two lines; return whether there were any."""
     from matplotlib.axes import Axes
 
@@ -201,7 +196,7 @@ def _break_labels(page: "Figure") -> bool:
     return broken
 
 
-def _thin_ticks(page: "Figure") -> bool:
+def _thin_ticks(page: Figure) -> bool:
     """Take fewer ticks where their numbers along x touch; return whether there were any."""
     from matplotlib.axes import Axes
     from matplotlib.ticker import MaxNLocator

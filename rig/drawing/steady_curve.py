@@ -1,15 +1,10 @@
 """Curves of predicted steady vibrations: stable and unstable parts, extrapolation, and where and why a curve ends."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from identification import SteadyPrediction
 from rig.drawing.areas import broad
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.typing import ColorType
+from rig.drawing.style import Axes, ColorType
 
 BEYOND = 1.0
 """Range use above which a model extrapolates."""
@@ -22,7 +17,7 @@ _EDGE = "the range of the model ends"
 
 
 def draw_curve(
-    axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: "ColorType", label: str | None = None
+    axis: Axes, response: SteadyPrediction, values: np.ndarray, colour: ColorType, label: str | None = None
 ) -> None:
     """Draw every branch separately; unstable parts are dotted, parts beyond the identified range have a broad shade.
 
@@ -41,7 +36,7 @@ def draw_curve(
             axis.plot(response.frequency_hz[on], beyond, color=colour, lw=broad(), alpha=0.25)
 
 
-def draw_ends(axis: "Axes", response: SteadyPrediction, values: np.ndarray, colour: "ColorType") -> None:
+def draw_ends(axis: Axes, response: SteadyPrediction, values: np.ndarray, colour: ColorType) -> None:
     """Mark by a square where a curve ends within the figure."""
     ends = ends_within(response)
     axis.plot(response.frequency_hz[ends], values[ends], "s", color=colour)
@@ -79,7 +74,7 @@ def why_it_ends(response: SteadyPrediction) -> list[str]:
 
 
 def draw_stability(
-    axis: "Axes", x: np.ndarray, y: np.ndarray, stable: np.ndarray, colour: "ColorType", *names: str
+    axis: Axes, x: np.ndarray, y: np.ndarray, stable: np.ndarray, colour: ColorType, *names: str
 ) -> None:
     """Draw a curve that may fold: stable parts as a line, unstable parts dotted; ``names`` are those of both in a legend."""
     axis.plot(x, np.where(with_neighbours(stable), y, np.nan), color=colour, label=names[0] if names else None)

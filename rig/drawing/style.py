@@ -17,8 +17,12 @@ import numpy as np
 from rig.errors import RecordingError
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.artist import Artist as Artist
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure, SubFigure as SubFigure
+    from matplotlib.typing import ColorType as ColorType
+else:  # matplotlib is loaded when something is drawn
+    Artist = Axes = Figure = SubFigure = ColorType = Any
 
 MAIN, SECOND, THIRD = "#0072b2", "#d55e00", "#009e73"
 REJECTED = "#767676"
@@ -185,7 +189,7 @@ def length_factor(amplitude_m: np.ndarray) -> tuple[float, str]:
     return (1e6, "µm") if amplitude_m.size and np.nanmax(amplitude_m) < 5e-4 else (1e3, "mm")
 
 
-def legend_above(axis: "Axes", columns: int, heading: str | None = None) -> None:
+def legend_above(axis: Axes, columns: int, heading: str | None = None) -> None:
     """Put the legend above the panel, where it hides nothing."""
     axis.legend(
         loc="lower left",
@@ -198,19 +202,19 @@ def legend_above(axis: "Axes", columns: int, heading: str | None = None) -> None
     )
 
 
-def say_why_empty(axis: "Axes", text: str) -> None:
+def say_why_empty(axis: Axes, text: str) -> None:
     """Write into a panel why it is empty."""
     axis.text(0.5, 0.5, text, ha="center", va="center", transform=axis.transAxes, color=REJECTED, parse_math=False)
     axis.set(xticks=[], yticks=[])
 
 
-def title(page: "Figure", text: str) -> None:
+def title(page: Figure, text: str) -> None:
     """Write a title at the top left, in as many lines as it needs, unless the text is empty."""
     if text:
         page.suptitle(lines_on(page, text, "figure.titlesize"), x=0.01, ha="left", parse_math=False)
 
 
-def lines_on(page: "Figure", text: str, setting: str) -> str:
+def lines_on(page: Figure, text: str, setting: str) -> str:
     """Return a text in lines as long as a page is wide, for the font size of a setting such as ``figure.titlesize``.
 
     Matplotlib's own wrapping would read ``$`` as the beginning of a formula.
@@ -234,7 +238,7 @@ def unit_text(unit: str) -> str:
     return f"({written[over]})/{under}" if slash and over in written else unit
 
 
-def plain_log(axis: "Axes") -> None:
+def plain_log(axis: Axes) -> None:
     """Label a logarithmic axis of errors with plain numbers, with some intermediate ones if it spans little."""
     from matplotlib.ticker import LogLocator, StrMethodFormatter
 

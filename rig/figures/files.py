@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 from identification import IdentificationError
 from rig.campaigns.evaluation.figure import draw_failure
@@ -12,6 +12,7 @@ from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.findings import is_check
 from rig.drawing.curves import View
 from rig.drawing.page import check_ending, check_replaceable, page_for
+from rig.drawing.style import Figure
 from rig.errors import RecordingError
 from rig.figures.lateness import draw_lateness
 from rig.figures.overlay import overlay
@@ -19,9 +20,6 @@ from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.results.files import load, understood
 from rig.results.kinds import KINDS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CHECK = "rig.check.figure:draw_recorded_check"
 
@@ -64,7 +62,7 @@ class FileOptions(TypedDict, total=False):
 
 def drawing_of(
     sources: Sequence[Path], *, lateness: bool = False, labels: Sequence[str] = (), view: View | None = None
-) -> tuple[tuple[float, float], Callable[["Figure"], None]]:
+) -> tuple[tuple[float, float], Callable[[Figure], None]]:
     """Return the size (inches) of the page for one or several files, and the function that draws them on an empty page.
 
     The arguments are those of `plot`.
@@ -75,7 +73,7 @@ def drawing_of(
     return overlay(sources, labels, view) if curves else drawing(sources[0], lateness=lateness)
 
 
-def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float], Callable[["Figure"], None]]:
+def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float], Callable[[Figure], None]]:
     """Return the size (inches) of the page for a file, and the function that draws the file's contents on an empty page.
 
     The arguments are those of `plot`. Raises `RecordingError` if the file is not one of ours; the function raises it, too.
@@ -87,13 +85,13 @@ def drawing(source: Path, *, lateness: bool = False) -> tuple[tuple[float, float
     return size_in, lambda page: _draw_recording(page, source, lateness=lateness)
 
 
-def _draw_model(page: "Figure", source: Path, kind: str) -> None:
+def _draw_model(page: Figure, source: Path, kind: str) -> None:
     found = load(source)
     with understood(source, kind):
         KINDS[kind].draw_on(page, found)
 
 
-def _draw_recording(page: "Figure", source: Path, *, lateness: bool) -> None:
+def _draw_recording(page: Figure, source: Path, *, lateness: bool) -> None:
     with Recording(source) as recording:
         if lateness:
             draw_lateness(page, recording)

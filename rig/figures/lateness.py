@@ -1,18 +1,14 @@
 """Figure of the timing of a wall-clock loop: histograms of wake-up, execution and response times."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, Figure, title
 from rig.errors import RecordingError
 from rig.recording.reader import Recording
 from rig.recording.stored import StoredTable
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PACED = {"host": "paced by the host", "device": "paced by the device", "lockstep": "in lockstep with the device"}
 """Printed name of each recorded pacing."""
@@ -23,7 +19,7 @@ TIMES = {"wake_up": "wake-up", "execution": "execution", "response": "response"}
 COLOURS = {"wake_up": MAIN, "execution": THIRD, "response": SECOND}
 
 
-def draw_lateness(page: "Figure", recording: Recording) -> None:
+def draw_lateness(page: Figure, recording: Recording) -> None:
     """Draw the number of blocks by time, and the share of blocks that took longer.
 
     All parts are taken together; the deadline is dashed. Raises `RecordingError` if no loop of the recording ran by the wall

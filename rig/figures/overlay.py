@@ -3,20 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rig.drawing.axes import log_axis
 from rig.drawing.curves import Curves, Panel, Quantity, Trace, View
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import COLOURS, MARKERS, REJECTED, engineering, rc, shade, title
+from rig.drawing.style import COLOURS, MARKERS, REJECTED, Axes, Figure, engineering, rc, shade, title
 from rig.errors import RecordingError
 from rig.figures.curves_of_files import curves_of, family_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DENSE = 80
 """Curves with more points are drawn without markers."""
@@ -40,7 +36,7 @@ class _Look:
 
 def overlay(
     sources: Sequence[Path], labels: Sequence[str] = (), view: View | None = None
-) -> tuple[tuple[float, float], Callable[["Figure"], None]]:
+) -> tuple[tuple[float, float], Callable[[Figure], None]]:
     """Return the size (inches) of the page for the curves of some files, and the function that draws them on an empty page.
 
     The files are recordings of one kind, or recordings and models with the same axes (`rig.figures.curves_of_files`).
@@ -94,7 +90,7 @@ def _frequency(trace: Trace, panels: Sequence[Panel]) -> np.ndarray:
     return np.asarray(line.x if panel.x.role == "frequency" else line.y)
 
 
-def _draw(page: "Figure", names: Sequence[str], found: Sequence[Curves], view: View, family: str) -> None:
+def _draw(page: Figure, names: Sequence[str], found: Sequence[Curves], view: View, family: str) -> None:
     panels = found[0].panels
     axes = grid(page, 1, len(panels))[0]
     levels = list(dict.fromkeys(trace.level for curves in found for trace in curves.traces))
@@ -131,7 +127,7 @@ def _look(number: int, level: int, files: int, levels: int, dense: bool) -> _Loo
 
 
 def _line(
-    axis: "Axes", panel: Panel, trace: Trace, n: int, look: _Look, view: View, unit: str, panels: Sequence[Panel]
+    axis: Axes, panel: Panel, trace: Trace, n: int, look: _Look, view: View, unit: str, panels: Sequence[Panel]
 ) -> None:
     line = trace.lines[n]
     inside = np.ones(line.x.size, bool)
@@ -158,7 +154,7 @@ def _shown(quantity: Quantity, values: np.ndarray, view: View, unit: str) -> np.
     return values * {"mm": 1e3, "µm": 1e6}[unit] if quantity.unit.partition("/")[0] == "m" else values
 
 
-def _axes(axis: "Axes", panel: Panel, view: View, unit: str) -> None:
+def _axes(axis: Axes, panel: Panel, view: View, unit: str) -> None:
     for name, quantity in (("x", panel.x), ("y", panel.y)):
         shown = quantity.unit
         if quantity.role == "amplitude" and view.amplitude == "dB":
@@ -176,7 +172,7 @@ def _axes(axis: "Axes", panel: Panel, view: View, unit: str) -> None:
         axis.axhline(90.0, color=REJECTED, lw=0.8, zorder=1)
 
 
-def _legend(page: "Figure", names: Sequence[str], levels: Sequence[str], found: Sequence[Curves], dense: bool) -> None:
+def _legend(page: Figure, names: Sequence[str], levels: Sequence[str], found: Sequence[Curves], dense: bool) -> None:
     from matplotlib.lines import Line2D
 
     def entry(look: _Look, text: str, fill: str | None = None) -> Line2D:

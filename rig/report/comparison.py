@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from rig.campaigns.evaluation.point import Point
 from rig.campaigns.evaluation.stored_point import value_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.check.findings import is_check
-from rig.drawing.style import COLOURS, MARKERS, REJECTED, title, unit_text
+from rig.drawing.style import COLOURS, MARKERS, REJECTED, Axes, Figure, title, unit_text
 from rig.recording.arrays import kind_of
 from rig.recording.reader import Recording
 from rig.report.document import Chapter, Section, Table
@@ -23,10 +22,6 @@ from rig.show.point_table import points_from
 from rig.show.summary import summarise_recording
 from rig.text.column import Column
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 MAX_PANELS = 3  # quantities that are compared; chosen
 _LEVEL = Column("level", "level", "", ".4g")
@@ -101,7 +96,7 @@ def panels(columns: Sequence[Column]) -> tuple[Column, list[Column]]:
     return x, [known[key] for key in wanted if key in known][:MAX_PANELS]
 
 
-def _draw(page: "Figure", kind: str, found: Sequence[_Compared]) -> None:
+def _draw(page: Figure, kind: str, found: Sequence[_Compared]) -> None:
     """Draw the points of the recordings over one another; those that are not accepted are small and hollow."""
     columns = CAMPAIGNS[kind].columns
     x, ys = panels(columns)
@@ -118,7 +113,7 @@ def _draw(page: "Figure", kind: str, found: Sequence[_Compared]) -> None:
     title(page, f"{kind}: {len(found)} recordings")
 
 
-def _panel(axis: "Axes", one: _Compared, n: int, x: Column, y: Column, spread: Column | None) -> None:
+def _panel(axis: Axes, one: _Compared, n: int, x: Column, y: Column, spread: Column | None) -> None:
     colour, marker = COLOURS[n % len(COLOURS)], MARKERS[n % len(MARKERS)]
     used = [point for point in one.points if point.accepted]
     errors = None if spread is None else _values(used, spread)

@@ -3,16 +3,13 @@
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification import IdentificationError
 from rig.drawing.page import svg_of
+from rig.drawing.style import Figure
 from rig.errors import RigError
 from rig.figures.files import drawing
 from rig.report.document import Block, Picture, Text
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _LARGEST_WIDTH_IN = 10.0
 """Wider figures of `rig plot` are drawn so wide, at the same shape: their text stays readable on A4."""
@@ -29,7 +26,7 @@ class Pictures:
         size_in, draw = drawing(path, lateness=lateness)
         return self.drawn(draw, size_in, caption)
 
-    def drawn(self, draw: Callable[["Figure"], None], size_in: tuple[float, float], caption: str) -> Block:
+    def drawn(self, draw: Callable[[Figure], None], size_in: tuple[float, float], caption: str) -> Block:
         """Return what a function draws on a page of a size (inches), or why it cannot be drawn."""
         scale = min(1.0, _LARGEST_WIDTH_IN / size_in[0])
         number = next(self._numbers)

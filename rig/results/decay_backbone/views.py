@@ -1,15 +1,12 @@
 """Table and figure of a free decay: modal frequency and damping over the amplitude."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from identification import DecayBackbone
-from rig.drawing.style import MAIN, SECOND, engineering, title
+from rig.drawing.style import MAIN, SECOND, Figure, engineering, title
 from rig.results.kind import Table
 from rig.text.column import Column
 from rig.text.console import print_rows
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _summarise(found: DecayBackbone) -> dict[str, Any]:
@@ -51,7 +48,7 @@ _SMALL_CHANGE = 2e-4
 """Least height of the frequency axis over the last frequency, so that rounding does not look like a change; chosen."""
 
 
-def draw_decay(page: "Figure", found: DecayBackbone) -> None:
+def draw_decay(page: Figure, found: DecayBackbone) -> None:
     """Draw every mode with its 95 % intervals."""
     panels = page.subplots(len(found.modes), 2, squeeze=False)
     for (left, right), mode in zip(panels, found.modes, strict=True):

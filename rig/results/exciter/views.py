@@ -1,20 +1,15 @@
 """Table and figure of an exciter model: force per volt, blocked force per volt and dynamic stiffness, with 95 % bands."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification import Exciter
 from identification.exciter_coupling import PARAMETERS
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, SECOND, title
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, title
 from rig.results.kind import Table
 from rig.text.console import number, print_table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _SHOWN = {
     "force_per_volt_n_v": ("force per volt, blocked", "N/V"),
@@ -68,7 +63,7 @@ _DECADES = 5.0
 _DOTS: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0, "color": REJECTED, "alpha": 0.5}
 
 
-def draw_exciter(page: "Figure", exciter: Exciter) -> None:
+def draw_exciter(page: Figure, exciter: Exciter) -> None:
     """Draw measurement and model over the band in which the exciter was identified, with amplitude above phase.
 
     From left to right: force per volt on the rig, as measured and as the model gives it for the measured motion, with the
@@ -108,7 +103,7 @@ def draw_exciter(page: "Figure", exciter: Exciter) -> None:
     title(page, _title(exciter, low, high))
 
 
-def _on_the_rig(size: "Axes", phase: "Axes", exciter: Exciter) -> None:
+def _on_the_rig(size: Axes, phase: Axes, exciter: Exciter) -> None:
     lines = exciter.lines
     assert lines is not None
     f, measured = lines.frequency_hz, lines.force_per_volt
@@ -135,7 +130,7 @@ def _each(exciter: Exciter) -> tuple[np.ndarray, np.ndarray]:
     return blocked, (exciter.force_per_volt(s) * path - lines.force_per_volt) / armature
 
 
-def _modelled(size: "Axes", phase: "Axes", frequency: np.ndarray, value: np.ndarray, drawn: list[np.ndarray]) -> None:
+def _modelled(size: Axes, phase: Axes, frequency: np.ndarray, value: np.ndarray, drawn: list[np.ndarray]) -> None:
     size.plot(frequency, np.abs(value), color=MAIN)
     if np.abs(value).max() > _DECADES * np.abs(value).min():
         size.set_yscale("log")
@@ -147,7 +142,7 @@ def _modelled(size: "Axes", phase: "Axes", frequency: np.ndarray, value: np.ndar
     phase.set(ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
 
 
-def _explain(axis: "Axes", band: bool, dots: bool) -> None:
+def _explain(axis: Axes, band: bool, dots: bool) -> None:
     axis.plot([], [], color=MAIN, label="model")
     if band:
         axis.fill([], [], color=MAIN, alpha=0.25, lw=0, label="95 % of the fit")

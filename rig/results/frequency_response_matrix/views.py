@@ -1,7 +1,7 @@
 """Table, figure, curves and exchange of frequency response matrices."""
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,14 +11,11 @@ from rig.drawing.areas import is_narrow
 from rig.drawing.curves import Curves, View, transfer_curves
 from rig.drawing.lines import pooled, without_wraps
 from rig.drawing.page import grid
-from rig.drawing.style import COLOURS, REJECTED, title, unit_text
+from rig.drawing.style import COLOURS, REJECTED, Figure, title, unit_text
 from rig.results.kind import Exchange, Table
 from rig.text.column import Column
 from rig.text.console import print_rows
 from rig.text.contents import Contents
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _summarise(matrix: FrequencyResponseMatrix) -> dict[str, Any]:
@@ -61,7 +58,7 @@ TABLE = Table(_summarise, _say)
 _LINES = ("-", "--", ":", "-.")
 
 
-def draw_response_matrix(page: "Figure", matrix: FrequencyResponseMatrix) -> None:
+def draw_response_matrix(page: Figure, matrix: FrequencyResponseMatrix) -> None:
     """Draw one colour per output and one line style per input; thin lines are standard errors."""
     size, phase = grid(page, 2, 1, sharex=True, height_ratios=(2.0, 1.0))[:, 0]
     known = False

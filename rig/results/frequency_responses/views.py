@@ -1,6 +1,6 @@
 """Storage, table, figure, curves and exchange of stepped-sine measurements."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -8,14 +8,11 @@ from identification import FrequencyResponse, pack_frequency_responses, unpack_f
 from identification.common import MOTION_UNIT
 from rig.drawing.curves import DISPLACEMENT, FREQUENCY, LAG, ONE_AMPLITUDE, Curves, Line, Panel, Trace, View
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import REJECTED, length_factor, plain_log, shade, title
+from rig.drawing.style import REJECTED, Figure, length_factor, plain_log, shade, title
 from rig.results.kind import Exchange, Storage, Table
 from rig.text.column import Column
 from rig.text.console import print_rows
 from rig.text.contents import Contents
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _summarise(responses: tuple[FrequencyResponse, ...]) -> dict[str, Any]:
@@ -48,7 +45,7 @@ def _say(summary: dict[str, Any]) -> None:
 TABLE = Table(_summarise, _say)
 
 
-def draw_responses(page: "Figure", responses: tuple[FrequencyResponse, ...]) -> None:
+def draw_responses(page: Figure, responses: tuple[FrequencyResponse, ...]) -> None:
     """Draw amplitude and phase lag over frequency."""
     top, bottom = grid(page, 2, 1, sharex=True)[:, 0]
     scale, unit = length_factor(np.concatenate([response.amplitude_m for response in responses]))

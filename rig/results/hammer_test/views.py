@@ -1,6 +1,6 @@
 """Table and figure of a hammer test: the hits, and the frequency responses with coherence."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -8,12 +8,9 @@ from identification import FrequencyResponseMatrix, HammerTest
 from rig.drawing.areas import is_narrow
 from rig.drawing.lines import without_wraps
 from rig.drawing.page import grid
-from rig.drawing.style import COLOURS, MAIN, REJECTED, title, unit_text
+from rig.drawing.style import COLOURS, MAIN, REJECTED, Figure, title, unit_text
 from rig.results.kind import Table
 from rig.text.console import number, print_table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _summarise(found: HammerTest) -> dict[str, Any]:
@@ -63,7 +60,7 @@ _MOST_OUTPUTS = 6
 """Largest number of outputs that are drawn; chosen for legibility."""
 
 
-def draw_hammer_test(page: "Figure", found: HammerTest) -> None:
+def draw_hammer_test(page: Figure, found: HammerTest) -> None:
     """Draw the responses in amplitude and phase, the coherence, and the spectrum of the force with the hits' peaks."""
     responses = found.responses
     size, phase, coherence, force = grid(page, 4, 1, sharex=True, height_ratios=(2.2, 1.0, 1.0, 1.0))[:, 0]

@@ -1,7 +1,5 @@
 """Figures of results without a file: responses and force surfaces, backbones, distortion, stabilisation, sweeps."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from identification import (
@@ -22,27 +20,22 @@ from identification.common import MOTION_UNIT
 from rig.drawing.force_surface import fitted_stiffness
 from rig.drawing.lines import draw_poles
 from rig.drawing.steady_curve import draw_stability
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, length_factor, shade, title, unit_text
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, Axes, Figure, length_factor, shade, title, unit_text
 from rig.results.frequency_responses.views import draw_responses
 from rig.results.predictions.figure import draw_predictions
 from simulators.analysis import PeriodicResponses
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 _FREQUENCY, _LAG = "frequency, Hz", "phase lag of displacement, deg"
 _LAGS_DEG = (30.0, 90.0, 150.0)
 """Phase lags of the sections that are drawn, deg: resonance, and one on each side; chosen."""
 
 
-def draw_response(page: "Figure", response: FrequencyResponse) -> None:
+def draw_response(page: Figure, response: FrequencyResponse) -> None:
     """Draw amplitude and lag over the frequency."""
     draw_responses(page, (response,))
 
 
-def draw_surface(page: "Figure", surface: ForceSurface) -> None:
+def draw_surface(page: Figure, surface: ForceSurface) -> None:
     """Draw stiffness and lag of every level as fitted, and the force over the displacement at three lags."""
     size, section = page.subplots(1, 2)
     factor, unit = length_factor(surface.amplitude_m)
@@ -63,7 +56,7 @@ def draw_surface(page: "Figure", surface: ForceSurface) -> None:
     title(page, f"{surface.specimen or 'specimen'}: force surface, {len(surface.levels)} levels")
 
 
-def draw_curve(page: "Figure", curve: ConstantForceCurve) -> None:
+def draw_curve(page: Figure, curve: ConstantForceCurve) -> None:
     """Draw amplitude over frequency with its 95 % band, and the lag; unstable parts are dotted."""
     size, lag = page.subplots(1, 2)
     found = curve.response
@@ -76,7 +69,7 @@ def draw_curve(page: "Figure", curve: ConstantForceCurve) -> None:
     title(page, f"{found.specimen or 'specimen'}: at constant force, cut from a force surface")
 
 
-def draw_comparison(page: "Figure", compared: Comparison) -> None:
+def draw_comparison(page: Figure, compared: Comparison) -> None:
     """Draw reference and prediction over the frequency, and their difference."""
     size, difference = page.subplots(1, 2)
     known = compared.reference
@@ -99,12 +92,12 @@ def as_predictions(one: SteadyPrediction | SweepPrediction) -> Predictions:
     return Predictions(steady=(one,), steady_references=(None,), steady_errors=(None,), steady_bands=(None,))
 
 
-def draw_prediction(page: "Figure", one: SteadyPrediction | SweepPrediction) -> None:
+def draw_prediction(page: Figure, one: SteadyPrediction | SweepPrediction) -> None:
     """Draw a single prediction as a file of predictions is drawn."""
     draw_predictions(page, as_predictions(one))
 
 
-def draw_band(page: "Figure", found: ResponseBand) -> None:
+def draw_band(page: Figure, found: ResponseBand) -> None:
     """Draw the interval of the amplitude over the lag, and of the frequency over the lag."""
     size, frequency = page.subplots(1, 2)
     factor, unit = length_factor(found.amplitude_m)
@@ -115,14 +108,14 @@ def draw_band(page: "Figure", found: ResponseBand) -> None:
     title(page, f"95 % of {found.draws} draws")
 
 
-def _label(size: "Axes", lag: "Axes", unit: str) -> None:
+def _label(size: Axes, lag: Axes, unit: str) -> None:
     size.set(xlabel=_FREQUENCY, ylabel=f"displacement amplitude, {unit}")
     size.legend()
     lag.axhline(90.0, color=REJECTED, lw=0.8)
     lag.set(xlabel=_FREQUENCY, ylabel=_LAG)
 
 
-def draw_continuous(page: "Figure", found: ContinuousBackbone) -> None:
+def draw_continuous(page: Figure, found: ContinuousBackbone) -> None:
     """Draw modal frequency and damping over the amplitude: the mean of both ramps with its 95 % band, and each ramp."""
     frequency, damping = page.subplots(1, 2)
     factor, unit = length_factor(found.amplitude_m)
@@ -145,7 +138,7 @@ def draw_continuous(page: "Figure", found: ContinuousBackbone) -> None:
     title(page, f"{found.backbone.specimen or 'specimen'}: continuous backbone, {found.periods:.0f} periods")
 
 
-def draw_periodic(page: "Figure", found: PeriodicResponses) -> None:
+def draw_periodic(page: Figure, found: PeriodicResponses) -> None:
     """Draw amplitude and lag over the frequency, in the order of the points; unstable parts are dotted."""
     size, lag = page.subplots(1, 2)
     factor, unit = length_factor(found.amplitude_m)
@@ -163,7 +156,7 @@ def draw_periodic(page: "Figure", found: PeriodicResponses) -> None:
 _FLOOR = 1e-6  # of the largest amplitude: smaller values are rounding
 
 
-def draw_distortion(page: "Figure", levels: DistortionLevels) -> None:
+def draw_distortion(page: Figure, levels: DistortionLevels) -> None:
     """Draw signal, odd and even distortion and noise of every channel over the frequency, as peak amplitudes."""
     axes = page.subplots(len(levels.channels), 1, sharex=True, squeeze=False)[:, 0]
     odd, even = ~levels.excited & ~levels.even, ~levels.excited & levels.even
@@ -186,7 +179,7 @@ def draw_distortion(page: "Figure", levels: DistortionLevels) -> None:
     title(page, f"distortion of what is driven by {levels.input}")
 
 
-def draw_stabilisation(page: "Figure", diagram: StabilisationDiagram) -> None:
+def draw_stabilisation(page: Figure, diagram: StabilisationDiagram) -> None:
     """Draw the poles over the order, and the singular values."""
     poles, singular = page.subplots(1, 2, width_ratios=(2.0, 1.0))
     draw_poles(poles, diagram, "frequency stable", "frequency, damping and shape stable")
@@ -198,7 +191,7 @@ def draw_stabilisation(page: "Figure", diagram: StabilisationDiagram) -> None:
     title(page, "stabilisation diagram")
 
 
-def draw_transient(page: "Figure", sweep: Transient) -> None:
+def draw_transient(page: Figure, sweep: Transient) -> None:
     """Draw the fundamental of every channel and the frequency over time."""
     axes = page.subplots(len(sweep.channels) + 1, 1, sharex=True)
     for axis, channel, values in zip(axes, sweep.channels, np.abs(sweep.fundamentals), strict=False):

@@ -1,7 +1,7 @@
 """Table, figure and exchange of a linear modal analysis."""
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -9,14 +9,21 @@ from identification import FrequencyResponseMatrix, LinearModes, ModalAnalysis, 
 from identification.common import decode, encode
 from rig.drawing.areas import areas
 from rig.drawing.lines import draw_poles, pooled, without_wraps
-from rig.drawing.style import COLOURS, MAIN, REJECTED, legend_above, say_why_empty, shade, title, unit_text
+from rig.drawing.style import (
+    COLOURS,
+    MAIN,
+    REJECTED,
+    Axes,
+    Figure,
+    legend_above,
+    say_why_empty,
+    shade,
+    title,
+    unit_text,
+)
 from rig.results.kind import Exchange, Table
 from rig.text.console import number, print_table
 from rig.text.contents import Contents
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def _summarise(analysis: ModalAnalysis) -> dict[str, Any]:
@@ -68,7 +75,7 @@ _MOST_DOTS = 4000
 """Largest number of dots of a curve; chosen for the size of the file."""
 
 
-def draw_linear_modes(page: "Figure", found: ModalAnalysis) -> None:
+def draw_linear_modes(page: Figure, found: ModalAnalysis) -> None:
     """Draw the modes, and the responses and the stabilisation diagram if the file has them.
 
     ``page`` is an empty figure, about 11 by 8 inches.
@@ -126,7 +133,7 @@ def _around(modes: LinearModes) -> np.ndarray:
 
 
 def _stabilisation(
-    axis: "Axes",
+    axis: Axes,
     modes: LinearModes,
     diagram: StabilisationDiagram | None,
     responses: FrequencyResponseMatrix | None,
@@ -147,7 +154,7 @@ def _stabilisation(
     legend_above(axis, 2)
 
 
-def _shapes(axis: "Axes", modes: LinearModes) -> None:
+def _shapes(axis: Axes, modes: LinearModes) -> None:
     """Draw the mass-normalised shape of every mode, one group of bars per channel, with 95 % intervals."""
     count = modes.frequency_hz.size
     width = 0.8 / count
@@ -164,7 +171,7 @@ def _shapes(axis: "Axes", modes: LinearModes) -> None:
     legend_above(axis, min(count, 2))
 
 
-def _mac(axis: "Axes", modes: LinearModes) -> None:
+def _mac(axis: Axes, modes: LinearModes) -> None:
     unit = modes.shapes / np.linalg.norm(modes.shapes, axis=0)
     mac = (unit.T @ unit) ** 2
     axis.imshow(mac, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")

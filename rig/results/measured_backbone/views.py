@@ -1,20 +1,17 @@
 """Storage, table, figure, curves and exchange of a backbone that was measured with another system."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification import Backbone, nonlinear_mode
 from rig.drawing.curves import Curves, View, backbone_curves
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, REJECTED, engineering, title
+from rig.drawing.style import MAIN, REJECTED, Figure, engineering, title
 from rig.measurements.backbone_table import backbone_from, backbone_parts
 from rig.results.kind import Exchange, Storage, Table
 from rig.text.column import Column
 from rig.text.console import print_rows
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _pack(backbone: Backbone) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -47,7 +44,7 @@ def _say(summary: dict[str, Any]) -> None:
 TABLE = Table(_summarise, _say)
 
 
-def draw_backbone(page: "Figure", backbone: Backbone) -> None:
+def draw_backbone(page: Figure, backbone: Backbone) -> None:
     """Draw amplitude and force over the frequency, amplitude over the force, and the phase error."""
     axes = grid(page, 2, 2)
     amplitude, unit = engineering(np.asarray(backbone.amplitude_m))

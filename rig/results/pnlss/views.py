@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification import Features, PnlssModel
-from rig.drawing.style import MAIN, REJECTED, SECOND, plain_log
+from rig.drawing.style import MAIN, REJECTED, SECOND, Axes, Figure, plain_log
 from rig.results.kind import Table
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.simulated.figure import channels_of, draw_simulated
@@ -15,9 +15,6 @@ from rig.results.simulated.table import say_errors, say_scatter, summary_of
 from rig.text.console import number
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from identification import PnlssFit
     from rig.results.pnlss.model import IdentifiedPnlss
 
@@ -100,7 +97,7 @@ def _say(summary: dict[str, Any]) -> None:
 TABLE = Table(_summarise, _say)
 
 
-def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
+def draw_pnlss(page: Figure, found: "IdentifiedPnlss") -> None:
     """Draw the drive point's spectrum and a stretch of time, measured and simulated, the course of the fit, and all errors."""
     model, fit = found.model, found.fit
     heading = (
@@ -110,7 +107,7 @@ def draw_pnlss(page: "Figure", found: "IdentifiedPnlss") -> None:
     draw_simulated(page, found, heading, {"fit": None if fit is None else partial(_history, fit=fit)})
 
 
-def _history(axis: "Axes", fit: "PnlssFit") -> None:
+def _history(axis: Axes, fit: "PnlssFit") -> None:
     from matplotlib.ticker import MaxNLocator
 
     past = fit.history

@@ -1,19 +1,15 @@
 """Figures of predictions with their references: frequency responses, sweeps and multisines."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification import Predictions, ResponseBand
 from rig.drawing.areas import areas, broad, is_narrow
 from rig.drawing.steady_curve import BEYOND, UNSTABLE, draw_curve, draw_ends, why_it_ends
-from rig.drawing.style import MARKERS, REJECTED, length_factor, shade, title
+from rig.drawing.style import MARKERS, REJECTED, Axes, Figure, length_factor, shade, title
 from rig.results.predictions.runs_figure import draw_runs
 from rig.results.predictions.sweeps_figure import draw_sweeps, sweeps_shown
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _MOST_NAMED = 12
 """Largest number of names in a legend; chosen for legibility."""
@@ -23,7 +19,7 @@ _MARKED = {"mfc": "white", "mec": "black", "mew": 0.8, "ls": "none"}
 """Looks of measured points: not of the colour of any curve."""
 
 
-def draw_predictions(page: "Figure", predictions: Predictions) -> None:
+def draw_predictions(page: Figure, predictions: Predictions) -> None:
     """Draw the predictions that exist, frequency responses and multisines above, sweeps below."""
     narrow = is_narrow(page)
     kinds = [kind for kind in ("steady", "runs", "sweeps") if getattr(predictions, kind)]
@@ -48,7 +44,7 @@ def draw_predictions(page: "Figure", predictions: Predictions) -> None:
     title(page, f"{predictions.specimen or 'specimen'}: predicted, {', '.join(counts)}")
 
 
-def _areas(page: "Figure", kinds: list[str], sweeps: int, narrow: bool) -> dict[str, Any]:
+def _areas(page: Figure, kinds: list[str], sweeps: int, narrow: bool) -> dict[str, Any]:
     panels = {"steady": 3, "sweeps": 3 * sweeps + 1, "runs": 2}
     if narrow:
         return dict(zip(kinds, areas(page, [panels[kind] for kind in kinds], [1.0] * len(kinds)), strict=True))
@@ -111,7 +107,7 @@ def _name(predictions: Predictions, index: int) -> str | None:
     return f"{name}, predicted: {error_text}"
 
 
-def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, colour: Any) -> None:
+def _uncertainty(size: Axes, phase: Axes, band: ResponseBand, scale: float, colour: Any) -> None:
     """Draw the 95 % band as areas: between the limits of amplitude, and between the limits of frequency."""
     middle_hz, middle_m = band.frequency_hz.mean(axis=0), band.amplitude_m.mean(axis=0)
     peak = int(np.argmax(middle_m))
@@ -127,7 +123,7 @@ def _uncertainty(size: "Axes", phase: "Axes", band: ResponseBand, scale: float, 
     phase.fill_betweenx(band.phase_lag_deg, *band.frequency_hz, color=colour, alpha=0.25, lw=0)
 
 
-def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> None:
+def _limit(size: Axes, predictions: Predictions, scale: float, top: float) -> None:
     highest = max(predictions.steady, key=lambda response: float(response.range_use.max()))
     where = int(np.argmax(highest.range_use))
     limit = scale * float(highest.amplitude_m()[where] / highest.range_use[where])
@@ -135,7 +131,7 @@ def _limit(size: "Axes", predictions: Predictions, scale: float, top: float) -> 
         size.axhline(limit, color=REJECTED, lw=0.9, ls="--", label="largest amplitude identified")
 
 
-def _show_references(size: "Axes", predictions: Predictions) -> None:
+def _show_references(size: Axes, predictions: Predictions) -> None:
     found = [reference.frequency_hz for reference in predictions.steady_references if reference is not None]
     if len(found) == len(predictions.steady):
         every = np.concatenate(found)
@@ -143,7 +139,7 @@ def _show_references(size: "Axes", predictions: Predictions) -> None:
         size.set_xlim(every.min() - margin, every.max() + margin)
 
 
-def _explain(size: "Axes", predictions: Predictions) -> None:
+def _explain(size: Axes, predictions: Predictions) -> None:
     if not all(response.stable.all() for response in predictions.steady):
         size.plot([], [], ls=UNSTABLE, color=REJECTED, label="unstable")
     if any(response.fold_frequency_hz.size for response in predictions.steady):

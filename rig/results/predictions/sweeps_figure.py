@@ -1,23 +1,20 @@
 """Figure of predicted sweeps: motion, force, and their differences from the recording, over the instantaneous frequency."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification import Predictions, SweepPrediction, Transient
 from identification.models import as_recorded
 from rig.drawing.areas import broad
-from rig.drawing.style import MAIN, REJECTED, SECOND, length_factor
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from rig.drawing.style import MAIN, REJECTED, SECOND, Figure, length_factor
 
 _MOST_SWEEPS, _MOST_ON_A_COLUMN, _MOST_BESIDE_OTHERS = 4, 2, 1
 _LINES_OF_TEXT = 14.0  # a row of panels takes the height of so many
 _MOST_SHOWN = 2.0  # times the largest recorded value: an unbounded run is not shown beyond
 
 
-def sweeps_shown(page: "Figure", predictions: Predictions, narrow: bool, alone: bool) -> int:
+def sweeps_shown(page: Figure, predictions: Predictions, narrow: bool, alone: bool) -> int:
     """Return how many sweeps are drawn, the first ones: as many as the page has room for."""
     from matplotlib import rcParams
 

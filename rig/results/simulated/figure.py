@@ -8,13 +8,22 @@ import numpy as np
 from identification.common import MOTION_UNIT
 from rig.drawing.lines import pooled
 from rig.drawing.page import grid
-from rig.drawing.style import MAIN, MARKERS, REJECTED, SECOND, THIRD, plain_log, say_why_empty, title, unit_text
+from rig.drawing.style import (
+    MAIN,
+    MARKERS,
+    REJECTED,
+    SECOND,
+    THIRD,
+    Axes,
+    Figure,
+    plain_log,
+    say_why_empty,
+    title,
+    unit_text,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from identification import Channel, ErrorSpectra, OutputStretch
     from identification.experiments import Simulator
@@ -25,7 +34,7 @@ _USES = {"training": (MAIN, "o"), "validation": (SECOND, "s"), "test": (REJECTED
 
 
 def draw_simulated(
-    page: "Figure", found: "SimulatedModel", heading: str, own: "Mapping[str, Callable[[Axes], None] | None]"
+    page: Figure, found: "SimulatedModel", heading: str, own: Mapping[str, Callable[[Axes], None] | None]
 ) -> None:
     """Draw the drive point's spectrum and a stretch of time, measured and simulated, the model's own panels, and all errors.
 
@@ -77,7 +86,7 @@ def _with_unit(channel: "Channel") -> str:
     return f"{channel.name}, {unit_text(unit)}" if unit else channel.name
 
 
-def _spectra(axis: "Axes", spectra: "ErrorSpectra", channel: "Channel") -> None:
+def _spectra(axis: Axes, spectra: "ErrorSpectra", channel: "Channel") -> None:
     row, f = spectra.outputs.index(channel.name), spectra.frequency_hz
     dots = (
         (spectra.measured, REJECTED, 3.0, "measured"),
@@ -106,7 +115,7 @@ def _positive(values: np.ndarray) -> np.ndarray:
     return np.where(values > 0.0, values, np.nan)
 
 
-def _stretch(axis: "Axes", stretch: "OutputStretch", channel: "Channel") -> None:
+def _stretch(axis: Axes, stretch: "OutputStretch", channel: "Channel") -> None:
     row = stretch.outputs.index(channel.name)
     measured, simulated = stretch.measured[row], stretch.simulated[row]
     axis.plot(stretch.time_s, measured, color=REJECTED, lw=3.0, alpha=0.6, label="measured")
@@ -119,7 +128,7 @@ def _stretch(axis: "Axes", stretch: "OutputStretch", channel: "Channel") -> None
         axis.set_title("the run becomes unbounded", loc="right")
 
 
-def _errors(axis: "Axes", found: "SimulatedModel") -> None:
+def _errors(axis: Axes, found: "SimulatedModel") -> None:
     bounded = [run for run in found.runs if run.bounded]
     lost = len(found.runs) - len(bounded)
     if not bounded:

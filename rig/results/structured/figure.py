@@ -7,15 +7,12 @@ import numpy as np
 
 from identification import structured_mode
 from rig.drawing.curves import Curves, View, backbone_curves
-from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD
+from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, Axes, Figure
 from rig.errors import RecordingError
 from rig.results.simulated.figure import channels_of, draw_simulated
 from rig.results.structured.model import IdentifiedStructured
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from identification import NonlinearElement
     from rig.results.structured.model import IdentifiedStructured
 
@@ -26,7 +23,7 @@ _POINTS = 301
 """Points of a drawn law; chosen."""
 
 
-def draw_structured(page: "Figure", found: "IdentifiedStructured") -> None:
+def draw_structured(page: Figure, found: "IdentifiedStructured") -> None:
     """Draw the drive point's spectrum and a stretch of time, measured and simulated, the elements, and all errors."""
     model = found.model
     modes, elements = len(model.frequency_hz), len(model.elements)
@@ -41,7 +38,7 @@ def draw_structured(page: "Figure", found: "IdentifiedStructured") -> None:
     draw_simulated(page, found, heading, panels)
 
 
-def _laws(axis: "Axes", element: "NonlinearElement", number: int) -> None:
+def _laws(axis: Axes, element: "NonlinearElement", number: int) -> None:
     """Draw forces and damping of an element over its displacement, and mark the range of the training data.
 
     Of joints it is the loop between the ends of that range. Functions of the user are not imported and therefore not drawn.

@@ -1,6 +1,6 @@
 """Table and figure of time records that were measured with other systems."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
@@ -8,14 +8,11 @@ import scipy
 from identification import TimeRecord, TimeRecords
 from identification.experiments import period_remark
 from rig.drawing.page import grid, legend_below
-from rig.drawing.style import MAIN, TRACE_BINS, shade, title, unit_text
+from rig.drawing.style import MAIN, TRACE_BINS, Figure, shade, title, unit_text
 from rig.results.kind import Table
 from rig.text.column import Column
 from rig.text.console import print_rows
 from vibrolock.arrays import Float
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _summarise(data: TimeRecords) -> dict[str, Any]:
@@ -89,7 +86,7 @@ _THIN = 0.7
 """Width of lines, points; chosen."""
 
 
-def draw_time_data(page: "Figure", data: TimeRecords) -> None:
+def draw_time_data(page: Figure, data: TimeRecords) -> None:
     """Draw the first record of each level: extremes over time on the left, on the right amplitudes of the lines of a period.
 
     Of records that are not periodic the right shows the amplitude spectral density. The first six channels and at most eight
