@@ -29,6 +29,7 @@ from rig.measurements.experiments.periods import Periods
 from rig.measurements.sep005 import time_series
 from rig.measurements.tables import points_table, telemetry
 from rig.recording.reader import Recording
+from rig.system.closing import Closing
 from vibrolock.results import Result
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-class Run(Result):
+class Run(Result, Closing):
     """A new recording and its measurements. If no output file was given, the recording is deleted together with this object."""
 
     def __init__(self, recording: Recording, temporary: Path | None = None) -> None:
@@ -141,12 +142,6 @@ class Run(Result):
         self.recording.close()
         if self._delete is not None:
             self._delete()
-
-    def __enter__(self) -> "Run":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def __del__(self) -> None:
         self.close()

@@ -100,7 +100,11 @@ def _responses(source: Recording, view: View) -> Curves:
         harmonics = np.array([spectrum_of(point).harmonics for point in some])
         across, amplitude = peak(channels, harmonics, frequency_hz, view)
         if some[0].level_unit == "m":
-            across, amplitude = _per_force(across, amplitude, np.abs(harmonics[:, force, 1]))
+            # where the response is held, its amplitude tells nothing: it is drawn over the force
+            name = across.text.replace("displacement amplitude", "receptance")
+            name = name.replace("amplitude", "response over force")
+            across = Quantity(name, f"{across.unit}/N", "amplitude")
+            amplitude = amplitude / np.abs(harmonics[:, force, 1])
         drive = harmonics[:, [channel.role for channel in channels].index("drive"), 1]
         lag = np.degrees(np.angle(-harmonics[:, force, 1] / drive))
         held = some[0].level_unit in ("N", "N RMS") and source.kind == "stepped-phase"
@@ -122,12 +126,6 @@ def _broken(line: Line, breaks: np.ndarray) -> Line:
     return Line(np.insert(line.x, breaks, np.nan), np.insert(line.y, breaks, np.nan), None, folded)
 
 
-def _per_force(across: Quantity, amplitude: np.ndarray, force_n: np.ndarray) -> tuple[Quantity, np.ndarray]:
-    """Return an amplitude over the fundamental of the force: where the response is held, its amplitude tells nothing."""
-    name = across.text.replace("displacement amplitude", "receptance").replace("amplitude", "response over force")
-    return Quantity(name, f"{across.unit}/N", "amplitude"), amplitude / force_n
-
-
 def _points_between(folded: np.ndarray) -> np.ndarray:
     """Return bool[n]: points with a folded piece on both sides, or at the end of one that ends the curve."""
     before, after = np.r_[folded[:1], folded], np.r_[folded, folded[-1:]]
@@ -144,9 +142,8 @@ def _sweeps(source: Recording, view: View) -> Curves:
         across, amplitude = peak(sweep.channels, harmonics, sweep.frequency_hz, view)
         panels = (Panel(FREQUENCY, across), Panel(FREQUENCY, FORCE))
         point = points[number]
-        name = f"{point.level:g} {point.level_unit} {point.direction}" + (
-            f" {point.repeat}" if point.repeat > 1 else ""
-        )
+        repeat = f" {point.repeat}" if point.repeat > 1 else ""
+        name = f"{point.level:g} {point.level_unit} {point.direction}{repeat}"
         lines = (Line(sweep.frequency_hz, amplitude), Line(sweep.frequency_hz, np.abs(sweep.force)))
         traces.append(Trace(name, lines))
     return Curves(panels, tuple(traces), specimen_of(source), refused(list(points.values())))

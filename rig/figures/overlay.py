@@ -56,20 +56,15 @@ def overlay(
     found = [curves_of(path, view) for path in sources]
     for path, curves in zip(sources, found, strict=True):
         if curves.panels != found[0].panels:
-            _refuse_other_axes(sources[0], found[0], path, curves)
+            axes = [", ".join(f"{panel.y.text} ({panel.y.unit})" for panel in one.panels) for one in (found[0], curves)]
+            raise RecordingError(
+                f"{sources[0]} and {path}: have no common axes: {axes[0]} and {axes[1]}; draw them apart"
+            )
         _check_limits(path, curves, view)
-    names = list(labels) or _names(sources)
+    names = list(labels) or [path.stem for path in sources]
+    if not labels and len(set(names)) < len(names):
+        names = [str(path.with_suffix("")) for path in sources]
     return SIZE_IN, lambda page: _draw(page, names, found, view, first)
-
-
-def _names(sources: Sequence[Path]) -> list[str]:
-    names = [path.stem for path in sources]
-    return names if len(set(names)) == len(names) else [str(path.with_suffix("")) for path in sources]
-
-
-def _refuse_other_axes(one: Path, first: Curves, other: Path, curves: Curves) -> None:
-    said = [", ".join(f"{panel.y.text} ({panel.y.unit})" for panel in each.panels) for each in (first, curves)]
-    raise RecordingError(f"{one} and {other}: have no common axes: {said[0]} and {said[1]}; draw them apart")
 
 
 def _check_limits(path: Path, curves: Curves, view: View) -> None:

@@ -100,7 +100,9 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
         say_why_empty(phase, "")
         return
     frequency = responses.frequency_hz
-    fine = np.union1d(np.geomspace(max(frequency[0], 1e-3), frequency[-1], 2000), _around(modes))
+    width = modes.damping_ratio * modes.frequency_hz
+    peaks = modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)
+    fine = np.union1d(np.geomspace(max(frequency[0], 1e-3), frequency[-1], 2000), peaks)
     fitted = modes.response_matrix(
         fine[(fine >= modes.lowest_hz) & (fine <= modes.highest_hz)], decay_rate_1_s=responses.decay_rate_1_s
     )
@@ -124,12 +126,6 @@ def responses_on(page: Any, modes: LinearModes, responses: FrequencyResponseMatr
     size.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, handlelength=1.2, borderaxespad=0.2)
     size.tick_params(labelbottom=False)
     phase.set(xlabel="frequency, Hz", ylabel="phase, deg", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
-
-
-def _around(modes: LinearModes) -> np.ndarray:
-    """Return frequencies dense enough to show every peak of the model."""
-    width = modes.damping_ratio * modes.frequency_hz
-    return np.asarray((modes.frequency_hz[:, None] + width[:, None] * np.linspace(-12.0, 12.0, 97)).ravel())
 
 
 def _stabilisation(

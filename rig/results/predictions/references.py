@@ -89,13 +89,8 @@ class Reference:
 
 def over_of(measured: FrequencyResponse, asked: Over | None) -> Over:
     """Return the quantity over which a reference is compared."""
-    return asked or ("phase" if _turns_back(measured.frequency_hz) else "frequency")
-
-
-def _turns_back(frequency_hz: np.ndarray) -> bool:
-    """Whether the frequency turns back along a branch. Then only the phase distinguishes vibrations at the same frequency."""
-    steps = np.diff(frequency_hz)
-    return bool((steps > 0.0).any() and (steps < 0.0).any())
+    steps = np.diff(measured.frequency_hz)  # where these change sign, the phase alone tells vibrations apart
+    return asked or ("phase" if (steps > 0.0).any() and (steps < 0.0).any() else "frequency")
 
 
 def references_in(path: Path, asked: Over | None) -> list[Reference]:

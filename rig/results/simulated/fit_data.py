@@ -77,7 +77,8 @@ def fit_data(
         inputs = tuple(channel.name for channel in like.inputs)
         outputs = tuple(channel.name for channel in like.outputs)
     else:
-        rate_hz = options.rate_hz or _common_rate_hz(paths)
+        rates = [] if options.rate_hz else [rates_hz_in(path) for path in paths]
+        rate_hz = options.rate_hz or min(max(suitable for suitable, _ in rates), min(known for _, known in rates))
     held = options.hold_out if options.hold_out is not None else (0 if options.validation else 1)
     training: list[Experiment] = []
     validation: list[Experiment] = []
@@ -150,12 +151,6 @@ def _check_files(
             "add one (or imported time data)"
         )
     one_specimen(**{str(path): specimen_in(path) for path in kinds})
-
-
-def _common_rate_hz(paths: Sequence[Path]) -> float:
-    """Return the highest rate that any recording needs, limited to the lowest rate at which any was recorded."""
-    rates = [rates_hz_in(path) for path in paths]
-    return min(max(suitable for suitable, _ in rates), min(recorded for _, recorded in rates))
 
 
 def _held_out(found: Sequence[Experiment], count: int) -> tuple[list[Experiment], list[Experiment]]:

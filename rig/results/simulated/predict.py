@@ -22,9 +22,8 @@ from rig.results.files import load, load_as
 from rig.results.predictions.references import Compared, other_specimens, predictions_of, references_in
 from rig.results.simulated.driven_models import LARGEST_RANGE_USE, DrivenModel, Fixed, Level, constants_of, level_of
 from rig.results.simulated.model import SimulatedModel
-from rig.results.simulated.multisines import simulated_multisines
+from rig.results.simulated.multisines import planned_multisines, simulated_multisines
 from rig.results.simulated.options import SimulatedPrediction
-from rig.results.simulated.planned_multisines import planned_multisines
 from rig.results.simulated.steady import compared, default_held
 from rig.results.simulated.sweep_models import SimulatedSweepModels
 from rig.results.simulated.sweeps import planned_simulated_sweeps, recorded_simulated_sweeps

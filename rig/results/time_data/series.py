@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification import Channel, IdentificationError, TimeRecord, TimeRecords
-from identification.common import Arrays, Attributes, decode, encode
+from identification.common import decode, encode
 from rig.campaigns.evaluation.point import point_name
 from rig.results.kind import Exchange
 from rig.text.contents import Array, Contents
@@ -80,8 +81,4 @@ def _contents(data: TimeData) -> Contents:
     return Contents("time-data", title, arrays, attributes, rows, {"samples": units}, {"samples": labels})
 
 
-def _from_contents(arrays: Arrays, attributes: Attributes) -> TimeData:
-    return decode(TimeData, {"samples": arrays["samples"]}, attributes)
-
-
-EXCHANGE = Exchange("time-data", TimeData, _contents, _from_contents)
+EXCHANGE = Exchange("time-data", TimeData, _contents, partial(decode, TimeData))

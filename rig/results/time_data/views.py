@@ -93,7 +93,8 @@ def draw_time_data(page: Figure, data: TimeRecords) -> None:
     levels are drawn; the title counts what is left out.
     """
     levels = data.levels()
-    chosen = [list(levels.values())[i].records[0] for i in _spread(len(levels), _MOST_LEVELS)]
+    spread = np.unique(np.linspace(0, len(levels) - 1, min(len(levels), _MOST_LEVELS)).round().astype(int))
+    chosen = [list(levels.values())[i].records[0] for i in spread]
     channels = data.channels[:_MOST_CHANNELS]
     axes = grid(page, len(channels), 2)
     for row, channel in enumerate(channels):
@@ -118,10 +119,6 @@ def draw_time_data(page: Figure, data: TimeRecords) -> None:
     count = f"{len(data.records)} record{'' if len(data.records) == 1 else 's'}"
     of = f", {len(levels)} levels" if len(levels) > 1 else ""
     title(page, f"{data.specimen or 'specimen'}: time data, {count}{of}, {data.sample_rate_hz:g} Hz{more}")
-
-
-def _spread(count: int, most: int) -> list[int]:
-    return sorted({round(at) for at in np.linspace(0, count - 1, min(count, most))})
 
 
 def _extremes(values: Float, rate_hz: float) -> tuple[Float, Float, Float]:

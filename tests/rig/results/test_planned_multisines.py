@@ -14,7 +14,7 @@ from rig.results.files import load, save
 from rig.results.pnlss.model import IdentifiedPnlss
 from rig.results.predictions.runs_figure import draw_runs
 from rig.results.simulated.driven_models import all_inputs, constants_of, with_constants
-from rig.results.simulated.planned_multisines import planned_multisines
+from rig.results.simulated.multisines import planned_multisines
 
 PLAN = {"kind": "multisine", "bench": "magnet-beam", "lowest_hz": 15.0, "highest_hz": 35.0, "resolution_hz": 0.25}
 PLAN |= {"realisations": 2, "levels_rms_v": [0.1, 0.2], "transient_periods": 2, "periods": 1}
