@@ -55,32 +55,18 @@ def _common(
     """Phase-locked nonlinear vibration tests on virtual and real rigs, and models from the recordings."""
 
 
-app.command("list")(list_)
-app.command()(new)
-app.command()(schema)
 app.add_typer(identify_app, name="identify")
 app.add_typer(predict_app, name="predict")
-app.command("import")(import_)
-app.command("export")(export_)
-app.command("tune")(tune_)
-app.command()(emulate)
-app.command()(conformance)
-app.command("check")(check_)
-app.command("rehearse")(rehearse_)
+for _command in (list_, new, schema, import_, export_, tune_, emulate, conformance, check_, rehearse_):
+    app.command(_command.__name__.rstrip("_"))(_command)
 app.command("reproduce", cls=StudyCommand, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})(
     reproduce_
 )
-app.command()(run)
-app.command()(resume)
-app.command()(monitor)
-app.command()(show)
-app.command("plot")(plot_)
-app.command("report")(report_)
-app.command()(doctor)
+for _command in (run, resume, monitor, show, plot_, report_, doctor):
+    app.command(_command.__name__.rstrip("_"))(_command)
 app.command(context_settings={"ignore_unknown_options": True})(docs)  # an option may be the word
-app.command("watch")(watch_)
-app.command("replay")(replay_)
-app.command()(stop)
+for _command in (watch_, replay_, stop):
+    app.command(_command.__name__.rstrip("_"))(_command)
 
 
 def main() -> None:

@@ -3,12 +3,9 @@
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from rig.reference.words import Hit
 
 BUILD = (
     "the documentation site is not built here; in a clone of the repository: "
@@ -42,20 +39,16 @@ def docs(
             f"nothing of this name{(f'; closest: {near}' if near else '')}", field="WORD", value=asked
         )
     for hit in hits:
-        _print(hit, folder)
+        print(f"{hit.title} ({hit.what}): {hit.line}")
+        for more in (hit.facts, _address(folder, hit.url) if folder and hit.url else ""):
+            if more:
+                print(f"    {more}")
     if folder is None:
         print(BUILD, file=sys.stderr)
     elif len(hits) > 1:
         print(f"rig docs {hits[0].title} opens the first")
     elif hits[0].url:
         _open(folder, hits[0].url)
-
-
-def _print(hit: "Hit", folder: Path | None) -> None:
-    print(f"{hit.title} ({hit.what}): {hit.line}")
-    for more in (hit.facts, _address(folder, hit.url) if folder and hit.url else ""):
-        if more:
-            print(f"    {more}")
 
 
 def _open(folder: Path, url: str) -> None:

@@ -1,4 +1,4 @@
-"""The list of kinds of results. A kind is declared in a folder of its name; here is one line for each."""
+"""The list of kinds of results. A kind is declared in a folder of its name."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -10,31 +10,20 @@ from vibrolock.on_use import Registry
 
 KINDS: Mapping[str, ResultKind] = Registry(
     {
-        "nonlinear-mode": "rig.results.nonlinear_mode:KIND",
-        "decay-backbone": "rig.results.decay_backbone:KIND",
-        "linear-modes": "rig.results.linear_modes:KIND",
-        "exciter": "rig.results.exciter:KIND",
-        "pnlss": "rig.results.pnlss:KIND",
-        "structured": "rig.results.structured:KIND",
-        "force-surface": "rig.results.force_surface:KIND",
-        "frequency-responses": "rig.results.frequency_responses:KIND",
-        "frequency-response-matrix": "rig.results.frequency_response_matrix:KIND",
-        "hammer-test": "rig.results.hammer_test:KIND",
-        "measured-backbone": "rig.results.measured_backbone:KIND",
-        "time-data": "rig.results.time_data:KIND",
-        "predictions": "rig.results.predictions:KIND",
-        "rehearsal": "rig.results.rehearsal:KIND",
+        name: f"rig.results.{name.replace('-', '_')}:KIND"
+        for name in (
+            *("nonlinear-mode", "decay-backbone", "linear-modes", "exciter", "pnlss", "structured", "force-surface"),
+            *("frequency-responses", "frequency-response-matrix", "hammer-test", "measured-backbone", "time-data"),
+            *("predictions", "rehearsal"),
+        )
     }
 )
 """Every kind of file other than recordings, by its name in the file. A declaration is imported when it is asked for."""
 
-_IN_MEMORY = "rig.results.in_memory.kinds:KINDS"
-"""Address of the kinds of results that have no file."""
-
 
 def all_kinds() -> Iterator[ResultKind]:
     """Yield every kind, those without a file first: of a result that is of two kinds, the first one is shown."""
-    yield from resolve_name(_IN_MEMORY)
+    yield from resolve_name("rig.results.in_memory.kinds:KINDS")
     yield from KINDS.values()
 
 
