@@ -16,7 +16,6 @@ from rig.text.console import number
 
 if TYPE_CHECKING:
     from identification import PnlssFit
-    from rig.results.pnlss.model import IdentifiedPnlss
 
 
 def poles_of(model: PnlssModel) -> list[dict[str, float]]:
@@ -97,7 +96,7 @@ def _say(summary: dict[str, Any]) -> None:
 TABLE = Table(_summarise, _say)
 
 
-def draw_pnlss(page: Figure, found: "IdentifiedPnlss") -> None:
+def draw_pnlss(page: Figure, found: IdentifiedPnlss) -> None:
     """Draw the drive point's spectrum and a stretch of time, measured and simulated, the course of the fit, and all errors."""
     model, fit = found.model, found.fit
     heading = (

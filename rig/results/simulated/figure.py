@@ -1,5 +1,6 @@
 """Figure of a model that is simulated: spectra and time of measured and simulated outputs, errors over the range used."""
 
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -23,8 +24,6 @@ from rig.drawing.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from identification import Channel, ErrorSpectra, OutputStretch
     from identification.experiments import Simulator
     from rig.results.simulated.model import SimulatedModel
@@ -65,7 +64,7 @@ def channels_of(model: "Simulator") -> str:
     return f"{inputs} to {outputs}"
 
 
-def _title(found: "SimulatedModel", heading: str, left_out: "Sequence[str]") -> str:
+def _title(found: "SimulatedModel", heading: str, left_out: Sequence[str]) -> str:
     lines = [heading]
     data, outputs = found.spectra or found.stretch, found.model.outputs
     if data is not None:

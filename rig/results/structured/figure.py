@@ -14,7 +14,6 @@ from rig.results.structured.model import IdentifiedStructured
 
 if TYPE_CHECKING:
     from identification import NonlinearElement
-    from rig.results.structured.model import IdentifiedStructured
 
 
 _BEYOND = 1.5
@@ -23,7 +22,7 @@ _POINTS = 301
 """Points of a drawn law; chosen."""
 
 
-def draw_structured(page: Figure, found: "IdentifiedStructured") -> None:
+def draw_structured(page: Figure, found: IdentifiedStructured) -> None:
     """Draw the drive point's spectrum and a stretch of time, measured and simulated, the elements, and all errors."""
     model = found.model
     modes, elements = len(model.frequency_hz), len(model.elements)
