@@ -50,14 +50,15 @@ def collected() -> Iterator[list[str | PrintedTable]]:
 
 def print_json(value: Mapping[str, object]) -> None:
     """Print one JSON document on standard output; numbers that are not finite become null."""
-    print(json.dumps(_finite(value), indent=2))
+    print(json.dumps(finite(value), indent=2))
 
 
-def _finite(value: object) -> object:
+def finite(value: object) -> object:
+    """Return a JSON value with null for numbers that are not finite."""
     if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
         return None
     return value

@@ -150,7 +150,9 @@ class Balance:
         for _ in range(_ITERATIONS):
             size = _size(value / scale)
             if size < _TOLERANCE:
-                return self._checked(Solution(y, jacobian, conditions))
+                if not np.all(y[-2:] > 0.0):  # a negative voltage: the same vibration shifted by half a period
+                    raise NotConvergedError(f"no periodic vibration with a positive voltage found at {conditions}")
+                return Solution(y, jacobian, conditions)
             columns = np.append(scale[:-2], y[-2:])
             try:
                 step = columns * np.linalg.solve(jacobian * columns / scale[:, None], -value / scale)
@@ -167,16 +169,6 @@ class Balance:
             if not np.all(np.isfinite(value)):
                 break
         raise NotConvergedError(f"no periodic vibration found at {conditions}")
-
-    def _checked(self, solution: Solution) -> Solution:
-        """Return the solution; raise `NotConvergedError` unless frequency and voltage are positive.
-
-        A negative voltage describes the same vibration shifted by half a period.
-        """
-        omega, voltage = solution.unknowns[-2:]
-        if omega > 0.0 and voltage > 0.0:
-            return solution
-        raise NotConvergedError(f"no periodic vibration with a positive voltage found at {solution.conditions}")
 
     def linear_start(self, conditions: Conditions, omega_rad_s: float) -> Float:
         """Return the vibration of the linear part alone at W, at the level of the conditions."""

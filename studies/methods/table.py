@@ -54,7 +54,9 @@ def _all_numbers(runs: Runs, rig: str) -> str:
         known = runs.of(cell, usual_knob(method, rig))
         if known:
             words = (METHODS[method].words, "sinusoidal" if pure else "exciter's", condition)
-            lines.append(f"| {' | '.join(words)} | {_numbers(known)} | {_needed(runs, cell)} |")
+            found = needed(runs, cell)
+            least = "– | –" if found is None else f"{found[1]['periods']:.0f} | {found[0]:g}"
+            lines.append(f"| {' | '.join(words)} | {_numbers(known)} | {least} |")
     return "\n".join(lines) + "\n"
 
 
@@ -75,11 +77,6 @@ _DIGITS = (("frequency", 4), ("damping", 2))
 
 def _errors(worst: float, median: float, digits: int) -> str:
     return "–" if math.isnan(worst) else f"{100.0 * worst:.{digits}f} / {100.0 * median:.{digits}f}"
-
-
-def _needed(runs: Runs, cell: Cell) -> str:
-    found = needed(runs, cell)
-    return "– | –" if found is None else f"{found[1]['periods']:.0f} | {found[0]:g}"
 
 
 def put(page: Path, text: str) -> None:

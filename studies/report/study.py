@@ -55,10 +55,9 @@ def _chapter(folder: Path, study: Mapping[str, Any], results: Path) -> Chapter:
     table = _read(results / "table.json")
     errors = {name: list(rows) for name, rows in table["errors"].items()}
     own = [row for row in errors[next(iter(errors))] if row["model"] is None and row["test"] == _OWN_LEVEL]
-    files = [
-        folder / "study.json",
-        *(results / name for name in ("models.json", "table.json") if (results / name).is_file()),
-    ]
+    settings = results / "models.json"
+    levels = len(_read(settings)["levels"]) if settings.is_file() else None
+    files = [folder / "study.json", *(() if levels is None else (settings,)), results / "table.json"]
     return Chapter(
         f"The paper's campaign on {study['specimen']}: models {results.name}",
         str(results),
@@ -70,7 +69,7 @@ def _chapter(folder: Path, study: Mapping[str, Any], results: Path) -> Chapter:
             )
         ],
         [
-            Section("How it was made", _made(study, table, _levels(results))),
+            Section("How it was made", _made(study, table, levels)),
             Section("Errors beside the paper's", _beside_the_paper(str(study["specimen"]), own)),
             Section("Figures", _figures(results)),
             Section("Errors of all models and tests", [_errors(rows, name) for name, rows in errors.items() if rows]),
@@ -80,11 +79,6 @@ def _chapter(folder: Path, study: Mapping[str, Any], results: Path) -> Chapter:
             Section("Files", [table_of_files(files)]),
         ],
     )
-
-
-def _levels(results: Path) -> int | None:
-    path = results / "models.json"
-    return len(_read(path)["levels"]) if path.is_file() else None
 
 
 def _made(study: Mapping[str, Any], table: Mapping[str, Any], levels: int | None) -> list[Block]:

@@ -54,7 +54,9 @@ def _errors(page: "Figure", study: Study) -> None:
     )
     tables = {name: study.tables[name] for name in shown if name in study.tables}
     axes = grid(page, 1, len(sets))[0]
-    tests = [test for test in (SAME_LEVEL, *study.table.levels) if _tested(study.table, test)]
+    tests = [
+        test for test in (SAME_LEVEL, *study.table.levels) if any(study.table.cell(one, test).runs for one in sets)
+    ]
     drawn = [_tests(axis, tables, training_set, tests) for axis, training_set in zip(axes, sets, strict=True)]
     low, high = min(one for one, _ in drawn), max(one for _, one in drawn)
     for axis in axes:
@@ -65,18 +67,10 @@ def _errors(page: "Figure", study: Study) -> None:
     legend_below(page, *axes)
     models = sum(len({row.model for row in study.table.tests if row.training_set == one}) for one in sets)
     count = f"{models} model{'' if models == 1 else 's'}"
-    title(page, f"{study.options.specimen.name}, models {study.options.variant}: tests of {count}{_few(study)}")
-
-
-def _tested(table: ErrorTable, test: str) -> bool:
-    return any(table.cell(training_set, test).runs for training_set in table.training_sets)
-
-
-def _few(study: Study) -> str:
-    """Say what a small study lacks."""
     specimen = study.options.specimen
     missing = len(specimen.levels) - len(study.table.levels)
-    return f"; {missing} of {len(specimen.levels)} levels not recorded (--levels)" if missing > 0 else ""
+    few = f"; {missing} of {len(specimen.levels)} levels not recorded (--levels)" if missing > 0 else ""
+    title(page, f"{specimen.name}, models {study.options.variant}: tests of {count}{few}")
 
 
 def _tests(axis: Any, tables: Mapping[str, ErrorTable], training_set: str, tests: Sequence[str]) -> tuple[float, float]:

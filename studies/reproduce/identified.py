@@ -58,8 +58,13 @@ class Models:
             fits = [self.fits[j.name] for j in self.jobs if j.training_set == training_set and j.name in self.fits]
             if not fits:
                 continue
-            seconds = np.array([_seconds(fit) for fit in fits])
-            iterations = np.array([_iterations(fit) for fit in fits])
+            numbers = [
+                (fit.history.seconds[-1], fit.history.iterations, fit.chosen)
+                if isinstance(fit, PnlssFit)
+                else (fit.seconds, fit.evaluations, fit.evaluations)
+                for fit in fits
+            ]
+            seconds, iterations, chosen = np.array(numbers, float).T
             found.append(
                 {
                     "training_set": training_set,
@@ -68,9 +73,7 @@ class Models:
                     "seconds_most": float(seconds.max()),
                     "iterations_mean": float(iterations.mean()),
                     "seconds_per_iteration": float(seconds.sum() / max(1, iterations.sum())),
-                    "chosen_mean": float(
-                        np.mean([fit.chosen if isinstance(fit, PnlssFit) else fit.evaluations for fit in fits])
-                    ),
+                    "chosen_mean": float(chosen.mean()),
                 }
             )
         return found
@@ -163,14 +166,6 @@ def _identify_structured(
 ) -> StructuredFit:
     """Fit one model; a structured model needs no validation data."""
     return fit_structured(modes, training, laws=laws, support=support)
-
-
-def _seconds(fit: PnlssFit | StructuredFit) -> float:
-    return float(fit.history.seconds[-1]) if isinstance(fit, PnlssFit) else fit.seconds
-
-
-def _iterations(fit: PnlssFit | StructuredFit) -> int:
-    return fit.history.iterations if isinstance(fit, PnlssFit) else fit.evaluations
 
 
 def _identify(training: Sequence[Experiment], *, validation: Sequence[Experiment], **how: Any) -> PnlssFit:

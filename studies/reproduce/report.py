@@ -3,13 +3,12 @@
 import csv
 import io
 import json
-from typing import Any
 
 from identification.models import SAME_LEVEL
 from rig.errors import RecordingError
 from rig.results.predictions.table import CUT
 from rig.system.text_files import read_text
-from rig.text.console import number, print_table
+from rig.text.console import finite, number, print_table
 from studies.reproduce.folder import write_json
 from studies.reproduce.options import Options
 from studies.reproduce.study import Study
@@ -33,7 +32,7 @@ _ERROR_COLUMNS = (
 def write_tables(study: Study) -> None:
     """Write ``table.json`` with everything and ``errors.csv`` with the error tables; raise `RecordingError` if this fails."""
     summary = study.summary()
-    write_json(study.options.result("table.json"), _plain(summary))
+    write_json(study.options.result("table.json"), finite(summary))
     text = io.StringIO()
     rows = csv.DictWriter(text, _ERROR_COLUMNS, lineterminator="\n")
     rows.writeheader()
@@ -165,14 +164,3 @@ def _say_others(options: Options) -> None:
     if len({row[0] for row in rows}) > 1:
         print("all kinds of models in this folder:")
         print_table(("models", "trained at", "tested at", "mean error %", "unbounded"), rows)
-
-
-def _plain(value: Any) -> Any:
-    """Return the value with null for numbers that are not finite."""
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and (value != value or abs(value) == float("inf")):
-        return None
-    return value

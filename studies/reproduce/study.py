@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from identification import ErrorTable, Experiment, IdentificationError, PnlssModel, StructuredModel
+from identification import ErrorTable, IdentificationError, PnlssModel, StructuredModel
 from identification.scatter import OwnModel
 from rig.results.simulated.table import rows_of_scatter
 from studies.reproduce.folder import prepare
@@ -106,7 +106,12 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
         first = next(iter(variants.values()))
         own = {name: OwnModel(first[name], scatter) for name, scatter in models.scatter.items()}
         variants = {OWN_SHIFTS: own} | variants
-    tables = {name: _table(options, models, levels, of) for name, of in variants.items()}
+    tables = {}
+    for name, of in variants.items():
+        known_models = {model: one for model, one in of.items() if one is not None}
+        tables[name] = ErrorTable.of(
+            known_models, models.jobs, levels, output=options.channel, failures=models.failures
+        )
     table = next(iter(tables.values()))
     selected = {name: (model, models.fits[model].model) for name, model in table.selected.items()}
     found: list[Steady] = []
@@ -118,13 +123,3 @@ def reproduce(options: Options, say: Callable[[str], None]) -> Study:
     if "sweeps" not in options.without:
         swept = simulated_sweeps(options, selected, say)
     return Study(options=options, models=models, tables=tables, steady=found, truths=known, sweeps=swept)
-
-
-def _table(
-    options: Options,
-    models: Models,
-    levels: Mapping[str, Sequence[Experiment]],
-    variants: Mapping[str, Any],
-) -> ErrorTable:
-    known = {name: model for name, model in variants.items() if model is not None}
-    return ErrorTable.of(known, models.jobs, levels, output=options.channel, failures=models.failures)

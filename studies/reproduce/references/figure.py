@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.drawing.page import grid, legend_below, page_for
 from rig.drawing.style import MAIN, REJECTED, SECOND, THIRD, title
-from studies.reproduce.references.result import Line, Panel, StudyResult
+from studies.reproduce.references.result import StudyResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,9 @@ def draw_reference(result: StudyResult, path: Path) -> None:
         if compared:
             _compare(axes[0], result)
         for axis, panel in zip(axes[compared:], result.panels, strict=False):
-            _curves(axis, panel)
+            for curve in panel.curves:
+                axis.plot(curve.x, curve.y, label=curve.label, **_STYLES[curve.role])
+            axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
         for axis in axes[count:]:
             axis.set_axis_off()
         legend_below(page, axes[count - 1])
@@ -53,18 +55,8 @@ def _compare(axis: "Axes", result: StudyResult) -> None:
             mfc=None if line.chosen or not ours else "none",
             ms=7,
         )
-    axis.set_yticks(range(len(lines)), [_name(line) for line in lines])
+    axis.set_yticks(range(len(lines)), [f"{line.method}{' (chosen)' if line.chosen else ''}" for line in lines])
     axis.set(xlabel=heading, ylim=(len(lines) - 0.5, -0.5))
     axis.grid(axis="y", visible=False)
     if all(line.values[key] > 0.0 for line in lines):
         axis.set_xscale("log")
-
-
-def _name(line: Line) -> str:
-    return f"{line.method}{' (chosen)' if line.chosen else ''}"
-
-
-def _curves(axis: "Axes", panel: Panel) -> None:
-    for curve in panel.curves:
-        axis.plot(curve.x, curve.y, label=curve.label, **_STYLES[curve.role])
-    axis.set(xlabel=panel.x_label, ylabel=panel.y_label)
