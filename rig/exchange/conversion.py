@@ -8,7 +8,7 @@ from rig.results.kinds import exchanges
 from rig.text.contents import Contents
 
 
-def taken_apart(value: object) -> Contents:
+def encoded(value: object) -> Contents:
     """Convert an object to arrays and attributes; raise `IdentificationError` for a type that is not exchanged."""
     if isinstance(value, Contents):
         return value
@@ -19,8 +19,8 @@ def taken_apart(value: object) -> Contents:
     raise IdentificationError("is not exchanged", field=type(value).__name__, hint=f"what is: {names}")
 
 
-def put_together(kind: str, arrays: Arrays, attributes: Attributes) -> Any:
-    """Convert the output of `taken_apart` back; raise `IdentificationError` for an unknown kind or data that does not fit."""
+def decoded(kind: str, arrays: Arrays, attributes: Attributes) -> Any:
+    """Convert the output of `encoded` back; raise `IdentificationError` for an unknown kind or data that does not fit."""
     for known in exchanges():
         if known.name == kind:
             try:

@@ -13,7 +13,7 @@ from rig.campaigns.evaluation.stored_point import point_from
 from rig.campaigns.evaluation.vibrations import VOLTAGE, channels_of
 from rig.campaigns.kinds import KINDS as CAMPAIGNS
 from rig.errors import ConfigurationError, RecordingError, RigError
-from rig.exchange.conversion import taken_apart
+from rig.exchange.conversion import encoded
 from rig.exchange.csv import write_csv
 from rig.exchange.mat import write_mat
 from rig.exchange.uff.writing import write_uff
@@ -84,7 +84,7 @@ def export_file(
     Returns the written contents. Raises `RecordingError` if reading or writing fails; ``output`` is then unchanged.
     """
     try:
-        found = [taken_apart(value) for value in read_objects(source, data, points)]
+        found = [encoded(value) for value in read_objects(source, data, points)]
     except IdentificationError as error:
         raise RecordingError.of(error, where=source) from None
     if item and not 1 <= item <= len(found):

@@ -195,7 +195,7 @@ def _chosen(found: Sequence[T], path: Path, item: int) -> T:
 
 
 def _read_without(path: Path, form: str, units: str, drive: str, item: int) -> "Measurement":
-    from rig.exchange.conversion import put_together
+    from rig.exchange.conversion import decoded
 
     match form:
         case "uff":
@@ -211,7 +211,7 @@ def _read_without(path: Path, form: str, units: str, drive: str, item: int) -> "
             raise ImportFailed(f"{path}: {PROPOSAL}")
         case _:
             raise ImportFailed(f"{path}: {PROPOSAL}")
-    found: Measurement = put_together(one.kind, one.arrays, one.attributes)
+    found: Measurement = decoded(one.kind, one.arrays, one.attributes)
     return found
 
 

@@ -1,8 +1,7 @@
 """Recordings as tables of pandas and xarray, with units. Both libraries are optional: ``pip install 'vibrolock[tables]'``."""
 
 from collections.abc import Sequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,7 +31,10 @@ def points_table(recording: Recording) -> "pandas.DataFrame":
 
     Raises ImportError without pandas.
     """
-    pandas = _library("pandas")
+    try:
+        import pandas
+    except ImportError:
+        raise _missing("pandas") from None
     campaign = KINDS[recording.kind]
     points: list[Point[object]] = [point_from(table, campaign.result) for table in recording.latest.values()]
     columns = {
@@ -93,7 +95,10 @@ def telemetry(
 
     Raises `RecordingError` for a column, part, point or number that there is not, ImportError without xarray.
     """
-    library = _library("xarray")
+    try:
+        import xarray
+    except ImportError:
+        raise _missing("xarray") from None
     number, samples, found = selected_rows(
         recording, columns=columns, part=part, point=point, from_s=from_s, to_s=to_s, every=every
     )
@@ -101,8 +106,7 @@ def telemetry(
     variables = {name: ("time", values, attributes) for name, values, attributes in found}
     coordinate = ("time", samples / rate_hz, {"units": "s", "long_name": "time from the beginning of the part"})
     facts = {"kind": recording.kind, "part": number, "sample_rate_hz": rate_hz, "started": recording.started}
-    table: xarray.Dataset = library.Dataset(variables, {"time": coordinate}, facts)
-    return table
+    return xarray.Dataset(variables, {"time": coordinate}, facts)
 
 
 def selected_rows(
@@ -178,8 +182,5 @@ def _variables(
     return out
 
 
-def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError:
-        raise ImportError(f"{name} is not installed, and tables need it: pip install 'vibrolock[tables]'") from None
+def _missing(library: str) -> ImportError:
+    return ImportError(f"{library} is not installed, and tables need it: pip install 'vibrolock[tables]'")

@@ -12,7 +12,7 @@ import scipy.io
 
 import rig
 from identification import FrequencyResponseMatrix, ModalAnalysis, nonlinear_mode
-from rig.exchange.conversion import taken_apart
+from rig.exchange.conversion import encoded
 from rig.exchange.export import write_contents
 from rig.exchange.reading import import_file
 from rig.results.files import load, save
@@ -182,7 +182,7 @@ def test_a_full_disk_is_named_and_leaves_nothing(command, backbone_file, tmp_pat
 
 
 def test_imported_modes_and_responses_are_shown_and_plotted_like_our_own(command, multisine_file, modes, tmp_path):
-    write_contents([taken_apart(modes)], tmp_path / "modes.unv", "uff")
+    write_contents([encoded(modes)], tmp_path / "modes.unv", "uff")
     assert command(f"export {multisine_file} --item 1 -o responses.uff")[0] == 0
     for name in ("modes.unv", "responses.uff"):
         status, _, err = command(f"import {name} -o {name}.h5")

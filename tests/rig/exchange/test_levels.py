@@ -74,12 +74,12 @@ def test_ascii_and_binary_are_what_they_say_and_pyuff_reads_the_same_from_both(m
 
 
 def test_binary_keeps_every_bit_of_uneven_frequencies_where_ascii_keeps_six_digits(responses, tmp_path):
-    from rig.exchange.conversion import taken_apart
+    from rig.exchange.conversion import encoded
     from rig.exchange.export import write_contents
 
     for encoding, digits in (("ascii", 1e-5), ("binary", 0.0)):
         path = tmp_path / f"{encoding}.uff"
-        write_contents([taken_apart(responses)], path, "uff", encoding)
+        write_contents([encoded(responses)], path, "uff", encoding)
         for found, expected in zip(import_file(path), responses, strict=True):
             np.testing.assert_allclose(found.frequency_hz, expected.frequency_hz, rtol=digits)
             np.testing.assert_allclose(found.response, expected.response, rtol=max(digits, 1e-15))

@@ -10,7 +10,7 @@ import scipy.io
 from identification import Backbone, FrequencyResponseMatrix, NonlinearMode
 from rig.errors import RigError
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.conversion import taken_apart
+from rig.exchange.conversion import encoded
 from rig.exchange.export import write_contents
 from rig.exchange.reading import import_file, read_mapping
 from rig.results.time_data.series import TimeData
@@ -191,7 +191,7 @@ def test_time_data_of_a_universal_file_says_rate_and_units_itself(tmp_path):
     items = []
     for k in (0, 1):
         samples = np.array([data["A"][:, k] * GRAVITY])
-        items.append(taken_apart(TimeData(channels, samples, RATE, point=k + 1)))
+        items.append(encoded(TimeData(channels, samples, RATE, point=k + 1)))
     write_contents(items, tmp_path / "acc.uff", "uff")
     told = (
         MULTISINE.replace('"A" }', '"acc_drive" }').replace('"F" }', '"acc_drive" }').replace('"U" }', '"acc_drive" }')
@@ -305,7 +305,7 @@ def test_foreign_files_without_a_mapping_are_refused_with_advice(tmp_path, name)
 
 
 def test_changed_files_of_ours_are_said_so(mode, tmp_path):
-    write_contents([taken_apart(mode)], tmp_path / "mode.csv", "csv")
+    write_contents([encoded(mode)], tmp_path / "mode.csv", "csv")
     lines = (tmp_path / "mode.csv").read_text().splitlines()
     (tmp_path / "mode.csv").write_text("\n".join([*lines[:-1], lines[-1].split(",", 1)[1]]))
     with refused(ImportFailed, "mode-csv-is-damaged-or-changed"):

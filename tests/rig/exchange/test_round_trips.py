@@ -9,7 +9,7 @@ import pytest
 
 from identification import NonlinearMode
 from identification.common import decode, encode
-from rig.exchange.conversion import put_together, taken_apart
+from rig.exchange.conversion import decoded, encoded
 from rig.exchange.export import write_contents
 from rig.exchange.mat import read_mat, stored_objects
 from rig.exchange.reading import import_file
@@ -44,7 +44,7 @@ def assert_same(found: Any, expected: Any, rtol: float = 0.0) -> None:
 def test_mat_and_csv_give_back_every_bit(name, format_, request, tmp_path):
     value = request.getfixturevalue(name)
     path = tmp_path / f"out.{format_}"
-    write_contents([taken_apart(value)], path, format_)
+    write_contents([encoded(value)], path, format_)
     assert_same(import_file(path), value)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
@@ -52,8 +52,8 @@ def test_mat_and_csv_give_back_every_bit(name, format_, request, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_the_parts_of_an_object_make_it_again(name, request):
     value = request.getfixturevalue(name)
-    contents = taken_apart(value)
-    assert_same(put_together(contents.kind, contents.arrays, contents.attributes), value)
+    contents = encoded(value)
+    assert_same(decoded(contents.kind, contents.arrays, contents.attributes), value)
 
 
 def test_a_single_point_or_mode_keeps_its_dimensions(mode, tmp_path):
@@ -61,13 +61,13 @@ def test_a_single_point_or_mode_keeps_its_dimensions(mode, tmp_path):
     single = decode(NonlinearMode, {name: array[:1] for name, array in arrays.items()}, attributes)
     for format_ in ("mat", "csv"):
         path = tmp_path / f"one.{format_}"
-        write_contents([taken_apart(single)], path, format_)
+        write_contents([encoded(single)], path, format_)
         assert_same(import_file(path), single)
 
 
 def test_universal_files_keep_frequency_responses_to_twelve_digits(matrix, tmp_path):
     path = tmp_path / "matrix.uff"
-    write_contents([taken_apart(matrix)], path, "uff")
+    write_contents([encoded(matrix)], path, "uff")
     found = import_file(path)
     np.testing.assert_allclose(found.value, matrix.value, rtol=2e-12, atol=1e-11)
     np.testing.assert_allclose(found.frequency_hz, matrix.frequency_hz, rtol=1e-12)
@@ -78,7 +78,7 @@ def test_universal_files_keep_frequency_responses_to_twelve_digits(matrix, tmp_p
 
 def test_universal_files_keep_modes_to_six_digits(modes, tmp_path):
     path = tmp_path / "modes.unv"
-    write_contents([taken_apart(modes)], path, "uff")
+    write_contents([encoded(modes)], path, "uff")
     found = import_file(path)
     assert found.channels == modes.channels
     for name in ("frequency_hz", "damping_ratio", "shapes"):
@@ -87,7 +87,7 @@ def test_universal_files_keep_modes_to_six_digits(modes, tmp_path):
 
 def test_universal_files_keep_stepped_sines_but_for_digits_of_the_frequency(responses, tmp_path):
     path = tmp_path / "levels.uff"
-    write_contents([taken_apart(responses)], path, "uff")
+    write_contents([encoded(responses)], path, "uff")
     assert_same(import_file(path), responses, rtol=5e-6)
     found = import_file(path)
     np.testing.assert_allclose(found[0].force, responses[0].force, rtol=1e-11)
@@ -97,7 +97,7 @@ def test_universal_files_keep_stepped_sines_but_for_digits_of_the_frequency(resp
 def test_time_data_of_universal_files_is_exact_and_so_is_its_rate(tmp_path, rate_hz):
     samples = np.random.default_rng(0).normal(size=(3, 1000))
     path = tmp_path / "time.uff"
-    write_contents([taken_apart(TimeData(CHANNELS, samples, rate_hz, point=4))], path, "uff")
+    write_contents([encoded(TimeData(CHANNELS, samples, rate_hz, point=4))], path, "uff")
     data = time_data_in(read_uff(path))
     assert data.sample_rate_hz == rate_hz
     for channel, expected in zip(CHANNELS, samples, strict=True):
@@ -109,14 +109,14 @@ def test_time_data_of_universal_files_is_exact_and_so_is_its_rate(tmp_path, rate
 def test_time_data_is_kept_with_its_channels(tmp_path, format_):
     data = TimeData(CHANNELS, np.random.default_rng(0).normal(size=(3, 50)), 5000.0, point=2, specimen="beam")
     path = tmp_path / f"time.{format_}"
-    write_contents([taken_apart(data)], path, format_)
+    write_contents([encoded(data)], path, format_)
     assert_same(import_file(path), data)
 
 
 def test_several_objects_are_a_structure_array_of_which_one_is_chosen(matrix, tmp_path):
     path = tmp_path / "levels.mat"
     other = matrix.select(["v"])
-    write_contents([taken_apart(matrix), taken_apart(other)], path, "mat")
+    write_contents([encoded(matrix), encoded(other)], path, "mat")
     assert len(stored_objects(read_mat(path))) == 2
     assert_same(import_file(path, item=1), matrix)
     assert_same(import_file(path, item=2), other)
@@ -129,7 +129,7 @@ def test_every_kind_has_a_name_of_its_own():
 
 def test_numbers_of_a_table_are_those_that_numpy_reads(backbone, tmp_path):
     path = Path(tmp_path / "backbone.csv")
-    write_contents([taken_apart(backbone)], path, "csv")
+    write_contents([encoded(backbone)], path, "csv")
     names = path.read_text().splitlines()[2].split(",")
     table = np.loadtxt(path, delimiter=",", skiprows=4)
     np.testing.assert_array_equal(table[:, names.index("force_n")], backbone.force_n)

@@ -8,7 +8,7 @@ import pyuff
 
 from identification import LinearModes
 from rig.exchange.child_reading import ImportFailed
-from rig.exchange.conversion import taken_apart
+from rig.exchange.conversion import encoded
 from rig.exchange.export import write_contents
 from rig.exchange.reading import import_file
 from rig.exchange.uff.reading import read_uff, time_data_in
@@ -61,7 +61,7 @@ def signal(value, *, node=1, code=12, label="m/s2", rate=1000.0) -> dict:
 
 def test_frequency_responses_are_functions_of_type_4_with_units_and_degrees_of_freedom(matrix, tmp_path):
     path = tmp_path / "matrix.uff"
-    write_contents([taken_apart(matrix)], path, "uff")
+    write_contents([encoded(matrix)], path, "uff")
     sets = pyuff.UFF(str(path)).read_sets()
     assert [dataset["type"] for dataset in sets] == [151, 164] + [58] * 6
     assert (sets[1]["units_code"], sets[1]["length"], sets[1]["force"]) == (1, 1.0, 1.0)
@@ -77,7 +77,7 @@ def test_frequency_responses_are_functions_of_type_4_with_units_and_degrees_of_f
 
 def test_columns_of_a_header_are_where_the_format_has_them(matrix, tmp_path):
     path = tmp_path / "matrix.uff"
-    write_contents([taken_apart(matrix)], path, "uff")
+    write_contents([encoded(matrix)], path, "uff")
     lines = path.read_text(encoding="ascii").splitlines()
     start = next(row for row, line in enumerate(lines) if line.strip() == "58" and lines[row - 1].strip() == "-1")
     assert lines[start - 1] == "    -1"
@@ -94,7 +94,7 @@ def test_columns_of_a_header_are_where_the_format_has_them(matrix, tmp_path):
 
 def test_modes_are_dataset_55_with_frequency_modal_mass_and_damping(modes, tmp_path):
     path = tmp_path / "modes.uff"
-    write_contents([taken_apart(modes)], path, "uff")
+    write_contents([encoded(modes)], path, "uff")
     sets = [dataset for dataset in pyuff.UFF(str(path)).read_sets() if dataset["type"] == 55]
     assert len(sets) == 3
     for number, dataset in enumerate(sets):
@@ -114,7 +114,7 @@ def test_modes_are_dataset_55_with_frequency_modal_mass_and_damping(modes, tmp_p
 def test_time_data_is_binary_with_the_number_of_bytes_that_follow(tmp_path):
     samples = np.random.default_rng(0).normal(size=(3, 777))
     path = tmp_path / "time.uff"
-    write_contents([taken_apart(TimeData(CHANNELS, samples, 5000.0, point=4))], path, "uff")
+    write_contents([encoded(TimeData(CHANNELS, samples, 5000.0, point=4))], path, "uff")
     content = path.read_bytes()
     at = content.index(b"    58b")
     header = content[at : at + 81].decode()  # I6,A1,I6,I6,I12,I12,...: byte order, float format, lines, bytes
@@ -130,7 +130,7 @@ def test_time_data_is_binary_with_the_number_of_bytes_that_follow(tmp_path):
 def test_a_table_is_a_function_for_each_column_over_the_points(name, request, tmp_path):
     value = request.getfixturevalue(name)
     path = tmp_path / "table.uff"
-    write_contents([taken_apart(value)], path, "uff")
+    write_contents([encoded(value)], path, "uff")
     sets = {d["id1"]: d for d in pyuff.UFF(str(path)).read_sets() if d["type"] == 58}
     np.testing.assert_allclose(sets["frequency_hz"]["data"], value.frequency_hz, rtol=1e-11)
     np.testing.assert_allclose(sets["force_n"]["data"], value.force_n, rtol=1e-11)
@@ -197,7 +197,7 @@ def test_what_is_unclear_is_said_in_one_line(tmp_path, datasets, message):
 @pytest.mark.parametrize("kept", [0.1, 0.5, 0.9, 0.999])
 def test_a_truncated_file_is_said_so(matrix, tmp_path, kept):
     path = tmp_path / "matrix.uff"
-    write_contents([taken_apart(matrix)], path, "uff")
+    write_contents([encoded(matrix)], path, "uff")
     content = path.read_bytes()
     path.write_bytes(content[: int(kept * len(content))])
     with refused(ImportFailed, "matrix-uff-cut-short-damaged-of"):

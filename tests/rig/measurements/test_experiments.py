@@ -189,7 +189,7 @@ def test_what_cannot_be_is_refused_by_name(multisine, asked, said):
 
 
 def test_a_continuous_backbone_holds_no_experiments(multisine, monkeypatch):
-    monkeypatch.setattr(type(multisine.recording), "kind", "continuous-backbone")
+    monkeypatch.setattr(multisine.recording, "kind", "continuous-backbone")
     with refused(RecordingError, "holds-continuous-backbone-wanted-is-mult"):
         experiments(multisine.recording)
 
