@@ -48,12 +48,9 @@ class ForceExtremes:
     @classmethod
     def of(cls, branch: PeriodicResponses) -> "ForceExtremes":
         """Return the extremes along a branch."""
-        force, frequency_hz = branch.force_n.tolist(), branch.frequency_hz.tolist()
-        (lowest, lowest_hz), (highest, highest_hz) = (
-            pick(zip(force, frequency_hz, strict=True), key=lambda point: point[0]) for pick in (min, max)
-        )
-        first = force[0]
-        return cls(first, lowest, lowest_hz, lowest / first, highest, highest_hz, highest / first)
+        low, high, hz = int(np.argmin(branch.force_n)), int(np.argmax(branch.force_n)), branch.frequency_hz
+        first, lowest, highest = (float(branch.force_n[at]) for at in (0, low, high))
+        return cls(first, lowest, float(hz[low]), lowest / first, highest, float(hz[high]), highest / first)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

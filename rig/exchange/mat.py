@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.exchange.child_reading import NAMES, ImportFailed, read_in_child
 from rig.exchange.file_data import FileData, StoredObject, Value, from_variables
-from rig.text.contents import Array, Contents
+from rig.text.contents import Contents
 
 _KIND, _ATTRIBUTES = "vibrolock_kind", "attributes_json"
 _MAX_NAME = 31  # most characters of a field name that every reader of version 5 accepts
@@ -50,17 +50,11 @@ def _structure(item: Contents) -> dict[str, object]:
     }
     for name in ("channels", "outputs", "inputs"):
         if name in item.attributes:
-            out[name] = _table(item.attributes[name])
+            texts = [(channel["name"], channel["role"], channel["unit"]) for channel in item.attributes[name]]
+            out[name] = np.array(texts, dtype=[(key, object) for key in ("name", "role", "unit")])
     out[_KIND] = item.kind
     out[_ATTRIBUTES] = json.dumps({"shapes": shapes, "attributes": item.attributes})
     return out
-
-
-def _table(channels: Sequence[Mapping[str, str]]) -> Array:
-    table = np.empty(len(channels), dtype=[(key, object) for key in ("name", "role", "unit")])
-    for row, channel in enumerate(channels):
-        table[row] = (channel["name"], channel["role"], channel["unit"])
-    return table
 
 
 def read_mat(path: Path) -> FileData:

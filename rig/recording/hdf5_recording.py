@@ -106,10 +106,13 @@ def _write_part(group: "h5py.Group", part: Part, check: Callable[[], None]) -> N
     write_table(group, "columns", described)
     step = rows_at_once(part.row_dtype)
     shrinking = _shrinking(part, step)
-    datasets = {
-        column.name: _row_dataset(group, column, field, part.n_rows, step, compressed=column.name in shrinking)
-        for column, field in columns
-    }
+    datasets = {}
+    for column, field in columns:
+        compressed = _COMPRESSED if column.name in shrinking else {}
+        storage = {"chunks": (min(step, part.n_rows), *field.shape), **compressed} if part.n_rows else {}
+        dataset = group.create_dataset(f"rows/{column.name}", (part.n_rows, *field.shape), field.base, **storage)
+        dataset.attrs["unit"], dataset.attrs["description"] = column.unit, column.description
+        datasets[column.name] = dataset
     for start in range(0, part.n_rows, step):
         stop = min(start + step, part.n_rows)
         rows = part.read(start, stop)
@@ -152,17 +155,6 @@ def _whole_chunk(values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     chunk = np.zeros(shape, values.dtype)
     chunk[: len(values)] = values
     return chunk
-
-
-def _row_dataset(
-    group: "h5py.Group", column: Column, field: np.dtype, n_rows: int, step: int, *, compressed: bool
-) -> "h5py.Dataset":
-    storage: dict[str, object] = {}
-    if n_rows:
-        storage = {"chunks": (min(step, n_rows), *field.shape), **(_COMPRESSED if compressed else {})}
-    dataset = group.create_dataset(f"rows/{column.name}", (n_rows, *field.shape), field.base, **storage)
-    dataset.attrs["unit"], dataset.attrs["description"] = column.unit, column.description
-    return dataset
 
 
 def read_recording(file: "h5py.File", path: Path) -> tuple[Header, list[StoredPart]]:

@@ -51,15 +51,14 @@ def ask_child(module: str, *arguments: str, timeout_s: float) -> bytes:
 
 def child_environment() -> dict[str, str]:
     """Return the environment in which a child imports what this process does, with one thread for linear algebra."""
-    path = os.pathsep.join(_import_path())
-    return {**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"}  # each thread reserves address space
-
-
-def _import_path() -> list[str]:
-    """Return the module search path of this process, with the working folder as a full path unless it was removed."""
-    with contextlib.suppress(FileNotFoundError):
-        return [path or str(Path.cwd()) for path in sys.path]
-    return [path for path in sys.path if path]
+    paths = [path for path in sys.path if path]
+    with contextlib.suppress(FileNotFoundError):  # the working folder was removed
+        paths = [path or str(Path.cwd()) for path in sys.path]
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(paths),
+        "OPENBLAS_NUM_THREADS": "1",
+    }  # each thread reserves address space
 
 
 def _how(status: int) -> str:

@@ -39,22 +39,18 @@ def _raised(number: int) -> Interrupted | Terminated:
     return Interrupted() if number == signal.SIGINT else Terminated(number)
 
 
-def _by_nohup(number: int) -> bool:
-    """Return whether the signal is SIGHUP and was ignored at the start.
-
-    SIGINT is not exempted: a shell's ``&`` ignores Ctrl-C, but ``kill -INT`` shall still have an effect.
-    """
-    return signal.Signals(number).name == "SIGHUP" and signal.getsignal(number) is signal.SIG_IGN
-
-
 @contextmanager
 def _handling(handler: _Handler, names: tuple[str, ...]) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    heeded = [number for number in numbers if not _by_nohup(number)]
-    before = {number: signal.signal(number, handler) for number in heeded}
+    before = {}
+    for number in numbers:
+        # A SIGHUP that was ignored at the start (nohup) stays so. SIGINT is not exempted: a shell's ``&`` ignores Ctrl-C, but
+        # ``kill -INT`` shall still have an effect.
+        if signal.Signals(number).name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, handler)
     try:
         yield
     finally:

@@ -7,6 +7,7 @@ from pathlib import Path
 from rig.errors import ConfigurationError, RigError
 
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)  # opening a FIFO that nobody writes to would wait for ever
+_KINDS = {stat.S_IFDIR: "folder", stat.S_IFIFO: "FIFO", stat.S_IFCHR: "device", stat.S_IFBLK: "device"}
 _RAW = getattr(os, "O_BINARY", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
@@ -17,7 +18,8 @@ def read_bytes(path: Path, largest_bytes: int, error: type[RigError] = Configura
         with os.fdopen(descriptor, "rb", closefd=True) as stream:
             kind = os.fstat(descriptor)
             if not stat.S_ISREG(kind.st_mode):
-                raise error(f"{path}: is a {_kind(kind.st_mode)}, allowed is a regular file")
+                named = _KINDS.get(stat.S_IFMT(kind.st_mode), "special file")
+                raise error(f"{path}: is a {named}, allowed is a regular file")
             read = b"" if kind.st_size > largest_bytes else stream.read(largest_bytes + 1)
             if kind.st_size > largest_bytes or len(read) > largest_bytes:
                 size = max(kind.st_size, len(read))
@@ -45,8 +47,3 @@ def read_text(
         raise error(
             f"{path}: is no text in {encoding.removesuffix('-sig').upper()} (byte {failure.start}: {failure.reason})"
         ) from None
-
-
-def _kind(mode: int) -> str:
-    kinds = {stat.S_IFDIR: "folder", stat.S_IFIFO: "FIFO", stat.S_IFCHR: "device", stat.S_IFBLK: "device"}
-    return kinds.get(stat.S_IFMT(mode), "special file")
