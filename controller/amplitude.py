@@ -17,6 +17,7 @@ from controller.through_response import (
     force_slope,
     wanted_displacement,
 )
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.errors import InputError
 
@@ -39,30 +40,22 @@ class AmplitudeLaw(IntEnum):
 
 VOLTAGE, FORCE, FORCE_RMS, RESPONSE = (int(law) for law in AmplitudeLaw)
 
-AMPLITUDE = np.dtype(
-    [("largest_v", "f8"), ("force", FORCE_LOOP), ("response", RESPONSE_LOOP), ("reference", REFERENCE)]
-)
+AMPLITUDE = record(("force", FORCE_LOOP), ("response", RESPONSE_LOOP), ("reference", REFERENCE), f8="largest_v")
 """Parameters of the amplitude law (one record), with one record for each of its loops."""
 
-OUTPUT = np.dtype(
-    [("amplitude_v", "f8"), ("command_phase_rad", "f8"), ("saturation_sign", "i8"), ("phase_saturation_sign", "i8")]
-)
+OUTPUT = record(i8="saturation_sign phase_saturation_sign", f8="amplitude_v command_phase_rad")
 """The last output (one record): amplitude and angle of ``u = Re(U exp(i theta))``.
 
 ``saturation_sign``, ``phase_saturation_sign``: 1 while a limit keeps amplitude or angle from rising as fast as demanded, -1
 while it keeps them from falling as fast, else 0."""
 
-AMPLITUDE_STATE = np.dtype(
-    [
-        ("law", "i8"),
-        ("demanded_v", "f8"),
-        ("demanded_phase_rad", "f8"),
-        ("saturated", "i8"),
-        ("output", OUTPUT),
-        ("force", FORCE_LOOP_STATE),
-        ("response", RESPONSE_LOOP_STATE),
-        ("reference", REFERENCE_STATE),
-    ]
+AMPLITUDE_STATE = record(
+    ("output", OUTPUT),
+    ("force", FORCE_LOOP_STATE),
+    ("response", RESPONSE_LOOP_STATE),
+    ("reference", REFERENCE_STATE),
+    i8="law saturated",
+    f8="demanded_v demanded_phase_rad",
 )
 """State of the amplitude law (one record): the present `AmplitudeLaw`, the demanded amplitude and angle, whether the demanded
 amplitude is at the largest voltage, the last output, and one record for each loop."""

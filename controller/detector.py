@@ -10,6 +10,7 @@ from pydantic import Field
 from controller.adaptive_filter import MOST_HARMONICS, adapt, root_mean_square, turn_phasors
 from controller.primitives import size, track, wrap
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.errors import InputError
 
@@ -28,35 +29,22 @@ class Detector(IntEnum):
 SIGN, ADAPTIVE = int(Detector.SIGN), int(Detector.ADAPTIVE)
 KINDS = {"two-phase": Detector.TWO_PHASE, "sign": Detector.SIGN, "adaptive": Detector.ADAPTIVE}
 
-DETECTOR = np.dtype([("kind", "i8"), ("harmonics", "i8"), ("gain", "f8"), ("mean_gain", "f8")])
+DETECTOR = record(i8="kind harmonics", f8="gain mean_gain")
 """Parameters of the detector (one record): its `Detector`, and the number of harmonics of the adaptive filter. ``gain`` is the
 step of the low-pass after the demodulation, ``mean_gain`` the step of the low-pass that follows the mean of an input."""
 
-DETECTOR_STATE = np.dtype(
-    [
-        ("sign_mean", "f8"),
-        ("force_square", "f8"),
-        ("phasors", "c16", (MOST_HARMONICS + 1,)),
-        ("force_filter", "c16", (MOST_HARMONICS + 1,)),
-        ("drive_filter", "c16", (MOST_HARMONICS + 1,)),
-    ]
+DETECTOR_STATE = record(
+    ("phasors", "c16", (MOST_HARMONICS + 1,)),
+    ("force_filter", "c16", (MOST_HARMONICS + 1,)),
+    ("drive_filter", "c16", (MOST_HARMONICS + 1,)),
+    f8="sign_mean force_square",
 )
 """State of the detector (one record). Only the first H+1 entries of the three complex arrays are used."""
 
-VIBRATION = np.dtype(
-    [
-        ("force", "c16"),
-        ("drive", "c16"),
-        ("force_n", "f8"),
-        ("drive_m_s2", "f8"),
-        ("displacement_m", "f8"),
-        ("force_rms_n", "f8"),
-        ("present", "i8"),
-        ("error_rad", "f8"),
-        ("rest_force_n", "f8"),
-        ("rest_drive_m_s2", "f8"),
-        ("rest_error_rad", "f8"),
-    ]
+VIBRATION = record(
+    i8="present",
+    f8="force_n drive_m_s2 displacement_m force_rms_n error_rad rest_force_n rest_drive_m_s2 rest_error_rad",
+    c16="force drive",
 )
 """Measured vibration at one sample (one record). Detector and rest estimate write it; the laws read it.
 

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from controller.primitives import log_proportional_integral, log_ratio, proportional_integral
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 
 
@@ -30,21 +31,10 @@ LOOPS = {
     "through-response": ForceLoop.THROUGH_RESPONSE,
 }
 
-FORCE_LOOP = np.dtype(
-    [
-        ("loop", "i8"),
-        ("k3", "f8"),
-        ("k4", "f8"),
-        ("kp", "f8"),
-        ("ki", "f8"),
-        ("smallest_v", "f8"),
-        ("largest_v", "f8"),
-        ("dt_s", "f8"),
-    ]
-)
+FORCE_LOOP = record(i8="loop", f8="k3 k4 kp ki smallest_v largest_v dt_s")
 """Parameters of the force loops (one record): K3 and K4 of the linear loop, kp and ki of the logarithmic loop."""
 
-FORCE_LOOP_STATE = np.dtype([("integral", "f8"), ("log_integral", "c16")])
+FORCE_LOOP_STATE = record(f8="integral", c16="log_integral")
 """State of the force loops (one record): integral of the linear loop (V) and of the logarithmic loop."""
 
 

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from controller.primitives import proportional_integral
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, inner_kernel, kernel
 from vibrolock.errors import InputError
 
@@ -29,25 +30,12 @@ LAWS = {"phase": FrequencyLaw.PHASE, "frequency-error": FrequencyLaw.FREQUENCY_E
 GAINS = {"phase": ("k1", "k2"), "frequency-error": ("frequency_proportional", "frequency_integral_per_s")}
 """Settings that are kp and ki of each law."""
 
-FREQUENCY = np.dtype(
-    [
-        ("law", "i8"),
-        ("kp", "f8"),
-        ("ki", "f8"),
-        ("centre_rad_s", "f8"),
-        ("lowest_rad_s", "f8"),
-        ("highest_rad_s", "f8"),
-        ("period_mean", "i8"),
-        ("mode_shape_squared", "f8"),
-        ("target_lag_rad", "f8"),
-        ("dt_s", "f8"),
-    ]
+FREQUENCY = record(
+    i8="law period_mean", f8="kp ki centre_rad_s lowest_rad_s highest_rad_s mode_shape_squared target_lag_rad dt_s"
 )
 """Parameters of the frequency law (one record). ``target_lag_rad``: wanted lag where the plan names none."""
 
-FREQUENCY_STATE = np.dtype(
-    [("omega", "f8"), ("integral", "f8"), ("mean_error_rad", "f8"), ("clamped", "i8"), ("taking_over", "i8")]
-)
+FREQUENCY_STATE = record(i8="clamped taking_over", f8="omega integral mean_error_rad")
 """State of the frequency law (one record): the oscillator's frequency (rad/s), the PI law's integral (rad/s), the mean phase
 error of the last whole period, whether the frequency is at an end of its window, and whether the law takes over at the next
 sample."""

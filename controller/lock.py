@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 from vibrolock.errors import InputError
 
@@ -29,29 +30,12 @@ SEARCHING, ACQUIRING, LOCKED, LOST = (int(state) for state in LockState)
 
 SWINGING = 3  # times as many far periods, less close ones, lose a lock whose phase swings to and fro
 
-THRESHOLDS = np.dtype(
-    [
-        ("locked_rad", "f8"),
-        ("locked_periods", "i8"),
-        ("lost_rad", "f8"),
-        ("lost_periods", "i8"),
-        ("waiting_rad", "f8"),
-        ("smallest_force_n", "f8"),
-        ("smallest_response", "f8"),
-    ]
+THRESHOLDS = record(
+    i8="locked_periods lost_periods", f8="locked_rad lost_rad waiting_rad smallest_force_n smallest_response"
 )
 """Thresholds at which a lock is gained and lost (one record)."""
 
-LOCK = np.dtype(
-    [
-        ("state", "i8"),
-        ("in_band_periods", "i8"),
-        ("out_of_band_periods", "i8"),
-        ("net_out_of_band_periods", "i8"),
-        ("out_of_band", "i8"),
-        ("gained", "i8"),
-    ]
-)
+LOCK = record(i8="state in_band_periods out_of_band_periods net_out_of_band_periods out_of_band gained")
 """State of the phase lock (one record). ``in_band_periods``, ``out_of_band_periods``: in a row, up to the present one;
 ``net_out_of_band_periods``: periods out of the band less those in it, at a held level; ``out_of_band``: the error of the
 present period exceeds that at which ramps wait; ``gained``: there has been a lock before."""

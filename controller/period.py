@@ -1,24 +1,11 @@
 """Means over one period of the oscillator; lock, settle rule and rig supervision use them."""
 
-import numpy as np
-
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, inner_kernel, kernel
 
-PERIOD = np.dtype(
-    [
-        ("sum_error", "f8"),
-        ("sum_force", "f8"),
-        ("sum_drive", "f8"),
-        ("sum_held", "f8"),
-        ("samples", "i8"),
-        ("error_rad", "f8"),
-        ("force_n", "f8"),
-        ("drive_m_s2", "f8"),
-        ("held", "f8"),
-        ("output_v", "f8"),
-        ("saturated", "i8"),
-        ("clamped", "i8"),
-    ]
+PERIOD = record(
+    i8="samples saturated clamped",
+    f8="sum_error sum_force sum_drive sum_held error_rad force_n drive_m_s2 held output_v",
 )
 """Sums over the current period, and means over the last complete period (one record).
 

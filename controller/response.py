@@ -8,29 +8,17 @@ from pydantic import Field
 
 from controller.primitives import log_proportional_integral, log_ratio, size, wrap
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 from vibrolock.errors import InputError
 
 PLANT_VARIES = 3.0  # factor by which the plant's gain may be off and is still followed
 
-RESPONSE_LOOP = np.dtype(
-    [
-        ("kp", "c16"),
-        ("ki", "f8"),
-        ("plant_gain", "c16"),
-        ("turns", "i8"),
-        ("gain", "f8"),
-        ("smallest_v", "f8"),
-        ("largest_v", "f8"),
-        ("dt_s", "f8"),
-    ]
-)
+RESPONSE_LOOP = record(i8="turns", f8="ki gain smallest_v largest_v dt_s", c16="kp plant_gain")
 """Parameters of the response loop (one record). ``turns``: whether the loop also holds the phase of the response, by turning
 the phase of the output; ``gain``: step of the low-pass that the loop's error passes."""
 
-RESPONSE_LOOP_STATE = np.dtype(
-    [("log_integral", "c16"), ("reference_turn", "f8"), ("error", "c16"), ("plant_ratio", "c16")]
-)
+RESPONSE_LOOP_STATE = record(f8="reference_turn", c16="log_integral error plant_ratio")
 """State of the response loop (one record). ``reference_turn``: angle at which the acceleration is held (rad);
 ``plant_ratio``: present gain of the plant, divided by the gain for which kp was designed."""
 

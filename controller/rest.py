@@ -8,17 +8,18 @@ from pydantic import Field
 from controller.detector import phase_lag
 from controller.primitives import size, wrap
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, inner_kernel
 from vibrolock.errors import InputError
 
-REST = np.dtype([("gain", "f8"), ("share", "f8"), ("mode_shape_squared", "f8"), ("dt_s", "f8")])
+REST = record(f8="gain share mode_shape_squared dt_s")
 """Parameters of the estimate (one record).
 
 ``gain``: step of the low-pass used for the response's rate of change; 0 takes force and lag as measured. ``share``: part of
 the force causing that rate of change which is subtracted. ``mode_shape_squared``: the drive point's mode shape squared
 (1/kg)."""
 
-REST_STATE = np.dtype([("late_force", "c16"), ("late_drive", "c16")])
+REST_STATE = record(c16="late_force late_drive")
 """State of the estimate (one record): fundamentals of force and drive after one more low-pass."""
 
 

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from controller.primitives import log_ratio
 from controller.settings import Settings
+from vibrolock.arrays import record
 from vibrolock.compiled import Record, kernel
 
 SLOPE_FORGETS = 0.5  # rate at which the slope estimate forgets, as a fraction of the loop's integral gain
@@ -17,20 +18,11 @@ STEEPEST = 10.0
 UNMOVED = 1e-7  # square of a logarithmic change (0.03 %) below which the slope estimate tends to 1
 SMALLEST_M = 1e-15  # about the size of an atomic nucleus: lower bound of displacements in logarithms
 
-REFERENCE = np.dtype([("ki", "f8"), ("follows_slope", "i8"), ("dt_s", "f8")])
+REFERENCE = record(i8="follows_slope", f8="ki dt_s")
 """Parameters of the loop (one record). ``follows_slope``: whether the loop's gain is divided by the slope of the force over
 the response."""
 
-REFERENCE_STATE = np.dtype(
-    [
-        ("log_displacement", "f8"),
-        ("slope_known", "i8"),
-        ("slow_x", "f8"),
-        ("slow_f", "f8"),
-        ("square_x", "f8"),
-        ("product_xf", "f8"),
-    ]
-)
+REFERENCE_STATE = record(i8="slope_known", f8="log_displacement slow_x slow_f square_x product_xf")
 """State of the loop (one record): logarithm of the wanted displacement (m), and sums for estimating the slope."""
 
 

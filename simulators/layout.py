@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vibrolock.arrays import record
+
 
 class Flag(IntFlag):
     """Faults of a sample; ``sample`` returns these bits, or-ed."""
@@ -50,24 +52,14 @@ N_PARAMETER = 8
 N_NODE = 513
 """Nodes of a table."""
 
-PLANT = np.dtype([("n_state", "i8"), ("n_local", "i8"), ("n_joint", "i8"), ("substeps", "i8"), ("input_limit_v", "f8")])
+PLANT = record(i8="n_state n_local n_joint substeps", f8="input_limit_v")
 """Sizes, and the voltage beyond which the amplifier clips (one record)."""
 
-SITE = np.dtype(
-    [
-        ("kind", "i8"),
-        ("limit", "f8"),
-        ("stiffness", "f8"),
-        ("strength", "f8"),
-        ("quadratic", "f8"),
-        ("gap", "f8"),
-        ("other_gap", "f8"),
-        ("offset", "f8"),
-        ("partner", "i8"),
-        ("address", "i8"),
-        ("parameters", "f8", (N_PARAMETER,)),
-        ("table", "f8", (2, N_NODE)),
-    ]
+SITE = record(
+    ("parameters", "f8", (N_PARAMETER,)),
+    ("table", "f8", (2, N_NODE)),
+    i8="kind partner address",
+    f8="limit stiffness strength quadratic gap other_gap offset",
 )
 """A local site. ``limit``: limit of validity (m). ``stiffness``: linear stiffness that the linear plant already contains (N/m).
 ``strength``: K0 (N m^4), k3 (N/m^3) or k (N/m). ``quadratic``: quadratic stiffness k2 (N/m^2). ``gap``, ``other_gap`` (m).
@@ -78,27 +70,11 @@ of a user's function, valid in the process that made the table; ``parameters``: 
 ``table``: of a force table, force (N) and its slope times the distance of the nodes, evenly from ``gap`` to ``other_gap``, with
 the slopes ``quadratic`` below and ``strength`` above (N/m); of a damping table, the damping (N s/m) in the first row."""
 
-CHANNEL = np.dtype(
-    [
-        ("noise_v", "f8"),
-        ("range_v", "f8"),
-        ("delay", "i8"),
-    ]
-)
+CHANNEL = record(i8="delay", f8="noise_v range_v")
 """A sensor: noise of sensor and converter together (RMS, V), the sensor's own range (V), and the number of internal instants
 back to its first tap."""
 
-CONVERTER = np.dtype(
-    [
-        ("oversampling", "i8"),
-        ("adc_step_v", "f8"),
-        ("adc_codes_per_v", "f8"),
-        ("adc_range_v", "f8"),
-        ("dac_step_v", "f8"),
-        ("dac_range_v", "f8"),
-        ("dac_noise_v", "f8"),
-    ]
-)
+CONVERTER = record(i8="oversampling", f8="adc_step_v adc_codes_per_v adc_range_v dac_step_v dac_range_v dac_noise_v")
 """Internal instants per sample, steps and ranges, noise of the output (one record). A step of zero means no quantisation."""
 
 

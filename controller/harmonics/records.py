@@ -2,9 +2,8 @@
 
 from enum import IntEnum
 
-import numpy as np
-
 from controller.adaptive_filter import MOST_HARMONICS
+from vibrolock.arrays import record
 
 ORDERS = (MOST_HARMONICS + 1,)
 
@@ -24,24 +23,12 @@ class HarmonicStage(IntEnum):
 
 WAITING, LISTENING, PROBING, CONTROLLING = (int(stage) for stage in HarmonicStage)
 
-HARMONICS = np.dtype(
-    [
-        ("highest", "i8"),
-        ("of_drive", "i8"),
-        ("corner", "f8"),
-        ("integral", "f8"),
-        ("largest", "f8"),
-        ("probe", "f8"),
-        ("tolerance", "f8"),
-        ("smallest", "f8"),
-        ("high_pass_rad_s", "f8"),
-        ("largest_v", "f8"),
-        ("step_v", "f8"),
-        ("dt_s", "f8"),
-        ("wanted", "c16", ORDERS),
-        ("plant", "c16", ORDERS),
-        ("left_alone", "i8", ORDERS),
-    ]
+HARMONICS = record(
+    ("wanted", "c16", ORDERS),
+    ("plant", "c16", ORDERS),
+    ("left_alone", "i8", ORDERS),
+    i8="highest of_drive",
+    f8="corner integral largest probe tolerance smallest high_pass_rad_s largest_v step_v dt_s",
 )
 """Parameters of the harmonics loop (one record). ``highest``: H, or 0 without the loop. ``of_drive``: the controlled channel
 is the drive. ``corner``, ``integral``: fractions of the oscillator's frequency. ``largest``: bound of |V_h| over the
@@ -50,38 +37,13 @@ always counts as none. ``largest_v``: bound of the whole output. ``step_v``: bou
 the next. ``wanted``: ratios to the fundamental, where the plan names none. ``plant``: P_h where it is known, else 0.
 ``left_alone``: harmonics that are not controlled."""
 
-HARMONICS_STATE = np.dtype(
-    [
-        ("stage", "i8"),
-        ("periods", "i8"),
-        ("probes", "i8"),
-        ("miss", "f8"),
-        ("miss_before", "f8"),
-        ("amplitude_v", "f8"),
-        ("share", "f8"),
-        ("probe_v", "f8"),
-        ("probe", "f8", ORDERS),
-        ("bounded", "i8"),
-        ("unsteady", "i8"),
-        ("samples", "i8"),
-        ("off", "i8", ORDERS),
-        ("prescribed", "i8"),
-        ("wanted", "c16", ORDERS),
-        ("phasors", "c16", ORDERS),
-        ("filter", "c16", ORDERS),
-        ("aim", "c16", ORDERS),
-        ("volts", "c16", ORDERS),
-        ("error", "c16", ORDERS),
-        ("judged", "c16", ORDERS),
-        ("sum", "c16", ORDERS),
-        ("before", "c16", ORDERS),
-        ("plant", "c16", ORDERS),
-        ("total", "c16", ORDERS),
-        ("mean", "c16", ORDERS),
-        ("scatter_square", "f8", ORDERS),
-        ("quiet_square", "f8", ORDERS),
-        ("square", "f8", ORDERS),
-    ]
+HARMONICS_STATE = record(
+    ("off", "i8", ORDERS),
+    *((name, "f8", ORDERS) for name in ("probe", "scatter_square", "quiet_square", "square")),
+    *((name, "c16", ORDERS) for name in ("wanted", "phasors", "filter", "aim", "volts", "error", "judged")),
+    *((name, "c16", ORDERS) for name in ("sum", "before", "plant", "total", "mean")),
+    i8="stage periods probes bounded unsteady samples prescribed",
+    f8="miss miss_before amplitude_v share probe_v",
 )
 """State of the harmonics loop (one record). ``periods``: of the present stage. ``probes``: how often the plant was measured
 again. ``miss``: largest judged error over its tolerance; infinite before the loop controls. ``unsteady``: unsteady periods

@@ -113,12 +113,18 @@ def rig_arrays(
     seed: int,
 ) -> RigArrays:
     """Discretise the plant and tabulate sites, sensors and converters; ``outputs``: one row per sensor."""
-    step = step_columns(plant, len(joints), _step_s(converter))
+    step = step_columns(plant, len(joints), converter.step_s)
     jenkins = jenkins_elements(joints)
     substeps = converter.substeps // converter.oversampling
     sizes = (plant.dynamics.shape[0], plant.n_local, len(joints), substeps, exciter.input_limit_v)
     delays, taps = skew_taps(sensors, converter)
-    channels = [_channel(*pair, converter, noise_scale) for pair in zip(sensors, delays, strict=True)]
+    noise_v = [
+        math.hypot(noise_scale * one.noise_rms * one.sensitivity_v_per_unit, converter.adc_noise_v) for one in sensors
+    ]
+    channels = np.zeros(len(sensors), CHANNEL)
+    channels["delay"], channels["noise_v"], channels["range_v"] = delays, noise_v, [one.range_v for one in sensors]
+    sections = channel_sections(sensors, converter)
+    padded = pad(sections.reshape(-1, len(sensors)), rows=False)
     conditioning = [_conditioning(sensor, converter) for sensor in sensors]
     return RigArrays(
         plant=np.array([sizes], PLANT),
@@ -128,11 +134,11 @@ def rig_arrays(
         elements=jenkins,
         stuck=jenkins[0].sum(axis=0),
         sense=pad(np.array(outputs).T),
-        channels=np.array(channels, CHANNEL),
+        channels=channels,
         conditioning=pad(np.array(conditioning).T, rows=False),
         converter=_converter(converter),
         noise_keys=np.random.SeedSequence(seed).generate_state(1 + len(sensors), np.uint64).astype(np.uint64),
-        sections=_padded_sections(channel_sections(sensors, converter)),
+        sections=padded.reshape(*sections.shape[:2], round_up(len(sensors))),
         reconstruction=output_sections(converter),
         taps=taps,
     )
@@ -142,13 +148,8 @@ def rediscretised(
     rig: RigArrays, plant: LinearPlant, n_joint: int, outputs: Sequence[Float], converter: Converter
 ) -> RigArrays:
     """Return a rig's arrays for another plant with the same coordinates and sites; ``outputs``: one row per sensor."""
-    step = step_columns(plant, n_joint, _step_s(converter))
+    step = step_columns(plant, n_joint, converter.step_s)
     return rig._replace(step=step.predictor, correct=step.corrector, sense=pad(np.array(outputs).T))
-
-
-def _step_s(converter: Converter) -> float:
-    """Return the integration step (s)."""
-    return 1.0 / (converter.sample_rate_hz * converter.substeps)
 
 
 def jenkins_elements(joints: Sequence[FrictionSite]) -> Float:
@@ -182,17 +183,6 @@ def at_rest(rig: RigArrays) -> RigState:
     )
 
 
-def _channel(sensor: Sensor, delay: int, converter: Converter, noise_scale: float) -> tuple[float, float, int]:
-    noise_v = math.hypot(noise_scale * sensor.noise_rms * sensor.sensitivity_v_per_unit, converter.adc_noise_v)
-    return noise_v, sensor.range_v, delay
-
-
-def _padded_sections(sections: Float) -> Float:
-    """Return sections [n_section, 5, n_channel] with their channels padded with zeros."""
-    n_section, n_coefficient, n_channel = sections.shape
-    return pad(sections.reshape(-1, n_channel), rows=False).reshape(n_section, n_coefficient, round_up(n_channel))
-
-
 def _conditioning(sensor: Sensor, converter: Converter) -> tuple[float, float, float, float, float]:
     """Return how a sensor turns its quantity into volts: a column of ``RigArrays.conditioning``.
 
@@ -207,17 +197,8 @@ def _conditioning(sensor: Sensor, converter: Converter) -> tuple[float, float, f
 
 
 def _converter(converter: Converter) -> NDArray[Any]:
-    return np.array(
-        [
-            (
-                converter.oversampling,
-                converter.adc_step_v,
-                1.0 / converter.adc_step_v if converter.adc_bits else 0.0,
-                converter.adc_range_v,
-                converter.dac_step_v,
-                converter.dac_range_v,
-                converter.dac_noise_v,
-            )
-        ],
-        CONVERTER,
-    )
+    out = np.zeros(1, CONVERTER)
+    for name in ("oversampling", "adc_step_v", "adc_range_v", "dac_step_v", "dac_range_v", "dac_noise_v"):
+        out[name] = getattr(converter, name)
+    out["adc_codes_per_v"] = 1.0 / converter.adc_step_v if converter.adc_bits else 0.0
+    return out

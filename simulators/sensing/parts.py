@@ -129,6 +129,11 @@ class Converter(Part):
         return self.sample_rate_hz * self.oversampling
 
     @property
+    def step_s(self) -> float:
+        """Integration step."""
+        return 1.0 / (self.sample_rate_hz * self.substeps)
+
+    @property
     def adc_step_v(self) -> float:
         """Voltage of one input code; 0 without quantisation."""
         return 2.0 * self.adc_range_v / 2.0**self.adc_bits if self.adc_bits else 0.0
